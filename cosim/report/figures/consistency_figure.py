@@ -11,7 +11,7 @@ from cosim.drawing.style import GAP, MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.consistency import FilterConsistency, Kind, filter_consistency
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, time_axis
+from cosim.report.figures.drawing import curve, legend_above, logarithmic, mark_evaluation, time_axis
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 from fmu_observer.filtering.consistency import chi_square_band
@@ -66,7 +66,7 @@ def _figure(result: Result, spec: ReportSpec, ax: Axes, kinds: Sequence[Kind]) -
         text = f"{text}: {100.0 * inside:.3g} % inside"
         drawn = np.clip(mean, SMALLEST, LARGEST)
         curve(ax, entry.time[count - 1 :], drawn, None, label=text, **observer_line(names, name))
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_ylabel(f"{kinds[0]} / degrees of freedom [1]")
     mark_evaluation(ax, result, spec)
     time_axis(ax, result)

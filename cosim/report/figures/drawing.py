@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from cosim.drawing.style import ALARM, BLACK, MARK, TIME, ZONE
 from cosim.evaluation.event_counts import accepted_stamps
+from cosim.evaluation.numbers import number
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import curve_size
 from cosim.results.result import Result
@@ -132,6 +134,17 @@ def time_axis(ax: Axes, result: Result) -> None:
     ax.set_xlabel(TIME)
     if len(result.time) and result.time[-1] > result.time[0]:
         ax.set_xlim(float(result.time[0]), float(result.time[-1]))
+
+
+def logarithmic(ax: Axes) -> None:
+    """A logarithmic ordinate with plain numbers at its decades.
+
+    Args:
+        ax: the axes.
+    """
+    ax.set_yscale("log")
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 1)))
 
 
 def legend_above(ax: Axes, leave_out: Sequence[str] = ()) -> None:

@@ -8,14 +8,21 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, NullLocator
 
 from cosim.drawing.style import MARK, WILD_LINE, axes_or_new, observer_line, styled
 from cosim.evaluation.metrics import error_size
 from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import balise_ticks, curve, legend_above, mark_evaluation, shade_zones, time_axis
+from cosim.report.figures.drawing import (
+    balise_ticks,
+    curve,
+    legend_above,
+    logarithmic,
+    mark_evaluation,
+    shade_zones,
+    time_axis,
+)
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum, window_length
 from cosim.results.result import Result
@@ -125,10 +132,8 @@ def _apply(ax: Axes, scale: ErrorScale, quantity: Quantity, unit: str, window: f
         ax.set_ylim(-scale.limit, scale.limit)
         ax.set_ylabel(f"{quantity.capitalize()} error [{unit}]")
         return
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_ylim(scale.floor, scale.limit)
-    ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 1)))
     ax.set_ylabel(f"|{quantity} error| [{unit}]\nlargest in {number(window, 1)} s")
 
 

@@ -9,7 +9,7 @@ from cosim.drawing.style import MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.fault_detection import DETECTION, intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import legend_above, time_axis
+from cosim.report.figures.drawing import legend_above, logarithmic, time_axis
 from cosim.report.figures.panel import Panel, any_estimate
 from cosim.report.figures.scales import bounded, running_maximum, window_length
 from cosim.results.result import Result
@@ -69,7 +69,7 @@ def bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
         ax.plot(middles, sizes, label=label(spec, observer), **observer_line(spec.observers, observer))
         largest = max(largest, float(np.max(sizes, initial=0.0)))
     ax.axhline(1.0, color=MARK, linewidth=1.2, label="bound")
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_ylim(1.0 / DECADES, 1.5 * largest)
     ax.set_ylabel("|Speed error| / bound [1]")
     time_axis(ax, result)

@@ -16,7 +16,7 @@ from cosim.evaluation.facts import mapping_entry, number_entry
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
+from cosim.report.figures.drawing import legend_above, logarithmic, shade_zones, time_axis
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import bounded
 from cosim.results.result import Result
@@ -127,7 +127,7 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
     way = np.linspace(0.0, max(1.05 * float(np.max(lengths, initial=0.0, where=np.isfinite(lengths))), 1.0), 50)
     ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=GRANTED)
     ax.set_xlim(way[0], way[-1])
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_xlabel("Way since the last balise [m]")
     ax.set_ylabel("|Position error| at the end [m]")
     legend_above(ax)

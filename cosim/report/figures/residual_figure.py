@@ -11,7 +11,7 @@ from cosim.drawing.style import MARK, OBSERVER_LINES, PALE_RED, axes_or_new, sty
 from cosim.evaluation.fault_detection import intervals
 from cosim.evaluation.roles import recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import legend_above, thin, time_axis
+from cosim.report.figures.drawing import legend_above, logarithmic, thin, time_axis
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 
@@ -56,7 +56,7 @@ def residual_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) ->
         ax.plot(time, values, label=f"{observer}: {text}" if several else text, **OBSERVER_LINES[coloured % 6])
         coloured += 1
     ax.axhline(1.0, color=MARK, linewidth=1.2, label="threshold")
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_ylim(bottom=FLOOR)
     ax.set_ylabel("Residual / threshold [1]")
     time_axis(ax, result)
