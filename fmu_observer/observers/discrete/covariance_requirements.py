@@ -59,7 +59,6 @@ def is_positive(matrix: Array) -> Array:
     lower, fits, size = factor(matrix), 1.0 + 0.0 * matrix[0, 0], matrix.shape[0]
     rest = matrix - lower @ lower.T
     for i in range(size):
-        fits = fits * np.where(matrix[i, i] >= 0.0, 1.0, 0.0)
         for j in range(i + 1):
             fits = fits * _small(rest[i, j], matrix, i, j, CARRIED_ROUNDING)
     return fits

@@ -39,6 +39,10 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
         {"observer.options.premise": {"x2": 3}},
         r"observer.options.premise: expected a text, .* or a table of lists of finite numbers .*got {'x2': 3}",
     ),
+    "option that is no number": (
+        {"locomotive.options.zone_count": float("nan")},
+        "zone_count: expected a text.*got nan",
+    ),
     "bad option": ({"observer.options.premise": "dead"}, "'dead'.*'frozen'"),
     "unknown parameter": ({"locomotive.mas": 1.0}, "locomotive: no variable 'mas'.*'mass'"),
     "list shorter than its vector": (
