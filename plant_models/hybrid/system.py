@@ -14,14 +14,13 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from plant_models.hybrid.declarations import check_declarations
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import Signal, parameter, width
 
 Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
 Method = Literal["rk4", "rosenbrock", "euler"]
-
-RESERVED_NAMES = frozenset({"time", "internal_step", "seed", "late_policy", "replay_horizon", "held_switches"})
 
 
 def vector(*components: Array) -> Array:
@@ -92,7 +91,7 @@ class HybridSystem:
 
     def __init__(self, **options: Any) -> None:
         self.options: dict[str, Any] = options
-        self._check_declarations()
+        check_declarations(self)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -329,76 +328,6 @@ class HybridSystem:
     @cached_property
     def _parameter_type(self) -> Any:
         return namedtuple("Parameters", [s.name for s in self.parameter_signals])
-
-    def _check_declarations(self) -> None:
-        where = f"{type(self).__name__} ({self.name!r})"
-        if not self.name.isidentifier():
-            raise ValueError(f"{where}: the system's name must be a legal identifier.")
-        names = [s.name for s in (*self.states, *self.input_signals, *self.outputs, *self.parameters)]
-        names += [e.name for e in self.events]
-        names += [name for e in self.triggered_events for name in e.implied_names]
-        repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED_NAMES & set(names)))
-        if repeated:
-            raise ValueError(f"{where}: names used twice or reserved: {', '.join(repeated)}.")
-        self._check_causalities(where)
-        self._check_event_prefixes(where)
-        unknown_stiff = sorted(set(self.stiff) - {s.name for s in self.states if s.variability == "continuous"})
-        if unknown_stiff:
-            raise ValueError(f"{where}: stiff names {unknown_stiff}; expected names of continuous states.")
-        variabilities = [s.variability for s in self.states]
-        if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
-            raise ValueError(f"{where}: list continuous states before memory.")
-        self._check_warnings(where)
-        scalars = {s.name for s in self.parameters if s.size is None}
-        for event in self.periodic_events:
-            for reference in filter(None, (event.period, event.offset)):
-                if reference not in scalars:
-                    raise ValueError(
-                        f"{where}: event {event.name!r} refers to unknown parameter {reference!r}; expected a scalar "
-                        f"one."
-                    )
-        vectors = {s.name for s in self.parameters if s.size is not None}
-        for resource in self.resources:
-            if resource.parameter not in vectors:
-                raise ValueError(
-                    f"{where}: {resource.file} is to set {resource.parameter!r}; expected a vector parameter."
-                )
-        known = {s.name for s in (*self.parameter_signals, *self.states)}
-        for preset, values in self.presets.items():
-            unknown = sorted(set(values) - known)
-            if unknown:
-                raise ValueError(f"{where}: preset {preset!r} sets unknown parameters {unknown}.")
-
-    def _check_causalities(self, where: str) -> None:
-        lists = (("states", "local"), ("inputs", "input"), ("outputs", "output"), ("parameters", "parameter"))
-        for attribute, causality in lists:
-            for signal in getattr(self, attribute):
-                if signal.causality != causality:
-                    raise ValueError(
-                        f"{where}: {signal.name!r} is listed in {attribute} but has causality {signal.causality!r}, "
-                        f"expected {causality!r}."
-                    )
-
-    def _check_warnings(self, where: str) -> None:
-        outputs = {s.name for s in self.outputs if s.size is None}
-        for signal in self.outputs:
-            unknown = [] if signal.warning is None else sorted(set(signal.warning.shows) - outputs)
-            if unknown:
-                raise ValueError(
-                    f"{where}: the warning of {signal.name!r} is to show {', '.join(unknown)}; expected scalar outputs."
-                )
-
-    def _check_event_prefixes(self, where: str) -> None:
-        """A master finds the payload of an event by its prefix; nothing else that it sees may begin so."""
-        for event in self.triggered_events:
-            payload = {s.name for s in event.payload}
-            others = [s.name for s in self.inputs] + [e.name for e in self.triggered_events]
-            others += [s.name for e in self.triggered_events for s in e.payload if s.name not in payload]
-            confusing = [name for name in others if name.startswith(f"{event.name}_")]
-            if confusing:
-                raise ValueError(
-                    f"{where}: {', '.join(confusing)} would be taken for payload of event {event.name!r}; rename."
-                )
 
     def _checked(self, function: str, values: Array, count: int) -> Array:
         if not getattr(values, "shape", ()):
