@@ -20,7 +20,7 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.system import Array
-from plant_models.railway.sensors.sampling import sampling
+from plant_models.railway.sensors.sampling import sampling_event
 
 BAR = 1e5  # [Pa]
 
@@ -60,7 +60,7 @@ class BrakePressureSensor(HybridSystem):
         parameter("resolution", "Pa", 244.0, "Step of the converter; 0 for none", min=0.0),
         parameter("span", "Pa", 10.0 * BAR, "Largest reading", min=1.0, display_unit="bar"),
     )
-    events = (sampling("The pressure is read"),)
+    events = (sampling_event("The pressure is read"),)
     presets: Mapping[str, Mapping[str, Any]] = {
         "class_0_5": {},
         "ideal": {"scale_error": 0.0, "offset": 0.0, "noise_std": 0.0, "resolution": 0.0},

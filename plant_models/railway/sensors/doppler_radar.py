@@ -20,7 +20,7 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.system import Array
-from plant_models.railway.sensors.sampling import sampling
+from plant_models.railway.sensors.sampling import sampling_event
 
 
 class DopplerRadar(HybridSystem):
@@ -63,7 +63,7 @@ class DopplerRadar(HybridSystem):
         ),
         parameter("lowest_speed", "m/s", 0.1, "Speed below which the reading is zero", min=0.0, display_unit="km/h"),
     )
-    events = (sampling("The radar is read"),)
+    events = (sampling_event("The radar is read"),)
     presets: Mapping[str, Mapping[str, Any]] = {
         "measured": {},
         "ideal": {"scale_error": 0.0, "noise_share": 0.0, "noise_std": 0.0, "lowest_speed": 0.0},

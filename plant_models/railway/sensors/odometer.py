@@ -21,7 +21,7 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window
-from plant_models.railway.sensors.sampling import sampling
+from plant_models.railway.sensors.sampling import sampling_event
 
 
 class Odometer(HybridSystem):
@@ -65,7 +65,7 @@ class Odometer(HybridSystem):
         parameter("teeth", "1", 0.0, "Pulses in one revolution; 0 for no quantisation", min=0.0),
         parameter("wheel_radius", "m", 0.575, "Radius of the wheel", min=1e-3),
     )
-    events = (sampling("The odometer is read", "sample_offset"),)
+    events = (sampling_event("The odometer is read", "sample_offset"),)
     presets: Mapping[str, Mapping[str, Any]] = {
         "ideal": {},
         "10_hz": {"sample_period": 0.1},

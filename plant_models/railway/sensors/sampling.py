@@ -9,7 +9,7 @@ READING_NOISE = input_signal(
 )
 
 
-def sampling(description: str, offset: str | None = None) -> PeriodicEvent:
+def sampling_event(description: str, offset: str | None = None) -> PeriodicEvent:
     """The periodic event of a sensor: its period is the parameter `sample_period`, its noise `reading_noise`.
 
     Args:
