@@ -168,7 +168,7 @@ def solve(
         used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
     if problem.disturbed:
         before = arrival.mean - np.reshape(arrival.covariance, (n, n)) @ adjoint
-        _, (points,) = scan_table(_followed(problem), (before,), (rows, points), (shared,))
+        _, (points,) = scan_table(_followed(problem), (arrival.point, before), (rows, points), (shared,))
     held = np.reshape(np.sum(np.abs(active[-1])), (1,))
     residual = np.sqrt(sums[0:1] / np.maximum(sums[2:3], 1.0))
     far = sums[3:4] / np.maximum(sums[2:3], 1.0)
@@ -261,16 +261,17 @@ def _followed(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     """A row as near to its estimate as the bounds of disturbances and states allow; where both cannot be, a state's."""
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (before,), (row_flat, point), (shared,) = carry, given, known
+        (about, before), (row_flat, point), (shared,) = carry, given, known
         row = problem.layout.unpacked(row_flat)
-        goes, moved = row.moves > 0.5, problem.moved(before, row, shared).state
+        goes, into = row.moves > 0.5, problem.moved(about, row, shared)
+        moved = into.state + into.F @ (before - about)
         lower, upper = problem.noise_limits(row, shared)
         values = [point[i] for i in range(problem.order)]
         for k, i in enumerate(problem.disturbed):
             within = np.minimum(np.maximum(values[i], moved[i] + lower[k]), moved[i] + upper[k])
             values[i] = np.where(goes, within, values[i])
         x = problem.clipped(vector(*values), shared)
-        return (x,), (x,)
+        return (x, x), (x,)
 
     return body
 

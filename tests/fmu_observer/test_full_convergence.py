@@ -61,7 +61,7 @@ def test_with_a_robust_loss_it_is_many_passes():
     assert abs(full.x[0] - 10.0 * full.t) < 5.0, "the false balise does not pull by 40 m"
 
 
-@pytest.mark.parametrize("options", [{}, {"noise_bounds": {"rate": [-1e-3, 1e-3]}}])
+@pytest.mark.parametrize("options", [{}, {"noise_bounds": {"angle": [-1e-3, 1e-3]}}])
 def test_of_any_model_it_is_many_passes(options):
     found = []
     for make, more in ((FullMovingHorizonObserver, {"tolerance": 1e-9}), (_Passes, {"passes": 8})):
