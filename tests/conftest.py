@@ -7,7 +7,7 @@ from __future__ import annotations
 import gc
 import os
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from zlib import crc32
@@ -86,6 +86,16 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     terminalreporter.section(f"processor time of tests: {sum(spent.values()):.0f} s, most of it in")
     for file in dearest:
         terminalreporter.write_line(f"{spent[file]:7.1f} s  {file}")
+
+
+@pytest.fixture
+def charge(request: pytest.FixtureRequest) -> Callable[[float], None]:
+    """Adds to the time of a test what was spent for it in a process that this one does not wait for [s]."""
+
+    def add(spent: float) -> None:
+        request.node.stash[BEGUN] -= spent
+
+    return add
 
 
 def processor_time() -> float:
