@@ -59,9 +59,14 @@ Run = Callable[..., Done]
 
 
 class Forked:
-    """The handle on a server, begun with the first command."""
+    """The handle on a server, begun with the first command.
+
+    Attributes:
+        spent: processor time of all commands together [s].
+    """
 
     def __init__(self) -> None:
+        self.spent = 0.0
         self._server: subprocess.Popen[str] | None = None
 
     def run(
@@ -96,6 +101,7 @@ class Forked:
         self._server.stdin.write(json.dumps(order) + "\n")
         self._server.stdin.flush()
         answer = json.loads(self._server.stdout.readline())
+        self.spent += answer["spent"]
         written = Path(order["output"]).read_text(encoding="utf-8", errors="replace")
         return Done(answer["returncode"], written, answer["spent"])
 
