@@ -17,12 +17,10 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inputs, referenced
 from fmus.content.casadi_source import private_source
+from fmus.content.rolled_loops import rolled_loops
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, traced_once, width
 from plant_models.hybrid.kernel import check_payloads
-from plant_models.hybrid.requirements import named_parameters
-
-MOST_NAMED = 4
-"""Parameters named by one requirement whose values the C runtime tells, as in `runtime/model.h`."""
+from plant_models.hybrid.requirements import MOST_NAMED, named_values
 
 
 class GenerationError(ValueError):
@@ -40,8 +38,9 @@ class Equations:
         derivative: ``(t, x, u, p, s) -> derivatives``, or None where nothing flows.
         balance: ``(t, x, u, p, s) -> flows, frictions, switching functions``, or None where all are empty.
         tangent: ``(t, x, u, p, s, dt, dx, du, dp) -> dy, d derivative``, or None where both are empty.
-        requirements: ``(p) -> 1 for each that is fulfilled``, or None without any.
+        requirements: ``(x, p) -> 1 for each that is fulfilled``, or None without any.
         requirement_texts: what is said where one is not.
+        lasting_count: how many of them are not about start values alone; they come first.
     """
 
     step: ca.Function | None
@@ -52,6 +51,7 @@ class Equations:
     tangent: ca.Function | None
     requirements: ca.Function | None
     requirement_texts: tuple[str, ...]
+    lasting_count: int
 
     def functions(self) -> list[ca.Function]:
         """All of them, in a fixed order."""
@@ -88,7 +88,7 @@ def trace_equations(system: HybridSystem) -> Equations:
     jumps = {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
     check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
     prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))
-    events, required = system.frictions or system.switchings, _requirement_texts(system)
+    events, (lasting, at_start) = system.frictions or system.switchings, _requirement_texts(system)
     return Equations(
         step=_dense(traced.step, f"{prefix}_step", system.continuous_count) if flows else None,
         output=_dense(traced.output, f"{prefix}_output") if outputs else None,
@@ -98,8 +98,9 @@ def trace_equations(system: HybridSystem) -> Equations:
         derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
         balance=_dense(traced.balance, f"{prefix}_balance") if events else None,
         tangent=_dense(traced.tangent, f"{prefix}_tangent") if flows or outputs else None,
-        requirements=_dense(traced.requirements, f"{prefix}_requirements") if required else None,
-        requirement_texts=required,
+        requirements=_dense(traced.requirements, f"{prefix}_requirements") if lasting or at_start else None,
+        requirement_texts=(*lasting, *at_start),
+        lasting_count=len(lasting),
     )
 
 
@@ -139,8 +140,10 @@ def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Func
     return ca.Function(name, arguments, ca.cse([results[0][:rows], *results[1:]]))
 
 
-def _requirement_texts(system: HybridSystem) -> tuple[str, ...]:
-    return tuple(system.requirements(system.unpack_parameters(system.start_parameters())))
+def _requirement_texts(system: HybridSystem) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Of requirements that last, and of those of start values."""
+    p = system.unpack_parameters(system.start_parameters())
+    return tuple(system.requirements(p)), tuple(system.start_requirements(system.start_state(), p))
 
 
 def _equations_source(name: str, equations: Equations) -> str:
@@ -150,7 +153,7 @@ def _equations_source(name: str, equations: Equations) -> str:
         generator.add(function)
     source = private_source(generator.dump(), {function.name() for function in equations.functions()})
     roomy = [_with_room(function) for function in equations.functions() if _calls(function)]
-    return "\n\n".join([source.strip(), *roomy]) + "\n"
+    return "\n\n".join([rolled_loops(source).strip(), *roomy]) + "\n"
 
 
 def _calls(function: ca.Function) -> bool:
@@ -216,7 +219,8 @@ def _resource_rows(system: HybridSystem) -> list[str]:
 
 
 def _requirement_rows(system: HybridSystem, equations: Equations) -> list[str]:
-    named = [(text, named_parameters(system, text)[:MOST_NAMED]) for text in equations.requirement_texts]
+    texts = equations.requirement_texts
+    named = zip(texts, (places[:MOST_NAMED] for places in named_values(system, texts)), strict=True)
     return [f"{_text(text)}, {len(places)}, {{{', '.join(map(str, places or [0]))}}}" for text, places in named]
 
 
@@ -293,6 +297,7 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "tangent": _name(equations.tangent),
         "first_reference": FIRST_REFERENCE,
         "requirement_count": len(equations.requirement_texts),
+        "lasting_count": equations.lasting_count,
         "requirements": "requirements",
         "fulfilled": _name(equations.requirements),
         "variable_count": len(description.modelVariables),

@@ -96,22 +96,24 @@ static Status cannot_run(const Instance *instance, const char *name, double valu
     return instance_fail(instance, "time cannot run with parameter %s = %.17g; set it to a legal value", name, value);
 }
 
-/* With the values of the parameters that the requirement names. */
+/* With the values of the parameters and states that the requirement names. */
 static Status not_fulfilled(const Instance *instance, const Requirement *requirement) {
     char values[MOST_NAMED * 128] = "";
     for (int i = 0; i < requirement->named_count; i++) {
         size_t used = strlen(values);
-        const char *name = parameter_name(requirement->named[i]);
-        snprintf(values + used, sizeof values - used, "%s%s = %.17g", used ? ", " : " (", name, instance->runtime.p[requirement->named[i]]);
+        int place = requirement->named[i], state = place - model.parameters;
+        const char *name = state < 0 ? parameter_name(place) : variables_name(ROLES(ROLE_STATE), state);
+        double value = state < 0 ? instance->runtime.p[place] : instance->runtime.x[state];
+        snprintf(values + used, sizeof values - used, "%s%s = %.17g", used ? ", " : " (", name, value);
     }
-    return instance_fail(instance, "time cannot run with these parameters: %s%s%s", requirement->text, values, values[0] ? ")" : "");
+    return instance_fail(instance, "time cannot run with these values: %s%s%s", requirement->text, values, values[0] ? ")" : "");
 }
 
 PRIVATE Status instance_start(Instance *instance, Mode next) {
     double horizon = *instance->runtime.horizon;
     if (!(horizon >= 0.0 && isfinite(horizon)))
         return cannot_run(instance, "replay_horizon", horizon);
-    const Requirement *unfulfilled = runtime_unfulfilled(&instance->runtime);
+    const Requirement *unfulfilled = runtime_unfulfilled(&instance->runtime, true);
     if (unfulfilled != NULL)
         return not_fulfilled(instance, unfulfilled);
     int refused = runtime_start(&instance->runtime, instance->start_time);

@@ -30,12 +30,12 @@ typedef struct {
     int verdict;        /* position in x of what the model made of it, see `Verdict`; -1 where it uses every one */
 } TriggeredEvent;
 
-/* What parameters must fulfil. */
+/* What parameters and start values must fulfil. */
 #define MOST_NAMED 4
 typedef struct {
     const char *text; /* what is said where they do not */
     int named_count;
-    int named[MOST_NAMED]; /* positions in p of the parameters that it names */
+    int named[MOST_NAMED]; /* positions in p, then x, of the parameters and states that it names */
 } Requirement;
 
 /* A vector parameter that is read from a column of a CSV file among the FMU's resources. */
@@ -122,8 +122,9 @@ typedef struct {
     ModelFunction tangent;    /* (t, x, u, p, s, dt, dx, du, dp) -> dy, then d derivative; or NULL where both are empty */
     unsigned first_reference; /* value reference of the first variable; the others count up from there */
     int requirement_count;
+    int lasting_count; /* how many of them, the first, are not about start values alone */
     const Requirement *requirements;
-    ModelFunction fulfilled; /* (p) -> 1 for each requirement that the parameters fulfil; or NULL without any */
+    ModelFunction fulfilled; /* (x, p) -> 1 for each requirement that is fulfilled; or NULL without any */
     unsigned variable_count;
     const Variable *variables;
 } Model;

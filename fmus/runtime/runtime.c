@@ -237,13 +237,14 @@ static bool is_positive(double value) {
     return isfinite(value) && value > 0.0;
 }
 
-PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime) {
+PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime, bool starting) {
     if (model.fulfilled == NULL)
         return NULL;
-    const double *arguments[] = {runtime->p};
+    const double *arguments[] = {runtime->x, runtime->p};
     double *results[] = {runtime->required};
     model.fulfilled(arguments, results, runtime->integer_work, runtime->real_work, 0);
-    for (int i = 0; i < model.requirement_count; i++)
+    int count = starting ? model.requirement_count : model.lasting_count;
+    for (int i = 0; i < count; i++)
         if (runtime->required[i] == 0.0)
             return &model.requirements[i];
     return NULL;
@@ -372,7 +373,7 @@ static bool timing_is_sane(const Runtime *runtime) {
     for (int i = 0; i < model.periodic_count; i++)
         if (!is_positive(runtime->periods[i]) || !isfinite(runtime->offsets[i]) || !is_whole(runtime->ticks[i], 0.0, LARGEST_WHOLE - 1.0))
             return false;
-    if (runtime_unfulfilled(runtime) != NULL)
+    if (runtime_unfulfilled(runtime, false) != NULL)
         return false;
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return false;

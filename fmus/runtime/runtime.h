@@ -62,8 +62,8 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers);
 /* Back to the start values, at time zero. */
 PRIVATE void runtime_reset(Runtime *runtime);
 
-/* The first requirement that the parameters do not fulfil, or NULL. */
-PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime);
+/* The first requirement that parameters, and where time starts the states, do not fulfil, or NULL. */
+PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime, bool starting);
 
 /* Begin at t0 [s], fire the periodic events due there, then the communication events. Returns -1, or the position in p of a
    parameter with which time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */

@@ -1,13 +1,13 @@
-"""Requirements: what parameters must fulfil before time runs, and what is said where they do not.
+"""Requirements: what parameters and start values must fulfil before time runs, and what is said where they do not.
 
-A system declares them by `HybridSystem.requirements`, each as a text and a condition. Mirrored by `runtime_unfulfilled`
-of the C runtime. Knows systems, and nothing of time.
+A system declares them by `HybridSystem.requirements`, and for start values by `start_requirements`, each as a text and
+a condition. Mirrored by `runtime_unfulfilled` of the C runtime. Knows systems, and nothing of time.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from sys import float_info
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,10 @@ from plant_models.hybrid.signal import Signal, scalar_names
 
 if TYPE_CHECKING:
     from plant_models.hybrid.system import HybridSystem
+
+
+MOST_NAMED = 4
+"""Values that are told of one requirement, as in `runtime/model.h` of the C runtime."""
 
 
 def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
@@ -40,30 +44,46 @@ def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
     return needed
 
 
-def named_parameters(system: HybridSystem, text: str) -> list[int]:
-    """Positions in `p` of the parameters that a text names, in the order of the parameters.
+WORD = re.compile(r"\w+(?:\[[\d,]+\])?")
+"""A name of a variable as it stands in a text."""
+
+
+def named_values(system: HybridSystem, texts: Iterable[str]) -> list[list[int]]:
+    """Positions of the parameters and states that texts name, in ascending order: those of parameters in `p`, those of
+    states in `x`, counted on from the number of parameters.
 
     Args:
-        system: whose parameters are meant.
+        system: whose parameters and states are meant. texts: of requirements.
     """
-    return [
-        i
-        for i, name in enumerate(scalar_names(system.parameter_signals))
-        if re.search(rf"(?<!\w){re.escape(name)}(?![\w\[])", text)
-    ]
+    places = {name: i for i, name in enumerate(value_names(system))}
+    return [sorted({places[word] for word in WORD.findall(text) if word in places}) for text in texts]
 
 
-def unfulfilled(system: HybridSystem, p: np.ndarray) -> str | None:
-    """The first requirement that parameters do not fulfil, with the values of those it names; None where they fulfil
-    all.
+def value_names(system: HybridSystem) -> list[str]:
+    """Names of all that a requirement may be about: the parameters, then the states.
+
+    Args:
+        system: the hybrid system.
+    """
+    return list(scalar_names((*system.parameter_signals, *system.states)))
+
+
+def unfulfilled(system: HybridSystem, p: np.ndarray, start: np.ndarray | None = None) -> str | None:
+    """The first requirement that is not fulfilled, with the values of those it names; None where all are.
 
     Args:
         system: the hybrid system.
         p: its parameters, shape (k,).
+        start: state with which time would begin, shape (n,); None where time has begun.
     """
-    for text, fulfilled in system.requirements(system.unpack_parameters(p)).items():
+    unpacked = system.unpack_parameters(p)
+    needed = system.requirements(unpacked)
+    if start is not None:
+        needed = {**needed, **system.start_requirements(start, unpacked)}
+    for text, fulfilled in needed.items():
         if not fulfilled:
-            names = scalar_names(system.parameter_signals)
-            values = ", ".join(f"{names[i]} = {float(p[i])!r}" for i in named_parameters(system, text))
-            return f"{text} ({values})" if values else text
+            names, (places,) = value_names(system), named_values(system, [text])
+            values = [*p, *(() if start is None else start)]
+            told = ", ".join(f"{names[i]} = {float(values[i])!r}" for i in places[:MOST_NAMED])
+            return f"{text} ({told})" if told else text
     return None

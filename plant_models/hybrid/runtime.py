@@ -74,9 +74,8 @@ class Runtime:
         """Begin at `t0` [s] with the values that stand in `x`, `u`, `p`, and fire the events due there.
 
         Raises:
-            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed; or the
-            parameters do
-                not fulfil what the system requires.
+            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed; or
+                parameters or start values do not fulfil what the system requires.
         """
         self._check_timing()
         self._check_requirements()
@@ -159,9 +158,9 @@ class Runtime:
             raise ValueError(self._illegal("seed", "a whole number from 0 to 2**53"))
 
     def _check_requirements(self) -> None:
-        broken = unfulfilled(self.system, self.p)
+        broken = unfulfilled(self.system, self.p, self.x)
         if broken is not None:
-            raise ValueError(f"{self.system.name}: time cannot run with these parameters: {broken}.")
+            raise ValueError(f"{self.system.name}: time cannot run with these values: {broken}.")
 
     def _illegal(self, name: str, expected: str) -> str:
         return (

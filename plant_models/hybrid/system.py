@@ -64,6 +64,7 @@ class HybridSystem:
        step keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
     10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or
         what several must fulfil together. They are checked before time runs, so they are about fixed parameters.
+        Nor does it begin with states that break one of the `start_requirements`; later nobody asks for these.
     11. `late_policy` is what an event stamped in the past means unless it is told otherwise: to be replayed at its
         stamp, to be rejected, or, for equations that count with the delay, to act when it arrives (``late``).
     12. A system that cannot be traced says ``traceable = False`` and may then use any Python.
@@ -120,6 +121,15 @@ class HybridSystem:
     def requirements(self, p: Any) -> dict[str, Array]:
         """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else
         0.
+        """
+        return {}
+
+    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+        """What the states must fulfil where time begins, by what is said where they do not (it names them): 1 where
+        they do, else 0.
+
+        Args:
+            x: state with which time would begin, before any event, shape (n,). p: named tuple of all parameters.
         """
         return {}
 
@@ -274,9 +284,10 @@ class HybridSystem:
         values = self.switching(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
         return self._checked("switching()", values, len(self.switchings))
 
-    def requirement_vector(self, p: Array) -> Array:
-        """Values of `requirements` in the declared order, stacked."""
-        values = list(self.requirements(self.unpack_parameters(p)).values())
+    def requirement_vector(self, x: Array, p: Array) -> Array:
+        """Values of `requirements`, then of `start_requirements`, in the declared order, stacked."""
+        unpacked = self.unpack_parameters(p)
+        values = [*self.requirements(unpacked).values(), *self.start_requirements(x, unpacked).values()]
         return vector(*values) if values else np.zeros(0)
 
     def switch_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:

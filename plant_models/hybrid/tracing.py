@@ -141,10 +141,10 @@ class TracedSystem:
 
     @cached_property
     def requirements(self) -> ca.Function:
-        """What the parameters must fulfil, in the declared order: ``(p) -> 1 where they do``."""
-        _, _, _, _, p = self._arrays()
-        values = self._guarded("requirements", lambda: self.system.requirement_vector(p))
-        return ca.Function("requirements", [self._symbols.p], [values])
+        """What parameters and start values must fulfil, in the declared order: ``(x, p) -> 1 where they do``."""
+        _, _, x, _, p = self._arrays()
+        values = self._guarded("requirements", lambda: self.system.requirement_vector(x, p))
+        return ca.Function("requirements", [self._symbols.x, self._symbols.p], [values])
 
     @cached_property
     def tangent(self) -> ca.Function:

@@ -277,7 +277,7 @@ def _in_python(bench: Bench) -> Runtime:
 def test_a_gate_that_cannot_be_is_refused(name: str, value: float, expected: str) -> None:
     bench = Bench(OBSERVERS["differentiator_cdo"](), **{name: value})
     said = (
-        rf"differentiator_cdo: time cannot run with these parameters: {name} must be .*{expected}.* \({name} = "
+        rf"differentiator_cdo: time cannot run with these values: {name} must be .*{expected}.* \({name} = "
         rf"{value}\)"
     )
     with pytest.raises(ValueError, match=said):

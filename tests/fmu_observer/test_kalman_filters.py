@@ -1,5 +1,6 @@
 """Kalman filters as systems: against filterpy and pykalman, against each other, and measurements by events."""
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,6 +17,8 @@ from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalma
 from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
+from fmu_observer.observers.traction.motor_ekf import MotorEkf
+from fmu_observer.observers.train.balise_odometer_ekf import BaliseOdometerEkf
 from plant_models import PLANTS
 from plant_models.hybrid import (
     HybridSystem,
@@ -443,20 +446,38 @@ def test_covariances_that_are_none_are_refused(values: dict[str, float], words: 
         started(PENDULUM, **values).start(0.0)
 
 
-@pytest.mark.parametrize(
-    ("start", "told"),
-    [
-        ([1.0, 0.0, 0.0, 1.0], 0.0),
-        ([-1.0, 0.0, 0.0, 1.0], 1.0),
-        ([1.0, 2.0, 2.0, 1.0], 1.0),
-        ([1.0, 1.0, 1.0, 1.0], 0.0),
-    ],
-)
-def test_a_start_covariance_that_is_none_is_told(start: list[float], told: float) -> None:
+NO_START = [
+    ([-1.0, 0.0, 0.0, 1.0], r"estimate_covariance[1] must be zero or more"),
+    ([1.0, 2.0, 2.0, 1.0], r"estimate_covariance[4] is too small beside the covariances of its row"),
+    ([1.0, 0.0, 0.5, 1.0], r"estimate_covariance[3] and estimate_covariance[2] must be equal"),
+]
+
+
+@pytest.mark.parametrize(("start", "words"), NO_START)
+def test_a_start_covariance_that_is_none_is_refused(start: list[float], words: str) -> None:
     runtime = Runtime(ExtendedKalmanFilter("pendulum"))
     place = scalar_names(runtime.system.states).index("estimate_covariance[1]")
     runtime.x[place : place + 4] = start
+    with pytest.raises(ValueError, match=re.escape(words)):
+        runtime.start(0.0)
+    with pytest.raises(ValueError, match=r"estimate_covariance\[\d\] = "):
+        runtime.start(0.0)
+
+
+@pytest.mark.parametrize("system", [MotorEkf(), BaliseOdometerEkf()], ids=lambda s: str(s.name))
+def test_other_filters_refuse_it_too(system: HybridSystem) -> None:
+    runtime = Runtime(system)
+    runtime.x[scalar_names(system.states).index("estimate_covariance[1]")] = -1.0
+    with pytest.raises(ValueError, match=r"estimate_covariance\[1\] must be zero or more.* = -1\.0"):
+        runtime.start(0.0)
+
+
+@pytest.mark.parametrize(("P", "told"), [([1.0, 1.0, 1.0, 1.0], 0.0), ([1.0, 2.0, 2.0, 1.0], 1.0)])
+def test_a_covariance_that_becomes_none_later_is_told(P: list[float], told: float) -> None:
+    runtime = Runtime(ExtendedKalmanFilter("pendulum"))
+    place = scalar_names(runtime.system.states).index("estimate_covariance[1]")
     runtime.start(0.0)
+    runtime.x[place : place + 4] = P
     outputs = dict(zip(scalar_names(runtime.system.outputs), runtime.update_outputs(), strict=True))
     assert outputs["covariance_not_positive"] == told
     (warned,) = [s for s in runtime.system.outputs if s.warning is not None]

@@ -123,7 +123,7 @@ def test_a_gate_that_cannot_be_is_refused_in_words(name: str, value: float, expe
     sealed, block = pair
     with pytest.raises(FMICallException):
         begin(sealed, **{name: value})
-    said = f"time cannot run with these parameters: {name} must be a finite number, {expected} ({name} ="
+    said = f"time cannot run with these values: {name} must be a finite number, {expected} ({name} ="
     assert said in sealed.log[-1]
     with pytest.raises(FMICallException, match=re.escape(said)):
         begin(block, **{name: value})

@@ -4,6 +4,7 @@ zone.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -75,6 +76,9 @@ class Chattering(HybridSystem):
         between = np.where(p.middle > p.left, np.where(p.middle < p.right, 1.0, 0.0), 0.0)
         return {"middle must lie between left and right": between}
 
+    def start_requirements(self, x: Any, p: Any) -> dict[str, Any]:
+        return {"elapsed must begin with zero, whatever middle": np.where(x[1] == 0.0, 1.0, 0.0)}
+
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         push = 50.0 - 100.0 * self.switches(t, x, u, p)[0]
         return vector(push, 1.0 + 0.0 * push)
@@ -94,11 +98,22 @@ def test_what_parameters_must_fulfil_together_is_refused_with_their_values(compo
     made = component(Chattering(), 3)
     with pytest.raises(Exception, match="xitInitializationMode"):
         made.initialize(middle=0.25)
-    said = (
-        "these parameters: middle must lie between left and right (middle = 0.25, left = 0, right = "
-        "0.20000000000000001)"
-    )
+    said = "these values: middle must lie between left and right (middle = 0.25, left = 0, right = 0.20000000000000001)"
     assert said in made.log[-1]
+
+
+def test_start_values_that_are_none_are_refused_and_only_where_time_begins(component: Callable[..., Any]) -> None:
+    """In the FMU and in the block; the test below restores states with other values."""
+    made, block = component(Chattering(), 3), make_block(Chattering(), 3)
+    with pytest.raises(Exception, match="xitInitializationMode"):
+        made.initialize(elapsed=0.5)
+    said = "these values: elapsed must begin with zero, whatever middle ("
+    assert f"{said}middle = 0.10000000000000001, elapsed = 0.5)" in made.log[-1]
+    block.instantiate()
+    block.enterInitializationMode(startTime=0.0)
+    block.instance.runtime.x[1] = 0.5
+    with pytest.raises(FMICallException, match=re.escape(f"{said}middle = 0.1, elapsed = 0.5)")):
+        block.exitInitializationMode()
 
 
 def test_states_with_parameters_with_which_time_cannot_run_are_refused(component: Callable[..., Any]) -> None:

@@ -141,6 +141,6 @@ def test_switches_that_chatter_do_not_stop_time() -> None:
 @pytest.mark.parametrize("system", [Locomotive(), Train(wagons=1, axles=1, zones="time")], ids=lambda s: s.name)
 def test_zones_that_overlap_or_have_no_length_are_refused_in_words(system: HybridSystem, ends: dict, said: str) -> None:
     zones = {"zone_from[1]": 10.0, "zone_to[1]": 20.0, "zone_from[2]": 40.0, "zone_to[2]": 50.0, "zone_to[3]": 80.0}
-    with pytest.raises(ValueError, match=f"{system.name}: time cannot run with these parameters: {said}"):
+    with pytest.raises(ValueError, match=f"{system.name}: time cannot run with these values: {said}"):
         started(system, **zones | {"zone_from[3]": 70.0} | ends)
     started(system, **zones | {"zone_from[3]": 50.0})  # one may follow the other

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from forked import Run
 from pages import ROOT
 
 GALLERY = ROOT / "docs" / "gallery"
@@ -36,11 +36,9 @@ def module_of(name: str) -> ModuleType:
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda s: f"{s.parent.name}/{s.stem}")
-def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, str(script), "--out", str(tmp_path)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path, run_script: Run) -> None:
+    done = run_script(script, ["--out", str(tmp_path)])
+    assert done.returncode == 0, done.output
     fresh = json.loads((tmp_path / f"{script.stem}.json").read_text())
     kept = json.loads((script.parent / "numbers" / f"{script.stem}.json").read_text())
     assert [line["quantity"] for line in fresh["lines"]] == [line["quantity"] for line in kept["lines"]]
@@ -49,7 +47,7 @@ def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path) ->
             assert now["measured"] == then["measured"], now["quantity"]
         else:
             assert now["measured"] == pytest.approx(then["measured"], rel=now["repeats"], abs=1e-12), now["quantity"]
-    assert "published" in done.stdout
+    assert "published" in done.output
     assert (
         fresh["figure"]
         == (tmp_path / f"{script.stem}.png").exists()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fmu_observer.filtering.square_root import factor
@@ -29,24 +31,33 @@ def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, 
             one, other = i * size + j + 1, j * size + i + 1
             text = f"{name}[{one}] and {name}[{other}] must be equal: a covariance is symmetric"
             needed[text] = _small(matrix[i, j] - matrix[j, i], matrix, i, j)
-    for i in range(size):
-        entry = f"{name}[{i * (size + 1) + 1}]" if size > 1 else f"{name}[1]"
-        value = matrix[i, i]
-        legal = value > 0.0 if definite else value >= 0.0
+    entries = [f"{name}[{i * (size + 1) + 1}]" for i in range(size)]
+    return needed | positive_matrix(name, matrix, entries, definite=definite)
+
+
+def positive_matrix(name: str, matrix: Array, entries: Sequence[str], *, definite: bool = False) -> dict[str, Array]:
+    """Requirements that a symmetric matrix is a covariance, entry by entry.
+
+    Args:
+        name: of it. matrix: shape (n, n). entries: names of its diagonal. definite: see `positive`.
+
+    Returns:
+        By text, which names the entry: 1 where it is fulfilled, else 0.
+    """
+    needed: dict[str, Array] = {}
+    for i, entry in enumerate(entries):
+        legal = matrix[i, i] > 0.0 if definite else matrix[i, i] >= 0.0
         needed[f"{entry} must be {'positive' if definite else 'zero or more'}: it is a variance"] = np.where(
             legal, 1.0, 0.0
         )
-    if size == 1:
-        return needed
     lower = factor(matrix)
     rest = matrix - lower @ lower.T
     kind = "definite" if definite else "semidefinite"
-    for i in range(1, size):
+    for i in range(1, len(entries)):
         fits: Array = np.where(lower[i, i] > 0.0, 1.0, 0.0) if definite else 1.0
         for j in range(i + 1):
             fits = fits * _small(rest[i, j], matrix, i, j)
-        entry = f"{name}[{i * (size + 1) + 1}]"
-        needed[f"{entry} is too small beside the covariances of its row: {name} must be positive {kind}"] = fits
+        needed[f"{entries[i]} is too small beside the covariances of its row: {name} must be positive {kind}"] = fits
     return needed
 
 

@@ -17,8 +17,8 @@ NOT_POSITIVE = output_signal(
     "1 once the covariance was not positive semidefinite",
     variability="discrete",
     warning=OutputWarning(
-        "its covariance is no covariance, so its estimates mean nothing. Give a positive semidefinite "
-        "estimate_covariance to start with; where it becomes so later, the form joseph or square_root"
+        "rounding has made its covariance none, so its estimates mean nothing: take the form joseph or square_root, or "
+        "noises whose sizes differ less"
     ),
 )
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from fmu_observer.condition import Condition
 from fmu_observer.filtering.kalman import correct, flattened, log_likelihood, normalised_square, predicted_covariance
+from fmu_observer.observers.discrete.covariance_requirements import positive
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
@@ -164,6 +165,11 @@ class MotorFilter(HybridSystem):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
+
+    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+        """The covariance of the first estimate is one."""
+        n = self.order
+        return positive("estimate_covariance", x[n : n + n * n], n, definite=False)
 
     def condition(
         self,

@@ -16,6 +16,7 @@ from fmu_observer.filtering.kalman import (
     normalised_square,
     predicted_covariance,
 )
+from fmu_observer.observers.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
@@ -28,6 +29,7 @@ ORDER = 4
 P, V, D, CREEP = range(ORDER)  # places of the estimates
 PAIRS = [(i, j) for i in range(ORDER) for j in range(i, ORDER)]  # the covariance as remembered, row by row
 COVARIANCE = ORDER
+VARIANCES = [f"estimate_covariance[{PAIRS.index((i, i)) + 1}]" for i in range(ORDER)]
 LAST_TIME, INNOVATION, NIS, LIKELIHOOD, FAULT = (ORDER + len(PAIRS) + i for i in range(5))
 FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s], [m/s2], [m/s] [ours]
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
@@ -151,6 +153,10 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     def requirements(self, p: Any) -> dict[str, Array]:
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(TUNABLE, p)
+
+    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+        """The covariance of the first estimate is one."""
+        return positive_matrix("estimate_covariance", covariance_of(x), VARIANCES)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Position, speed, disturbance and creep, shape (4,)."""
