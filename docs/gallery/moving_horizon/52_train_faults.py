@@ -37,7 +37,7 @@ def number(cell: str) -> float:
     Args:
         cell: of the table.
     """
-    return np.nan if cell == "-" else float(cell.split()[0])
+    return np.nan if cell == "-" else float(cell.split(maxsplit=1)[0])
 
 
 def draw_shares(axis: Axes, rows: list[list[str]]) -> None:
@@ -130,7 +130,7 @@ def main() -> None:
     draw_delays(delays, faults)
     draw_alarms(rare, alarms)
     delays.tick_params(labelleft=False)
-    for axis, place in ((shares, "center"), (delays, "center right"), (rare, "upper right")):
+    for axis, place in ((shares, "center"), (delays, "lower right"), (rare, "upper right")):
         axis.grid(visible=True, alpha=0.3)
         axis.legend(fontsize=7, loc=place)
     sheet.finish(figure)
