@@ -27,8 +27,8 @@ CFLAGS = os.environ.get("CFLAGS", "")
 QUICK = f"{CFLAGS} -O0".strip()
 AS_SHIPPED = (
     "tests/fmus/test_fmu_numbers.py",
-    "tests/fmus/test_batch.py",
-    "tests/project/test_page_blocks.py::test_blocks_of_a_page[README.md]",
+    "tests/fmus/test_batch.py::test_a_member_is_the_fmu_alone[discrete_uio]",
+    "tests/fmus/test_batch.py::test_a_member_is_the_fmu_alone[locomotive]",
 )
 """Tests of the second tier whose FMUs are built with the flags that users get."""
 SECOND_TIER = Path(__file__).with_name("second_tier.txt")
