@@ -144,14 +144,10 @@ class Instance(Described):
         return self.guarded(f"reading {shown(names)}", self._unguarded_reader(names, values))
 
     def writer(self, names: Sequence[str], values: np.ndarray | None = None) -> tuple[Callable[[], None], np.ndarray]:
-        """A call that writes scalars and elements.
+        """A call that writes scalars and elements, prepared once, and the array that it writes from.
 
         Args:
-            names: what is written.
-            values: where from, shape (len(names),), a contiguous view of the caller's array; None for one of its own.
-
-        Returns:
-            The call, prepared once, and the array that it writes from.
+            names: what is written. values: that array, shape (len(names),), contiguous; None for one of its own.
         """
         write, buffer = self._unguarded_writer(names, values)
         return self.guarded(f"writing {shown(names)}", write), buffer
