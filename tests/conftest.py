@@ -4,9 +4,11 @@ integration.
 
 from __future__ import annotations
 
+import gc
 import os
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from zlib import crc32
 
@@ -25,22 +27,35 @@ CFLAGS = os.environ.get("CFLAGS", "")
 QUICK = f"{CFLAGS} -O0".strip()
 AS_SHIPPED = (
     "tests/fmus/test_fmu_numbers.py",
-    "tests/fmus/test_batch.py",
-    "tests/project/test_page_blocks.py::test_blocks_of_a_page[README.md]",
+    "tests/fmus/test_batch.py::test_a_member_is_the_fmu_alone[discrete_uio]",
+    "tests/fmus/test_batch.py::test_a_member_is_the_fmu_alone[locomotive]",
 )
 """Tests of the second tier whose FMUs are built with the flags that users get."""
 SECOND_TIER = Path(__file__).with_name("second_tier.txt")
 KEPT = "! "
+FIRST_TIER = "not slow"
 BEGUN = pytest.StashKey[float]()
 SPENT = "processor time [s]"
+ELSEWHERE: list[float] = []
 SAMPLE = 16
 """One test in so many is in the sample, by a digest of its name."""
 
 
+@cache
 def second_tier() -> dict[str, bool]:
     """Beginnings of test names, and whether what begins so belongs to the second tier."""
     lines = [line for line in SECOND_TIER.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
     return {line.removeprefix(KEPT): not line.startswith(KEPT) for line in lines}
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """In the first tier, leave aside the files that belong to the second as a whole: what they import, packages of
+    others most of all, is not loaded and need not be there.
+    """
+    if config.option.markexpr != FIRST_TIER or any(collection_path.name in argument for argument in config.args):
+        return None
+    name = collection_path.relative_to(config.rootpath).as_posix()
+    return True if second_tier().get(name) and not any(line.startswith(f"{name}::") for line in second_tier()) else None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -74,20 +89,21 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"{spent[file]:7.1f} s  {file}")
 
 
-@pytest.fixture
-def charge(request: pytest.FixtureRequest) -> Callable[[float], None]:
-    """Adds to the time of a test what was spent for it in a process that this one does not wait for [s]."""
-
-    def add(spent: float) -> None:
-        request.node.stash[BEGUN] -= spent
-
-    return add
+@pytest.fixture(scope="session")
+def charge() -> Callable[[float], None]:
+    """Adds what was spent for a test in a process that this one has not waited for [s]."""
+    return ELSEWHERE.append
 
 
 def processor_time() -> float:
-    """Of this process and of those that it has waited for [s]."""
+    """Of this process, of those that it has waited for, and what was charged [s]."""
     times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return times.user + times.system + times.children_user + times.children_system + sum(ELSEWHERE)
+
+
+def pytest_collection_finish() -> None:
+    """Tests and modules stay to the end: no collection of garbage needs to look at them again."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,4 +1,5 @@
-"""How well observers say that the odometer lies: faults found and missed, false alarms, delays, positions at balises.
+"""How well observers tell faults, say that the odometer lies: found and missed, false alarms, delays, positions at
+balises.
 
 Rates come with the interval that their count allows. Imports NumPy only; SciPy is loaded for an interval.
 """
@@ -18,8 +19,6 @@ from cosim.evaluation.roles import estimate, estimation_error, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 
-DETECTION = "odometer_fault"
-"""Output of an observer or detector that is 1 while it judges the odometer to lie."""
 GRACE = 0.5
 """A detection that begins so soon after the end of a fault is still of that fault [s]."""
 LEVEL = 0.95
@@ -82,6 +81,14 @@ class FaultDetection:
         """False detections in an hour of operation [1/h]; NaN where no time was judged."""
         return self.false / (self.duration / HOUR) if self.duration > 0.0 else nan
 
+    def within(self, limit: float) -> bool:
+        """Whether every fault was told, and none later than that.
+
+        Args:
+            limit: longest delay [s].
+        """
+        return not self.missed and max(self.start_delays, default=0.0) <= limit + SEPARATE
+
     @property
     def missed_interval(self) -> Interval:
         """Clopper-Pearson interval of the share of missed faults [1]."""
@@ -102,13 +109,13 @@ class FaultDetection:
 
 
 def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
-    """What every observer said of the faults by its output `odometer_fault`, from the start of the evaluation on.
+    """What every observer said of the faults by their output `spec.detection`, from the start of the evaluation on.
 
     Observers without that output are compared by their position.
 
     Args:
         result: the run.
-        spec: the role `true_fault`, observers, start of the evaluation.
+        spec: the role `true_fault`, the output `detection`, observers, start of the evaluation.
 
     Returns:
         One entry an observer, in their order; none where no true fault was recorded.
@@ -118,7 +125,7 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
         return []
     start = max(float(result.time[0]), spec.evaluate_after)
     faults = [f for f in intervals(result.time, true) if f[0] >= start]
-    told = {observer: estimate(result, observer, DETECTION) for observer in spec.observers}
+    told = {observer: estimate(result, observer, spec.detection) for observer in spec.observers}
     seen = [o for o in told if told[o] is not None or estimate(result, o, "position") is not None]
     return [_judged(result, spec, observer, told[observer], faults, start) for observer in seen]
 

@@ -37,11 +37,11 @@ SHORT = (
 )
 
 
-def cells(found: FaultDetection) -> list[str]:
+def cells(found: FaultDetection, limit: float | None = None) -> list[str]:
     """The numbers of an observer, in the order of `HEADINGS`; delays are means.
 
     Args:
-        found: of the observer.
+        found: of the observer. limit: longest delay that is allowed [s], told beside the delay; None for none.
     """
     share = found.missed_interval
     sizes = [abs(error) for error in found.position_errors]
@@ -54,7 +54,7 @@ def cells(found: FaultDetection) -> list[str]:
         _span((100.0 * share[0], 100.0 * share[1])) if found.faults else DASH,
         str(found.false),
         _span(found.false_interval),
-        number(fmean(found.start_delays)) if found.start_delays else DASH,
+        _start(found, limit),
         _end(found.end_delays),
         number(found.time_outside),
         *positions,
@@ -72,13 +72,21 @@ def fault_text(found: Sequence[FaultDetection], spec: ReportSpec) -> str:
     """
     if not found:
         return ""
-    rows = [["odometer faults", *SHORT], *([label(spec, f.observer), *cells(f)] for f in found)]
+    heading = spec.detection.replace("_", " ") + "s" if spec.detection == ReportSpec.detection else spec.detection
+    rows = [[heading, *SHORT], *([label(spec, f.observer), *cells(f, spec.delay_limit)] for f in found)]
     return "\n".join(text_table(rows, (0,), heading=True))
 
 
 def _span(interval: Interval) -> str:
     low, high = interval
     return DASH if high != high else f"{number(low)} to {number(high)}"  # noqa: PLR0124 - NaN
+
+
+def _start(found: FaultDetection, limit: float | None) -> str:
+    delay = number(fmean(found.start_delays)) if found.start_delays else DASH
+    if limit is None or not found.faults:
+        return delay
+    return f"{delay} ({'within' if found.within(limit) else 'not within'} {number(limit)})"
 
 
 def _end(delays: Sequence[float]) -> str:

@@ -22,9 +22,11 @@ class ReportSpec:
     Args:
         title: heading of the report.
         true_position, true_speed, true_slip, true_adhesion_force, true_fault, odometer, speed_reference: names of
-            recorded signals; `true_fault` is not zero while the odometer lies.
+            recorded signals; `true_fault` is not zero while a fault acts: while the odometer lies, say.
+        detection: output of the observers that is not zero while they tell a fault. delay_limit: longest delay of its
+            detection that is allowed [s], or None.
         observers: component names of the observers; signals are ``<name>.position``, ``.speed``, ``.slip``,
-            ``.adhesion_force``, ``.slip_indicator``, ``.odometer_fault``, each used where it was recorded.
+            ``.adhesion_force``, ``.slip_indicator``, and that of `detection`, each used where it was recorded.
         other_trains: components with a ``position`` and a ``speed`` that are drawn beside the true ones: the same train
             under another controller, say.
         labels: text to show for an observer or another train.
@@ -50,6 +52,8 @@ class ReportSpec:
     phases: Sequence[Phase] = ()
     zones: Sequence[tuple[float, float]] = ()
     evaluate_after: float = 0.0
+    detection: str = "odometer_fault"
+    delay_limit: float | None = None
     published: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     independent: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     notes: Sequence[str] = ()

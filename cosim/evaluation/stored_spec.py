@@ -63,6 +63,8 @@ def _stored(data: Mapping[str, Any], title: str) -> ReportSpec:
         ],
         zones=[(float(z[0]), float(z[1])) for z in _list(data.get("zones")) if _is_zone(z)],
         evaluate_after=_number(data.get("evaluate_after")),
+        detection=data["detection"] if isinstance(data.get("detection"), str) else ReportSpec.detection,
+        delay_limit=_number(data["delay_limit"]) if data.get("delay_limit") is not None else None,
         published=_numbers(data.get("published")),
         independent=_numbers(data.get("independent")),
         notes=[str(note) for note in _list(data.get("notes"))],

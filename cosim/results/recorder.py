@@ -61,6 +61,8 @@ class Recorder:
             gone with the recorder and its table whatever happens to the program.
         every: keep each `every`-th communication point only, counted from the first. The last point, rows of events,
             and the point that follows an event are always kept.
+        switching: places among the values of flags. A point at which one of them turns from zero to another number, or
+            back, is always kept: when it did is then exact however few rows there are.
         stream: writes rows where others see them while the run goes on, block by block and whenever its `seconds` have
             passed; in memory is then no more than a block.
 
@@ -76,6 +78,7 @@ class Recorder:
         memory: float = MEMORY,
         folder: str | Path | None = None,
         every: int = 1,
+        switching: Sequence[int] = (),
         stream: Stream | None = None,
     ) -> None:
         self._dtype = table_dtype(["time", *(s.name for s in signals)])
@@ -85,6 +88,8 @@ class Recorder:
         self._file: RowFile | None = None
         self.every = every
         self._points, self._after_event, self._skipping = 0, False, False
+        self._switching = np.asarray(switching if every != 1 else (), dtype=np.intp)
+        self._flags = np.zeros(len(self._switching), dtype=bool)
         self._skipped = np.empty(self._width)
         self._source: np.ndarray | None = None
         self.count = self._first = 0  # `_first`: first row of the block in memory; all before it are in the file
@@ -126,7 +131,7 @@ class Recorder:
         Raises:
             OutputError: the file cannot take more rows; everything recorded so far is kept.
         """
-        if self.every == 1 or self._is_due():
+        if self.every == 1 or self._is_due(values):
             self._append(t, values)
             return
         if self.count - self._first == len(self._rows):
@@ -144,6 +149,7 @@ class Recorder:
         """
         self._append(t, values)
         self._after_event, self._skipping = True, False
+        self._flags = values[self._switching] != 0.0
 
     def block(self, rows: int) -> np.ndarray:
         """Free rows to be filled by somebody else, who says with `commit` how many of them are communication points
@@ -170,6 +176,9 @@ class Recorder:
             filled = self._rows[start : start + rows]
             due = (self._points + np.arange(rows)) % self.every == 0
             due[0] |= self._after_event
+            flags = np.vstack([self._flags, filled[:, 1 + self._switching] != 0.0])
+            due |= (flags[1:] != flags[:-1]).any(axis=1)
+            self._flags = flags[-1]
             self._points, self._after_event, self._skipping = self._points + rows, False, not due[-1]
             self._skipped[:] = filled[-1]
             kept = filled[due]
@@ -216,9 +225,11 @@ class Recorder:
         if self._due != inf and monotonic() >= self._due:
             self._make_room()
 
-    def _is_due(self) -> bool:
+    def _is_due(self, values: np.ndarray) -> bool:
         """Whether the next communication point is to be kept."""
-        due = self._points % self.every == 0 or self._after_event
+        flags = values[self._switching] != 0.0
+        due = self._points % self.every == 0 or self._after_event or bool((flags != self._flags).any())
+        self._flags = flags
         self._points += 1
         self._after_event = self._skipping = False
         return due

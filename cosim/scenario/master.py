@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from cosim.balises.service import BaliseService
 from cosim.compiled.choice import choose_stepper
@@ -26,7 +27,9 @@ from cosim.master.control.multirate import set_rates
 from cosim.master.master import Master
 from cosim.master.system import System
 from cosim.network.service import NetworkService
+from cosim.results.data import SignalInfo
 from cosim.results.recorder import Recorder
+from cosim.scenario.roles import switching_signals
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import MasterTable
 
@@ -58,7 +61,7 @@ def make_master(
         algorithm=lambda plan: make_algorithm(table.master, plan, choice),
         control=_control(table.master),
         stepper=partial(choose_stepper, table.master.stepper),
-        recorder=partial(Recorder, every=table.master.record_every, memory=1e6 * table.master.record_memory),
+        recorder=partial(Recorder, memory=1e6 * table.master.record_memory, **kept_rows(table, plan.signals)),
         events=table.master.events,
         network=network,
     )
@@ -66,6 +69,16 @@ def make_master(
     _set_rates(table, plan, axis, balises, network)
     master.choose_stepper()
     return master
+
+
+def kept_rows(table: ScenarioTable, signals: Sequence[SignalInfo]) -> dict[str, Any]:
+    """Which rows a recorder keeps, as its arguments.
+
+    Args:
+        table: of the scenario, with its roles. signals: that are recorded.
+    """
+    names = [signal.name for signal in signals]
+    return {"every": table.master.record_every, "switching": switching_signals(table, names)}
 
 
 def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> Algorithm:

@@ -99,6 +99,22 @@ def signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
     return record
 
 
+def switching_signals(table: ScenarioTable, recorded: Iterable[str]) -> list[int]:
+    """Which signals are judged by when they turn from zero to another number, or back: true fault, detection, and what
+    expectations look at.
+
+    Args:
+        table: of the scenario, with its roles. recorded: names of the recorded signals.
+
+    Returns:
+        Their places among the recorded ones.
+    """
+    spec = report_spec(table)
+    judged = {spec.true_fault, *(f"{observer}.{spec.detection}" for observer in spec.observers)}
+    judged |= {getattr(item, "signal", None) for item in table.expect}
+    return [place for place, name in enumerate(recorded) if name in judged]
+
+
 def check_roles(table: ScenarioTable, components: Mapping[str, Component], where: str) -> None:
     """Check the report table of a scenario against its components.
 
@@ -155,6 +171,8 @@ def report_spec(table: ScenarioTable) -> ReportSpec:
         phases=[Phase(p.name, p.start, p.end) for p in report.phases],
         zones=report.zones,
         evaluate_after=report.evaluate_after,
+        detection=report.detection,
+        delay_limit=report.delay_limit,
         published=report.published,
         independent=report.independent,
         notes=report.notes,

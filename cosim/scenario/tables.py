@@ -279,6 +279,8 @@ class ReportTable(Table):
     phases: list[PhaseTable] = []
     zones: list[tuple[float, float]] = []
     evaluate_after: float = 0.0
+    detection: str = "odometer_fault"
+    delay_limit: Annotated[float, Field(ge=0.0)] | None = None
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []

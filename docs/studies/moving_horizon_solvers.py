@@ -42,9 +42,16 @@ class ClarabelProgram(WindowProgram):
     """The quadratic programme handed to Clarabel."""
 
     def handed(
-        self, h: np.ndarray, g: np.ndarray, a: np.ndarray, right: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self,
+        h: np.ndarray,
+        g: np.ndarray,
+        a: np.ndarray,
+        sides: tuple[np.ndarray, np.ndarray],
+        lower: np.ndarray,
+        upper: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, str]:
-        """See `WindowProgram.handed`."""
+        """See `WindowProgram.handed`; no disturbance has bounds here."""
+        right = sides[0]
         P, E = _matrix(self.cost, h), _matrix(self.transitions, a)
         eye = scipy.sparse.eye(len(g), format="csr")
         has_low, has_high = np.isfinite(lower), np.isfinite(upper)
@@ -72,11 +79,17 @@ class IpoptProgram(WindowProgram):
         self._ipopt = ca.nlpsol("window", "ipopt", problem, options)
 
     def handed(
-        self, h: np.ndarray, g: np.ndarray, a: np.ndarray, right: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self,
+        h: np.ndarray,
+        g: np.ndarray,
+        a: np.ndarray,
+        sides: tuple[np.ndarray, np.ndarray],
+        lower: np.ndarray,
+        upper: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, str]:
-        """See `WindowProgram.handed`."""
+        """See `WindowProgram.handed`; no disturbance has bounds here."""
         p = np.concatenate([g, h, a])
-        told = self._ipopt(x0=np.zeros(len(g)), p=p, lbx=lower, ubx=upper, lbg=right, ubg=right)
+        told = self._ipopt(x0=np.zeros(len(g)), p=p, lbx=lower, ubx=upper, lbg=sides[0], ubg=sides[1])
         status = str(self._ipopt.stats()["unified_return_status"])
         return told["x"].full().ravel(), told["lam_g"].full().ravel(), status
 
@@ -85,9 +98,16 @@ class TrustRegionProgram(WindowProgram):
     """The same programme as bounded least squares of SciPy: equations weighted by 1e6, `lsq_linear` with LSMR."""
 
     def handed(
-        self, h: np.ndarray, g: np.ndarray, a: np.ndarray, right: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self,
+        h: np.ndarray,
+        g: np.ndarray,
+        a: np.ndarray,
+        sides: tuple[np.ndarray, np.ndarray],
+        lower: np.ndarray,
+        upper: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, str]:
-        """See `WindowProgram.handed`."""
+        """See `WindowProgram.handed`; no disturbance has bounds here."""
+        right = sides[0]
         size = len(g)
         blocks = h[: size // 2 * self.order].reshape(self.count, self.order, self.order)
         values, vectors = np.linalg.eigh(blocks)

@@ -10,7 +10,8 @@ import numpy as np
 
 from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
 from plant_models.hybrid import memory, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid.scan import Arrays, enclosed, scan_table
+from plant_models.hybrid.system import Array, vector
 
 BLOCKS = 30  # of the window
 VALUES = 5  # of the grid, N_e
@@ -70,12 +71,12 @@ def simulated_speed(efficiency: Array, start: Array, driving: Any, braking: Any,
     minute (its time constant is 18 s), so that windows of some minutes do not see it.
 
     Args:
-        efficiency: eta [1]. start: generator speed where the window begins [rad/s].
+        efficiency: values of eta [1], shape (k,). start: generator speed where the window begins [rad/s].
         driving: mean torques on the rotor, oldest first [N.m]. braking: of the generator [N.m].
         period: length of a block [s]. p: parameters with `EFFICIENCY_PARAMETERS` and `gear_ratio`.
 
     Returns:
-        Speed [rad/s].
+        Speeds [rad/s], shape (k,).
 
     Source:
         Omar 2012, (7.3.3), repaired, reduced to its slow mode.
@@ -86,10 +87,20 @@ def simulated_speed(efficiency: Array, start: Array, driving: Any, braking: Any,
     rate = friction / inertia
     kept = np.exp(-rate * period)
     gain = (1.0 - kept) / friction
-    speed = start / p.gear_ratio
-    for i in range(BLOCKS):
-        speed = kept * speed + gain * (driving[i] - ratio * braking[i])
+    torques = (vector(*(driving[i] for i in range(BLOCKS))), vector(*(braking[i] for i in range(BLOCKS))))
+    (speed,) = enclosed(_turned, 0.0 * efficiency + start / p.gear_ratio, kept, gain, ratio, *torques)
     return p.gear_ratio * speed
+
+
+def _turned(start: Array, kept: Array, gain: Array, ratio: Array, driving: Array, braking: Array) -> Arrays:
+    """Rotor speeds after all blocks, one for each efficiency, as a function of arrays alone."""
+    tables = (np.stack([driving], axis=1), np.stack([braking], axis=1))
+    return scan_table(_block, (start,), tables, (kept, gain, ratio))[0]
+
+
+def _block(carry: Arrays, row: Arrays, shared: Arrays) -> tuple[Arrays, Arrays]:
+    kept, gain, ratio = shared
+    return (kept * carry[0] + gain * (row[0][0] - ratio * row[1][0]),), ()
 
 
 def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
@@ -113,11 +124,8 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
     grid = grid_around(previous, VALUES, *bounds)
     start = m.generator_starts[0]  # where the oldest of the moved blocks began
     torques = (moved["driving_means"], moved["braking_means"])
-    found = invert(
-        grid,
-        [simulated_speed(eta, start, *torques, p.update_period, p) - m.last_generator for eta in grid],
-        previous,
-    )
+    ends_there = simulated_speed(vector(*grid), start, *torques, p.update_period, p)
+    found = invert(grid, [ends_there[i] - m.last_generator for i in range(VALUES)], previous)
     full = full_blocks > BLOCKS + 0.5  # the block before the window tells where it begins
     return {
         **moved,

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.diagnosis.window_inversion import Inverted, grid_around, invert, smoothed
-from plant_models.hybrid.system import Array
+from plant_models.hybrid.scan import Arrays, enclosed, scan
+from plant_models.hybrid.system import Array, vector
 
 GRID = 5  # values of the parameter, as in the thesis
 
@@ -57,16 +58,16 @@ def between(means: list[Array]) -> list[Array]:
     return [0.5 * (a + b) for a, b in pairwise(means)]
 
 
-def simulated_change(start: Array, forces: list[Array], step: Array, mass: Array, p: Any) -> Array:
+def simulated_change(start: Array, forces: list[Array], step: Array, mass: Array, davis: Array) -> Array:
     """Speed at the end of the window [m/s], by Euler steps from middle to middle.
 
     Args:
         start: speed at its start [m/s]. forces: accelerations without resistance [m/s2]. step: [s].
-        mass: with the rotating masses [kg]. p: with ``davis_a``, ``davis_b``, ``davis_c``.
+        mass: with the rotating masses [kg]. davis: coefficients of the resistance [N], [N.s/m], [N.s2/m2], three.
     """
     speed = start
     for force in forces:
-        resistance = p.davis_a + p.davis_b * speed + p.davis_c * speed * np.abs(speed)
+        resistance = davis[0] + davis[1] * speed + davis[2] * speed * np.abs(speed)
         speed = np.maximum(speed + step * (force - resistance / mass), 0.0)
     return speed
 
@@ -75,6 +76,8 @@ def share_of(
     parts: list[Array], rest: list[Array], window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any
 ) -> Inverted:
     """Share of a force at which the simulated speed at the end of the window is the measured one [1].
+
+    In generated C this is one function, called for each force.
 
     Args:
         parts: acceleration by the whole force [m/s2], signed. rest: all others [m/s2]. window: for the speeds.
@@ -87,13 +90,28 @@ def share_of(
     Source:
         Omar 2012, 7.7.7, (7.7.7)-(7.7.8), for the train as one point.
     """
-    grid = grid_around(previous, GRID, least=p.least_share, most=p.most_share)
+    known = (window.speed[0], window.speed[-1], step, mass, p.davis_a, p.davis_b, p.davis_c)
+    looked_through = (p.least_share, p.most_share, p.smoothing)
+    (found,) = enclosed(_inverted, vector(previous), vector(*parts), vector(*rest), vector(*known, *looked_through))
+    return Inverted(found[0], found[1])
+
+
+def _inverted(previous: Array, *others: Array) -> Arrays:
+    """`share_of` as a function of arrays alone."""
+    return scan(_share, (), [(previous,)], others)[1][0]
+
+
+def _share(_: Arrays, row: Arrays, shared: Arrays) -> tuple[Arrays, Arrays]:
+    """`share_of` of single elements: last share; parts, rest, and what is known in the order of `share_of`."""
+    previous, (parts, rest, known) = row[0][0], shared
+    start, end, step, mass = (known[i] for i in range(4))
+    grid = grid_around(previous, GRID, least=known[7], most=known[8])
     differences = []
     for share in grid:
-        forces = [share * part + other for part, other in zip(parts, rest, strict=True)]
-        differences.append(simulated_change(window.speed[0], forces, step, mass, p) - window.speed[-1])
+        forces = [share * parts[i] + rest[i] for i in range(parts.shape[0])]
+        differences.append(simulated_change(start, forces, step, mass, known[4:7]) - end)
     found = invert(grid, differences, previous)
-    return Inverted(smoothed(previous, found.value, p.smoothing), found.crossings)
+    return (), (vector(smoothed(previous, found.value, known[9]), found.crossings),)
 
 
 def traction_share(window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any) -> Share:

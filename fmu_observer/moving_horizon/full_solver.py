@@ -8,7 +8,7 @@ was chosen.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from time import perf_counter
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from fmu_observer.moving_horizon import robust_loss
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.moving_horizon.gauss_newton import FAR, WindowProblem
 from fmu_observer.moving_horizon.window_program import Step, WindowProgram, window_program
-from fmu_observer.moving_horizon.window_stages import Stages, WindowStages
+from fmu_observer.moving_horizon.window_stages import Stages, WindowStages, forward_substituted
 
 SMALLEST_SHARE = 1.0 / 64.0
 """Of a step; where not even this makes the cost smaller, the search has ended."""
@@ -102,10 +102,11 @@ class FullSolver:
 
     Args:
         problem: what moves, what is measured, bounds, losses.
-        program: gives what solves the quadratic programmes of a window, of its rows and states.
+        program: gives what solves the quadratic programmes of a window, of its rows and states, and of the states whose
+            disturbances have bounds where there are some.
     """
 
-    def __init__(self, problem: WindowProblem, program: Callable[[int, int], WindowProgram] = window_program) -> None:
+    def __init__(self, problem: WindowProblem, program: Callable[..., WindowProgram] = window_program) -> None:
         self.problem, self._program = problem, program
         self._stages = WindowStages(problem)
 
@@ -132,9 +133,16 @@ class FullSolver:
             WindowError: bounds contradict one another, a number is not finite, or no trajectory of the model keeps the
                 bounds; the message says which.
         """
-        program = self._program(len(rows), self.problem.order)
-        search = _Search(self.problem, self._stages, program, arrival, np.asarray(rows), np.asarray(shared))
-        return search.solve(np.asarray(points, dtype=float), effort)
+        problem, given, start = self.problem, np.asarray(rows), np.asarray(points, dtype=float)
+        if not problem.disturbed:
+            program = self._program(len(given), problem.order)
+            return _Search(problem, self._stages, program, arrival, given, np.asarray(shared)).solve(start, effort)
+        # the disturbance into the first row is a noise of its own where the state before it has an empty row
+        given = np.vstack([np.zeros(problem.layout.width), given])
+        program = self._program(len(given), problem.order, problem.disturbed)
+        search = _Search(problem, self._stages, program, arrival, given, np.asarray(shared))
+        found = search.solve(np.vstack([np.reshape(arrival.point, (1, -1)), start]), effort)
+        return replace(found, states=found.states[1:], noises=found.noises[1:], weights=found.weights[1:])
 
 
 class _Search:
@@ -158,7 +166,9 @@ class _Search:
         self.doubts = problem.loss_scale(shared) if robust else 1.0  # deviations at which the losses doubt
         q, n = problem.layout.measurements, problem.order
         self.used, self.measured = rows[:, -q:], rows[:, -2 * q : -q]
-        self.lower, self.upper = np.full(n, -inf), np.full(n, inf)
+        self.lower, self.upper = np.full((len(rows), n), -inf), np.full((len(rows), n), inf)
+        self.disturbed = list(problem.disturbed)
+        self.noise_limits = self.limits_of_noises() if self.disturbed else None
         if problem.bounded:
             low, high = (np.asarray(bound, dtype=float) for bound in problem.limits(shared))
             if not (low <= high).all():
@@ -167,7 +177,8 @@ class _Search:
                     f"bounds of state {problem.bounded[k]} contradict one another: "
                     f"at least {low[k]:g} and at most {high[k]:g}."
                 )
-            self.lower[list(problem.bounded)], self.upper[list(problem.bounded)] = low, high
+            first = 1 if self.disturbed else 0  # the state before the window is not of it
+            self.lower[first:, list(problem.bounded)], self.upper[first:, list(problem.bounded)] = low, high
 
     def solve(self, start: np.ndarray, effort: Effort) -> FullSolution:
         """The solution.
@@ -215,10 +226,11 @@ class _Search:
 
     def at(self, states: np.ndarray, noises: np.ndarray | None) -> _Point:
         """A trajectory with all that follows from it; noises that explain it best where none are given."""
-        stages = self.stages.along(states, self.arrival, self.rows, self.shared)
+        led = bool(self.disturbed)
+        stages = self.stages.along(states, self.arrival, self.rows, self.shared, led=led)
         if noises is None:
             roots = np.where(np.abs(stages.G.diagonal(0, 1, 2)) > 0.0, stages.G.diagonal(0, 1, 2), inf)
-            noises = _forward_substituted(stages.G, states - stages.moved, roots)
+            noises = forward_substituted(stages.G, states - stages.moved, roots)
         squares = self.used * (self.measured - stages.measured) ** 2 / np.where(self.used > 0.0, stages.variances, 1.0)
         return _Point(states, noises, stages, squares)
 
@@ -261,12 +273,12 @@ class _Search:
         stages = point.stages
         given = (A, b, stages.F, stages.G, stages.moved - point.states)
         lower, upper = self.lower - point.states, self.upper - point.states
-        if self.active(point.states) == 0:
+        if self.active(point.states) == 0 and not self.disturbed:
             free = np.full(lower.shape, inf)
             found = self.program.solve(*given, -free, free)
             if found.solved and ((found.change >= lower) & (found.change <= upper)).all():
                 return found
-        found = self.program.solve(*given, lower, upper)
+        found = self.program.solve(*given, lower, upper, self.noise_limits)
         return found._replace(change=np.clip(found.change, lower, upper))
 
     def searched(self, point: _Point, step: Step, *, free: bool) -> tuple[_Point, float]:
@@ -312,18 +324,46 @@ class _Search:
         return self.stages.covariances(weighted, self.rows)
 
     def keeps(self, point: _Point) -> bool:
-        """Whether a point keeps the transitions; every point keeps the bounds."""
-        return bool((np.abs(self.missing(point)) <= KEPT * self.scale).all())
+        """Whether a point keeps the transitions and the bounds of disturbances; every point keeps those of states."""
+        kept = bool((np.abs(self.missing(point)) <= KEPT * self.scale).all())
+        return kept and self.disturbs(point.stages, point.noises) <= KEPT * float(self.scale.max())
+
+    def disturbs(self, stages: Stages, noises: np.ndarray) -> float:
+        """How far disturbances are beyond their bounds at most; negative where none is."""
+        if self.noise_limits is None:
+            return -inf
+        w = np.einsum("kir,kr->ki", stages.G[:, self.disturbed], noises)
+        return float(np.maximum(self.noise_limits[0] - w, w - self.noise_limits[1]).max())
+
+    def limits_of_noises(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the disturbances into each row, infinite where none is, shape (N, d) each."""
+        found = (
+            np.full((len(self.rows), len(self.disturbed)), -inf),
+            np.full((len(self.rows), len(self.disturbed)), inf),
+        )
+        for k, flat in enumerate(self.rows):
+            row = self.problem.layout.unpacked(flat)
+            if row.moves > 0.5:
+                found[0][k], found[1][k] = self.problem.noise_limits(row, self.shared)
+        return found
 
     def active(self, states: np.ndarray) -> int:
         """How many bounds are touched."""
-        near = NEAR * self.scale
-        return int(((states <= self.lower + near) | (states >= self.upper - near)).sum())
+        near, last = NEAR * self.scale, slice(-len(states), None)
+        return int(((states <= self.lower[last] + near) | (states >= self.upper[last] - near)).sum())
+
+    def pushed(self, point: _Point) -> int:
+        """How many disturbances into the last row touch their bounds."""
+        if self.noise_limits is None:
+            return 0
+        w, near = (point.stages.G[-1] @ point.noises[-1])[self.disturbed], NEAR * self.scale[self.disturbed]
+        return int(((w <= self.noise_limits[0][-1] + near) | (w >= self.noise_limits[1][-1] - near)).sum())
 
     def broken(self, start: np.ndarray) -> str:
         """What the first guess breaks, in words."""
         parts = [
-            f"state {i} is {start[k, i]:g} in row {k}, legal is {self.lower[i]:g} to {self.upper[i]:g}"
+            f"state {i} is {start[k, i]:g} in row {k - bool(self.disturbed)}, legal is {self.lower[k, i]:g} to "
+            f"{self.upper[k, i]:g}"
             for k, i in np.argwhere((start < self.lower) | (start > self.upper))[:2]
         ]
         return "; the first guess breaks them: " + "; ".join(parts) if parts else ""
@@ -344,21 +384,9 @@ class _Search:
             far=float((point.squares > FAR**2).sum() / max(self.used.sum(), 1.0)),
             iterations=iterations,
             seconds=perf_counter() - began,
-            active=self.active(point.states[-1:]),
+            active=self.active(point.states[-1:]) + self.pushed(point),
             converged=not reason,
             timed_out=reason.startswith("deadline"),
             feasible=self.keeps(point),
             reason=reason,
         )
-
-
-def _forward_substituted(G: np.ndarray, right: np.ndarray, pivots: np.ndarray) -> np.ndarray:
-    """Solutions of ``G w = right`` for lower triangular G; zero where a pivot is infinite; shape (N, n).
-
-    Args:
-        G: shape (N, n, n). right: shape (N, n). pivots: its diagonal, infinite for zero, shape (N, n).
-    """
-    found = np.zeros(right.shape)
-    for i in range(right.shape[1]):
-        found[:, i] = (right[:, i] - np.einsum("kj,kj->k", G[:, i, :i], found[:, :i])) / pivots[:, i]
-    return found

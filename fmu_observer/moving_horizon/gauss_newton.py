@@ -9,7 +9,8 @@ sequential estimation, chapter X). No covariance is inverted, so that states wit
 Bounds are kept by a primal-dual active set (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865): a bound that is
 active is a measurement without noise, whose multiplier the adjoint knows; from pass to pass it is let go where the
 multiplier has the wrong sign, and taken up where a state has crossed it. What a pass returns is clipped, so that it
-keeps the bounds after any number of passes.
+keeps the bounds after any number of passes. A bound of a disturbance is held alike, on the noise of a transition before
+it moves the state; at the end the trajectory is followed once more, each disturbance within its bounds.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class Seen(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Bounds of the states in `WindowProblem.bounded`, in their order.
+    """Bounds of the states in `WindowProblem.bounded`, or of the disturbances in `disturbed`, in their order.
 
     Attributes:
         lower, upper: shape (b,).
@@ -62,6 +63,11 @@ class Limits(NamedTuple):
 
     lower: Array
     upper: Array
+
+
+def _none(_row: WindowRow, _shared: Array) -> Limits:
+    """Limits of no disturbance."""
+    return Limits(np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +81,8 @@ class WindowProblem:
         bounded: which states have bounds. limits: the bounds, of what all rows share.
         losses: of each measurement. loss_scale: of what all rows share, deviations at which the losses doubt.
         form: of the covariance.
+        disturbed: states whose disturbances have bounds, what a transition adds to them beyond the model.
+        noise_limits: these bounds, of the row that the transition leads into and what all rows share; zero lies within.
     """
 
     order: int
@@ -86,6 +94,13 @@ class WindowProblem:
     losses: tuple[Loss, ...]
     loss_scale: Callable[[Array], Array]
     form: Form = "joseph"
+    disturbed: tuple[int, ...] = ()
+    noise_limits: Callable[[WindowRow, Array], Limits] = _none
+
+    @property
+    def bounds(self) -> int:
+        """Bounds of a row, of states and of disturbances."""
+        return len(self.bounded) + len(self.disturbed)
 
     def clipped(self, x: Array, shared: Array) -> Array:
         """A state within its bounds, shape (n,).
@@ -123,6 +138,7 @@ class Solution(NamedTuple):
 
 KEPT = 8  # problems whose sweeps are known as functions, so that they are traced once
 FAR = 5.0  # of a measurement's own deviations: noise is not that far off [ours]
+NEAR = 1e-6  # of its standard deviation: so near a bound a disturbance touches it
 SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 
 
@@ -138,18 +154,21 @@ def solve(
         shared: what all rows share, shape (s,). passes: one or more.
     """
     n, count = problem.order, rows.shape[0]
-    active, used = _at_bounds(problem, points, shared), np.zeros(1)
+    active, used = _at_bounds(problem, arrival.point, rows, points, shared), np.zeros(1)
     fresh = np.zeros((count, 1))
     fresh[-1] = 1.0
     for _ in range(passes):
         table = (rows, points, active, fresh)
         _, swept = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
         behind = (np.zeros(n), np.zeros(4))
-        (_, sums), (points, active) = scan_table(
+        (adjoint, sums), (points, active) = scan_table(
             _backwards(problem), behind, (*table, *swept), (shared,), backwards=True
         )
         fresh = np.zeros((count, 1))
         used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
+    if problem.disturbed:
+        before = arrival.mean - np.reshape(arrival.covariance, (n, n)) @ adjoint
+        _, (points,) = scan_table(_followed(problem), (arrival.point, before), (rows, points), (shared,))
     held = np.reshape(np.sum(np.abs(active[-1])), (1,))
     residual = np.sqrt(sums[0:1] / np.maximum(sums[2:3], 1.0))
     far = sums[3:4] / np.maximum(sums[2:3], 1.0)
@@ -164,7 +183,7 @@ def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Arra
         point: its state, shape (n,). shared: what all rows share, shape (s,).
     """
     of_row, at = np.reshape(row, (1, problem.layout.width)), np.reshape(point, (1, problem.order))
-    table = (of_row, at, np.zeros((1, max(len(problem.bounded), 1))), np.zeros((1, 1)))
+    table = (of_row, at, np.zeros((1, max(problem.bounds, 1))), np.zeros((1, 1)))
     after, _ = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
     return ArrivalCost(*after)
 
@@ -172,7 +191,7 @@ def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Arra
 @lru_cache(maxsize=KEPT)
 def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
     """The Kalman filter over one row: prediction, measurements, active bounds."""
-    n, q = problem.order, problem.layout.measurements
+    n, q, states = problem.order, problem.layout.measurements, len(problem.bounded)
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
         (before, mean, flat), (row_flat, point, active, fresh), (shared,) = carry, given, known
@@ -181,8 +200,11 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         moved = problem.moved(before, row, shared)
         goes = row.moves > 0.5
         F = np.where(goes, moved.F, np.eye(n))
-        mean = np.where(goes, moved.state + moved.F @ (mean - before), mean)
-        P = np.where(goes, predicted_covariance(P, moved.F, moved.noise), P)
+        bounded = (problem.disturbed, problem.noise_limits(row, shared))
+        push, noise, noise_gains, noise_pulls = _held(np.zeros(n), moved.noise, *bounded, active[states:])
+        mean = np.where(goes, moved.state + moved.F @ (mean - before) + push, mean)
+        P = np.where(goes, predicted_covariance(P, moved.F, noise), P)
+        pushed = (np.where(goes, push, 0.0 * push), np.where(goes, noise, 0.0 * noise))
         seen = problem.seen(point, row, shared)
         scale = vector(*_scales(problem, row, seen, P, fresh[0], shared))
         error = scale * (row.measured - seen.measured - seen.H @ (mean - point))
@@ -190,12 +212,14 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         noise = seen.noise * np.outer(row.used, row.used) + np.diag(1.0 - row.used)
         after = correct(mean, P, error, H, noise, None, problem.form)
         forces = np.reshape(np.linalg.solve(after.innovation_covariance, np.reshape(error, (q, 1))), (q,))
-        mean, P, gains, pulls = _held(problem, after.estimate, after.covariance, active, shared)
+        limits = (problem.bounded, problem.limits(shared))
+        mean, P, gains, pulls = _held(after.estimate, after.covariance, *limits, active)
         handed = (point, mean, np.reshape(P, (n * n,)))
         kept = (*(np.reshape(m, (m.shape[0] * m.shape[1],)) for m in (F, H, after.gain, noise)), forces, gains, pulls)
         off = row.measured - seen.measured
         beyond = [np.where(off[j] * off[j] > FAR * FAR * seen.noise[j, j], row.used[j], 0.0) for j in range(q)]
-        return handed, (mean, handed[2], *kept, vector(*beyond))
+        disturbed = (pushed[0], np.reshape(pushed[1], (n * n,)), noise_gains, noise_pulls) if problem.disturbed else ()
+        return handed, (mean, handed[2], *kept, vector(*beyond), *disturbed)
 
     return body
 
@@ -207,23 +231,19 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
         (adjoint, sums), (shared,) = carry, known
-        row_flat, point, active, _, mean, flat, F, H, K, noise, forces, gains, pulls, beyond = given
+        row_flat, point, active, _, mean, flat, F, H, K, noise, forces, gains, pulls, beyond, *disturbed = given
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         x = mean - P @ adjoint
-        taken, behind = [0.0 * x[0]] * max(len(problem.bounded), 1), [adjoint[i] for i in range(n)]
-        lower, upper = problem.limits(shared)
-        for k, i in reversed(list(enumerate(problem.bounded))):
-            gain = gains[k * n : (k + 1) * n]
-            force = pulls[k] + gain @ vector(*behind)
-            behind[i] = behind[i] - np.where(np.abs(active[k]) > 0.5, force, 0.0)
-            above, below = x[i] > upper[k], x[i] < lower[k]
-            crossed = np.where(above, 1.0, np.where(below, -1.0, 0.0))
-            holds = force * active[k] < 0.0  # it pushes back, into the bounds
-            taken[k] = np.where(np.abs(active[k]) > 0.5, np.where(holds, active[k], 0.0), crossed)
-        adjoint = vector(*behind)
+        adjoint, taken = _let_go(x, adjoint, gains, pulls, problem.bounded, problem.limits(shared), active)
         force = forces + np.reshape(K, (n, q)).T @ adjoint
-        adjoint = np.reshape(F, (n, n)).T @ (adjoint - np.reshape(H, (q, n)).T @ force)
+        adjoint = adjoint - np.reshape(H, (q, n)).T @ force
+        if disturbed:
+            push, added, *held = disturbed
+            w, limits = push - np.reshape(added, (n, n)) @ adjoint, problem.noise_limits(row, shared)
+            _, more = _let_go(w, adjoint, *held, problem.disturbed, limits, active[len(problem.bounded) :])
+            taken = [*taken, *more]
+        adjoint = np.reshape(F, (n, n)).T @ adjoint
         x = problem.clipped(x, shared)
         square = force @ np.reshape(noise, (q, q)) @ force
         spread = vector(*(P[i, i] for i in range(n)))
@@ -231,7 +251,27 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
         exists = np.max(np.hstack([row.used, np.reshape(row.moves, (1,))]))
         most = np.maximum(sums[1], exists * np.max(off))
         sums = vector(sums[0] + square, most, sums[2] + np.sum(row.used), sums[3] + np.sum(beyond))
-        return (adjoint, sums), (x, vector(*taken))
+        return (adjoint, sums), (x, vector(*(taken or [0.0 * x[0]])))
+
+    return body
+
+
+@lru_cache(maxsize=KEPT)
+def _followed(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
+    """A row as near to its estimate as the bounds of disturbances and states allow; where both cannot be, a state's."""
+
+    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (about, before), (row_flat, point), (shared,) = carry, given, known
+        row = problem.layout.unpacked(row_flat)
+        goes, into = row.moves > 0.5, problem.moved(about, row, shared)
+        moved = into.state + into.F @ (before - about)
+        lower, upper = problem.noise_limits(row, shared)
+        values = [point[i] for i in range(problem.order)]
+        for k, i in enumerate(problem.disturbed):
+            within = np.minimum(np.maximum(values[i], moved[i] + lower[k]), moved[i] + upper[k])
+            values[i] = np.where(goes, within, values[i])
+        x = problem.clipped(vector(*values), shared)
+        return (x, x), (x,)
 
     return body
 
@@ -252,21 +292,20 @@ def _scales(problem: WindowProblem, row: WindowRow, seen: Seen, P: Array, fresh:
 
 
 def _held(
-    problem: WindowProblem, mean: Array, P: Array, active: Array, shared: Array
+    mean: Array, P: Array, places: tuple[int, ...], limits: Limits, active: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Mean and covariance with the active bounds as measurements without noise, their gains and forces."""
-    n = problem.order
-    if not problem.bounded:
+    n = mean.shape[0]
+    if not places:
         return mean, P, np.zeros(1), np.zeros(1)
-    lower, upper = problem.limits(shared)
     gains: list[Array] = []
     pulls: list[Array] = []
-    for k, i in enumerate(problem.bounded):
+    for k, i in enumerate(places):
         free = np.where(np.abs(active[k]) > 0.5, P[i, i], 0.0)
         holds = free > 0.0
         divisor = np.where(holds, free, 1.0)
         gain = np.where(holds, P[:, i] / divisor, 0.0 * P[:, i])
-        error = np.where(active[k] > 0.0, upper[k], lower[k]) - mean[i]
+        error = np.where(active[k] > 0.0, limits.upper[k], limits.lower[k]) - mean[i]
         mean = np.where(holds, mean + gain * error, mean)
         known = np.eye(n)[i]
         stays = np.where(holds, 1.0 - known, 1.0 + 0.0 * known)  # a known state has no rounding left either
@@ -276,13 +315,52 @@ def _held(
     return mean, P, vector(*gains), vector(*pulls)
 
 
-def _at_bounds(problem: WindowProblem, points: Array, shared: Array) -> Array:
-    """1 where a state stands at its upper bound, -1 at its lower one, else 0, shape (N, b), at least (N, 1)."""
-    if not problem.bounded:
+def _let_go(
+    x: Array, adjoint: Array, gains: Array, pulls: Array, places: tuple[int, ...], limits: Limits, active: Array
+) -> tuple[Array, list[Array]]:
+    """The adjoint before the bounds of `_held`, and which of them are active in the next pass: 1, -1 or 0."""
+    n, (lower, upper) = x.shape[0], limits
+    taken, behind = [0.0 * x[0]] * len(places), [adjoint[i] for i in range(n)]
+    for k, i in reversed(list(enumerate(places))):
+        gain = gains[k * n : (k + 1) * n]
+        force = pulls[k] + gain @ vector(*behind)
+        behind[i] = behind[i] - np.where(np.abs(active[k]) > 0.5, force, 0.0)
+        above, below = x[i] > upper[k], x[i] < lower[k]
+        crossed = np.where(above, 1.0, np.where(below, -1.0, 0.0))
+        holds = force * active[k] < 0.0  # it pushes back, into the bounds
+        taken[k] = np.where(np.abs(active[k]) > 0.5, np.where(holds, active[k], 0.0), crossed)
+    return vector(*behind), taken
+
+
+def _at_bounds(problem: WindowProblem, before: Array, rows: Array, points: Array, shared: Array) -> Array:
+    """1 where a state or a disturbance stands at its upper bound, -1 at its lower one, else 0, shape (N, b), at least
+    (N, 1)."""
+    if not problem.bounds:
         return np.zeros((points.shape[0], 1))
     lower, upper = problem.limits(shared)
     columns = []
     for k, i in enumerate(problem.bounded):
         x = points[:, i : i + 1]
         columns.append(np.where(x >= upper[k], 1.0, 0.0) - np.where(x <= lower[k], 1.0, 0.0))
+    if problem.disturbed:
+        _, (touched,) = scan_table(_touched(problem), (before,), (rows, points), (shared,))
+        columns.append(touched)
     return np.hstack(columns)
+
+
+@lru_cache(maxsize=KEPT)
+def _touched(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
+    """Which disturbances stand at a bound on the way to a row."""
+
+    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (before,), (row_flat, point), (shared,) = carry, given, known
+        row = problem.layout.unpacked(row_flat)
+        moved, (lower, upper) = problem.moved(before, row, shared), problem.noise_limits(row, shared)
+        at = []
+        for k, i in enumerate(problem.disturbed):
+            w, near = point[i] - moved.state[i], NEAR * np.sqrt(moved.noise[i, i])
+            side = np.where(w >= upper[k] - near, 1.0, 0.0) - np.where(w <= lower[k] + near, 1.0, 0.0)
+            at.append(np.where(row.moves > 0.5, side, 0.0))
+        return (point,), (vector(*at),)
+
+    return body

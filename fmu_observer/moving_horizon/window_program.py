@@ -16,6 +16,7 @@ import numpy as np
 from fmu_observer.moving_horizon.window_stages import BufferedCall
 
 SOLVER, OPTIONS = "piqp", {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100}
+FREE = 1e6  # standard deviations, so many that they are no bound of a disturbance
 
 
 class Step(NamedTuple):
@@ -43,12 +44,18 @@ class WindowProgram:
     Args:
         count: N, rows of the window. order: n, states.
         solver: name of a solver of quadratic programmes that CasADi knows. options: of it.
+        disturbed: rows of ``G w`` that have bounds, d of them.
     """
 
     def __init__(
-        self, count: int, order: int, solver: str = SOLVER, options: Mapping[str, Any] = MappingProxyType(OPTIONS)
+        self,
+        count: int,
+        order: int,
+        solver: str = SOLVER,
+        options: Mapping[str, Any] = MappingProxyType(OPTIONS),
+        disturbed: tuple[int, ...] = (),
     ) -> None:
-        self.count, self.order = count, order
+        self.count, self.order, self.disturbed = count, order, list(disturbed)
         size, within = count * order, np.arange(order)
         rows = np.repeat(np.arange(count) * order, order * order) + np.tile(within, size)
         self.cost = _sparsity([np.full(size, order), np.ones(size)], [rows, size + np.arange(size)])
@@ -59,10 +66,12 @@ class WindowProgram:
         place[:, :, 0] = first + within
         place[:-1, :, 1:] = (first[1:] + within)[:, None, :]
         self._kept = (place >= 0).ravel()
+        bounds = np.arange(len(disturbed))
+        of_noise = np.hstack([first + within, size + np.arange(count)[:, None] * len(disturbed) + bounds])
         self.transitions = _sparsity(
-            [columns.ravel(), np.full(size, order)],
-            [place.ravel()[self._kept], np.repeat(first + within, order, axis=0).ravel()],
-            size,
+            [columns.ravel(), np.full(size, of_noise.shape[1])],
+            [place.ravel()[self._kept], np.repeat(of_noise, order, axis=0).ravel()],
+            size + count * len(disturbed),
         )
         told: dict[str, Any] = {"print_time": False, "error_on_fail": False, solver: dict(options)}
         self._solver = ca.conic("window", solver, {"h": self.cost, "a": self.transitions}, told)
@@ -78,6 +87,7 @@ class WindowProgram:
         c: np.ndarray,
         lower: np.ndarray,
         upper: np.ndarray,
+        noise: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> Step:
         """Solve one.
 
@@ -86,50 +96,61 @@ class WindowProgram:
             F: transitions into each row, that of the first is not read, shape (N, n, n). G: of the noises, shape
                 (N, n, n). c: what is missing, shape (N, n).
             lower, upper: bounds of the changes, infinite for none, shape (N, n).
+            noise: bounds of ``G w`` where it has some, infinite for none, shape (N, d) each; None for none.
         """
         N, n = self.count, self.order
         columns = np.empty((N, n, n + 1))
         columns[:, :, 0] = -1.0
         columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
-        coupling = np.concatenate([columns.ravel()[self._kept], G.transpose(0, 2, 1).ravel()])
+        of_noise = np.concatenate([G, G[:, self.disturbed]], axis=1).transpose(0, 2, 1)
+        coupling = np.concatenate([columns.ravel()[self._kept], of_noise.ravel()])
+        none = FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without sides
+        low, high = (-none, none) if noise is None else (np.maximum(noise[0], -none), np.minimum(noise[1], none))
         free, zero = np.full(N * n, np.inf), np.zeros(N * n)
         found, prices, status = self.handed(
             np.concatenate([A.ravel(), zero + 1.0]),
             np.concatenate([b.ravel(), zero]),
             coupling,
-            -c.ravel(),
+            (np.concatenate([-c.ravel(), low.ravel()]), np.concatenate([-c.ravel(), high.ravel()])),
             np.concatenate([lower.ravel(), -free]),
             np.concatenate([upper.ravel(), free]),
         )
         changes, noises = found.reshape(2, N, n)
-        return Step(changes, noises, prices.reshape(N, n), status)
+        return Step(changes, noises, prices[: N * n].reshape(N, n), status)
 
     def handed(
-        self, h: np.ndarray, g: np.ndarray, a: np.ndarray, right: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self,
+        h: np.ndarray,
+        g: np.ndarray,
+        a: np.ndarray,
+        sides: tuple[np.ndarray, np.ndarray],
+        lower: np.ndarray,
+        upper: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, str]:
-        """``min z' H z / 2 + g' z`` with ``A z = right`` and bounds, by the solver.
+        """``min z' H z / 2 + g' z`` with ``A z`` between two sides and bounds, by the solver.
 
         Args:
             h: nonzeros of H as in `cost`. g: shape (2 N n,). a: nonzeros of A as in `transitions`.
-            right: shape (N n,). lower, upper: shape (2 N n,).
+            sides: of the transitions, equal, then of the noises with bounds, shape (N n + N d,).
+            lower, upper: shape (2 N n,).
 
         Returns:
-            z, the multipliers of the equations, and the solver's status.
+            z, the multipliers of the rows of A, and the solver's status.
         """
-        nothing, none = np.zeros(len(g)), np.zeros(len(right))
-        told = self._call(h, g, a, right, right, lower, upper, nothing, nothing, none, *self._rest)
+        nothing, none = np.zeros(len(g)), np.zeros(len(sides[0]))
+        told = self._call(h, g, a, *sides, lower, upper, nothing, nothing, none, *self._rest)
         status = str(self._solver.stats(self._call.memory)["unified_return_status"])
         return told[0].copy(), told[2].copy(), status
 
 
 @lru_cache(maxsize=64)
-def window_program(count: int, order: int) -> WindowProgram:
+def window_program(count: int, order: int, disturbed: tuple[int, ...] = ()) -> WindowProgram:
     """The programme of a size, made once.
 
     Args:
-        count: N, rows. order: n, states.
+        count: N, rows. order: n, states. disturbed: states whose noises have bounds.
     """
-    return WindowProgram(count, order)
+    return WindowProgram(count, order, disturbed=disturbed)
 
 
 def _sparsity(counts: list[np.ndarray], rows: list[np.ndarray], height: int | None = None) -> Any:

@@ -85,21 +85,29 @@ class WindowStages:
         self._mapped: dict[tuple[str, int], BufferedCall] = {}
         self._shared_count = 0
 
-    def along(self, states: Numbers, arrival: ArrivalCost, rows: Numbers, shared: Numbers) -> Stages:
+    def along(
+        self, states: Numbers, arrival: ArrivalCost, rows: Numbers, shared: Numbers, *, led: bool = False
+    ) -> Stages:
         """The stages along a trajectory.
 
         Args:
             states: of each row, shape (N, n). arrival: what is known before the first row. rows: shape (N, width).
             shared: what all rows share, shape (s,).
+            led: whether the first row is an empty one that stands for the state before the window; the transition out
+                of it stays linearised at the arrival cost's point.
         """
         count, n, q = len(rows), self.problem.order, self.problem.layout.measurements
         shared = np.asarray(shared, dtype=float)
         self._shared_count = len(shared)
         before = np.vstack([np.reshape(arrival.point, (1, n)), states[:-1]])
+        if led:
+            before[1] = arrival.point
         moved, F, added = self._called("transition", count, n, before, rows, shared)
         mean, P = np.asarray(arrival.mean, dtype=float), np.reshape(np.asarray(arrival.covariance, dtype=float), (n, n))
         moved, G = moved[:, :, 0], added
         moved[0] += F[0] @ (mean - before[0])
+        if led:
+            moved[1] += F[1] @ (states[0] - before[1])
         G[0] = factor(symmetric(F[0] @ P @ F[0].T + added[0] @ added[0].T))
         F[0] = 0.0
         measured, H, whitening, variances = self._called("reading", count, q, states, rows, shared)
@@ -171,3 +179,15 @@ class WindowStages:
 
 def _function(name: str, symbols: list[Any], *results: Array) -> Any:
     return ca.Function(name, symbols, ca.cse([ca.densify(ca.SX(result)) for result in results]))
+
+
+def forward_substituted(G: np.ndarray, right: np.ndarray, pivots: np.ndarray) -> np.ndarray:
+    """Solutions of ``G w = right`` for lower triangular G; zero where a pivot is infinite; shape (N, n).
+
+    Args:
+        G: shape (N, n, n). right: shape (N, n). pivots: its diagonal, infinite for zero, shape (N, n).
+    """
+    found = np.zeros(right.shape)
+    for i in range(right.shape[1]):
+        found[:, i] = (right[:, i] - np.einsum("kj,kj->k", G[:, i, :i], found[:, :i])) / pivots[:, i]
+    return found

@@ -17,6 +17,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inputs, referenced
 from fmus.content.casadi_source import private_source
+from fmus.content.rolled_loops import rolled_loops
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, traced_once, width
 from plant_models.hybrid.kernel import check_payloads
 from plant_models.hybrid.requirements import MOST_NAMED, named_values
@@ -152,7 +153,7 @@ def _equations_source(name: str, equations: Equations) -> str:
         generator.add(function)
     source = private_source(generator.dump(), {function.name() for function in equations.functions()})
     roomy = [_with_room(function) for function in equations.functions() if _calls(function)]
-    return "\n\n".join([source.strip(), *roomy]) + "\n"
+    return "\n\n".join([rolled_loops(source).strip(), *roomy]) + "\n"
 
 
 def _calls(function: ca.Function) -> bool:

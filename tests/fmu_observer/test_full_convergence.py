@@ -61,9 +61,11 @@ def test_with_a_robust_loss_it_is_many_passes():
     assert abs(full.x[0] - 10.0 * full.t) < 5.0, "the false balise does not pull by 40 m"
 
 
-def test_of_any_model_it_is_many_passes():
+@pytest.mark.parametrize("options", [{}, {"noise_bounds": {"angle": [-1e-3, 1e-3]}}])
+def test_of_any_model_it_is_many_passes(options):
     found = []
-    for system in (FullMovingHorizonObserver("pendulum", window=3), _Passes("pendulum", window=3, passes=8)):
+    for make, more in ((FullMovingHorizonObserver, {"tolerance": 1e-9}), (_Passes, {"passes": 8})):
+        system = make("pendulum", window=3, **options, **more)
         runtime, rng = Runtime(system), np.random.default_rng(2)
         runtime.start(0.0)
         for k in range(6):
@@ -71,6 +73,7 @@ def test_of_any_model_it_is_many_passes():
             runtime.advance(0.1 * (k + 1))
         found.append(runtime.x[: system.model.order].copy())
     assert found[0] == pytest.approx(found[1], abs=SOLVED)
+    assert _told(runtime, "bounds_active") == [1.0 if options else 0.0]
 
 
 def test_a_deadline_that_is_missed_is_told_and_bounds_are_kept():

@@ -19,6 +19,7 @@ from fmu_observer.models import find_model
 from fmu_observer.models.filter_model import Known, filter_model
 from fmu_observer.moving_horizon import robust_loss
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_at
+from fmu_observer.moving_horizon.full_solver import Effort, FullSolver
 from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, solve
 from fmu_observer.moving_horizon.real_time_iteration import contradicted, iterate
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
@@ -48,7 +49,12 @@ def transition(T: Any) -> tuple[Any, Any]:
     return F, np.diag(np.hstack([0.0 * T, 0.2 * T, 0.05 * T]))
 
 
-def problem(bounded: tuple[int, ...] = (), lower: float = -0.5, upper: float = 0.5) -> WindowProblem:
+JERK = 0.03  # bound of the disturbance of the unknown input, for each second
+
+
+def problem(
+    bounded: tuple[int, ...] = (), lower: float = -0.5, upper: float = 0.5, disturbed: tuple[int, ...] = ()
+) -> WindowProblem:
     def moved(x: Any, row: WindowRow, _shared: Any) -> Moved:
         F, Q = transition(row.period)
         return Moved(F @ x + F[:, 1] * row.inputs[0], F, Q)
@@ -56,6 +62,7 @@ def problem(bounded: tuple[int, ...] = (), lower: float = -0.5, upper: float = 0
     def limits(_shared: Any) -> Limits:
         return Limits(np.full(len(bounded), lower), np.full(len(bounded), upper))
 
+    noises = np.ones(len(disturbed))
     return WindowProblem(
         N,
         LAYOUT,
@@ -65,16 +72,20 @@ def problem(bounded: tuple[int, ...] = (), lower: float = -0.5, upper: float = 0
         limits,
         ("squares", "squares"),
         lambda s: s,
+        disturbed=disturbed,
+        noise_limits=lambda row, _shared: Limits(-JERK * noises * row.period, JERK * noises * row.period),
     )
 
 
 @cache
-def compiled(window: int, passes: int = 1, bounded: tuple[int, ...] = ()) -> Callable[..., Any]:
+def compiled(
+    window: int, passes: int = 1, bounded: tuple[int, ...] = (), disturbed: tuple[int, ...] = ()
+) -> Callable[..., Any]:
     """`iterate` as one traced function, as an observer's jump is."""
     sizes = (2 * N + N * N, window * LAYOUT.width, window * N, LAYOUT.width, N, 1)
     symbols = [ca.SX.sym(f"a{i}", size) for i, size in enumerate(sizes)]
     arrays = [ca.ArrayInterface.SX(s, shape=(s.numel(),)) for s in symbols]
-    found = iterate(problem(bounded), passes, *arrays)
+    found = iterate(problem(bounded, disturbed=disturbed), passes, *arrays)
     return ca.Function("iterated", symbols, [ca.SX(value) for value in found])
 
 
@@ -106,8 +117,14 @@ def kalman(rows: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
     return found
 
 
-def moved_through(window: int, rows: list[np.ndarray], passes: int = 1, bounded: tuple[int, ...] = ()) -> list[Any]:
-    function = compiled(window, passes, bounded)
+def moved_through(
+    window: int,
+    rows: list[np.ndarray],
+    passes: int = 1,
+    bounded: tuple[int, ...] = (),
+    disturbed: tuple[int, ...] = (),
+) -> list[Any]:
+    function = compiled(window, passes, bounded, disturbed)
     arrival = np.concatenate(arrival_cost_at(START, P0))
     table, points, x, found = np.zeros(window * LAYOUT.width), np.tile(START, window), START, []
     for row in rows:
@@ -177,6 +194,32 @@ def dense(rows: list[np.ndarray], bounds: tuple[int, float, float] | None) -> np
     return np.asarray(found.x).reshape(count, N)
 
 
+def disturbed_dense(rows: list[np.ndarray]) -> np.ndarray:
+    """All states of a record whose unknown input has bounded disturbances, shape (N, n): SciPy's active set over the
+    start and the noises, which alone are unknown."""
+    S, s = np.linalg.cholesky(P0), START
+    S = np.hstack([S, np.zeros((N, 2 * len(rows)))])
+    blocks, sides, states = [np.eye(S.shape[1])], [np.zeros(S.shape[1])], []
+    bound = np.full(S.shape[1], np.inf)
+    for k, row in enumerate(rows):
+        if row[0]:
+            F, Q = transition(row[1])
+            S, s = F @ S, F @ s + F[:, 1] * row[3]
+            for place, i in enumerate((1, 2)):
+                S[i, N + 2 * k + place] += np.sqrt(Q[i, i])
+            bound[N + 2 * k + 1] = JERK * row[1] / np.sqrt(Q[2, 2])
+        states.append((S.copy(), s))
+        used = row[6:] > 0.5
+        if used.any():
+            root = np.linalg.inv(np.linalg.cholesky(R[np.ix_(used, used)]))
+            blocks.append(root @ H[used] @ S)
+            sides.append(root @ (row[4:6][used] - H[used] @ s))
+    A, b = np.vstack(blocks), np.concatenate(sides)
+    z = scipy.optimize.lsq_linear(A, b, (-bound, bound), method="bvls", tol=1e-14).x
+    assert (np.abs(z) >= bound * (1.0 - 1e-9)).any()  # a bound is active
+    return np.array([S @ z + s for S, s in states])
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_bounds_give_the_bounded_optimum(seed: int) -> None:
     """Enough passes find the optimum of all states under bounds, that of another solver; the first seeds have 3 to 9
@@ -189,6 +232,35 @@ def test_bounds_give_the_bounded_optimum(seed: int) -> None:
     assert (np.abs(expected[:, 2]) > 0.5 - 1e-9).any()  # a bound is active
     assert np.allclose(found.estimates, expected, atol=2e-5 * np.abs(expected).max())  # the 1e-12 above
     assert found.moved[0] < 12.0  # it has settled
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bounds_of_disturbances_give_the_bounded_optimum(seed: int) -> None:
+    """Passes and the search to convergence against SciPy on the same equations."""
+    rows = [row for row in rows_of(seed, 12) if row[1] < 3.0]
+    table, points, judged = np.array(rows), np.tile(START, (len(rows), 1)), problem(disturbed=(2,))
+    found = solve(judged, arrival_cost_at(START, P0), table, points, np.zeros(1), 12)
+    expected = disturbed_dense(rows)
+    scale = np.abs(expected).max()
+    assert np.abs(found.estimates - expected).max() <= 1e-9 * scale
+    full = FullSolver(judged).solve(arrival_cost_at(START, P0), table, points, np.zeros(1), Effort(1e-9))
+    assert full.converged
+    assert np.abs(full.states - expected).max() <= 1e-6 * scale  # PIQP ends at 1e-9 in the units of the problem
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 2**20), size=st.floats(0.1, 1e6))
+def test_bounds_of_disturbances_are_never_broken(seed: int, size: float) -> None:
+    rows = rows_of(seed, 30)
+    for row in rows:
+        row[4:6] *= size
+    found = moved_through(8, rows, 2, (1,), (2,))
+    for k, (_, _, points, _) in enumerate(found):
+        assert np.abs(points[:, 1]).max() <= 0.5
+        for i in range(1, min(8, k + 1)):
+            T, F = rows[k - i + 1][1], transition(rows[k - i + 1][1])[0]
+            push = points[-i][2] - F[2] @ points[-i - 1]
+            assert abs(push) <= JERK * T + 1e-12 * np.abs(points).max()  # rounding of the difference
 
 
 @settings(max_examples=10, deadline=None)
@@ -276,6 +348,8 @@ def test_contradictory_bounds_are_refused_in_words() -> None:
         ({"bounds": {"rate": [0.0, float("nan")]}}, "bounds of 'rate' are .0.0, nan.; expected .lowest, highest."),
         ({"bounds": {"rate": 3.0}}, "bounds of 'rate' are 3.0; expected .lowest, highest."),
         ({"bounds": "rate"}, "bounds = 'rate'; expected .lowest, highest. by name of a state"),
+        ({"noise_bounds": {"rate": [0.1, 1.0]}}, "noise_bounds of 'rate' are .0.1, 1.0.; zero must lie within"),
+        ({"noise_bounds": {"y": [-0.1, 1.0]}}, "expected .lowest, highest. of one of the states angle, rate"),
         ({"loss": "tukey"}, "expected one of squares, huber, geman_mcclure"),
         ({"window": 0}, "window must be 1 to 1000"),
         ({"passes": 0}, "passes must be 1 to 20"),

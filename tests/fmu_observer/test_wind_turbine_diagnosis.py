@@ -158,7 +158,7 @@ def test_the_slow_mode_is_that_of_the_drive_train() -> None:
         for u in zip(driving, braking, strict=True):
             x = A @ x + B @ np.array(u)
         # The shaft still swings after the last block, by its torsion of 1e-3 rad times 15 to 28 rad/s, times Ng.
-        found = simulated_speed(efficiency, 1.6 * 95.0, driving, braking, 10.0, p)
+        found = simulated_speed(np.array([efficiency]), 1.6 * 95.0, driving, braking, 10.0, p)
         assert found == pytest.approx(x[1], abs=1e-4 * 28.0 * 95.0)
 
 

@@ -13,6 +13,7 @@ from pages import PACKAGES, ROOT
 HIDDEN_AT_MOST = 40
 """In functions stands only what is large and seldom used: an optional package, the drawing of a page."""
 
+HOLDERS = (ast.stmt, ast.excepthandler, ast.match_case)
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 
 
@@ -30,8 +31,10 @@ def module_name(path: Path) -> str:
 
 
 def imports(node: ast.AST, hidden: bool = False) -> Iterator[Import]:
-    """All imports but those for type checkers."""
+    """All imports but those for type checkers; an expression holds none."""
     for child in ast.iter_child_nodes(node):
+        if not isinstance(child, HOLDERS):
+            continue
         if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
             continue
         if isinstance(child, ast.Import):

@@ -1,4 +1,4 @@
-"""Figures of the faults of the odometer: when it lies and who says so, and speed errors beside their bounds."""
+"""Figures of faults: when one acts and who says so, and speed errors beside their bounds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.drawing.style import MARK, axes_or_new, observer_line, styled
-from cosim.evaluation.fault_detection import DETECTION, intervals
+from cosim.evaluation.fault_detection import intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above, logarithmic, time_axis
@@ -22,7 +22,7 @@ FILLED = 0.7  # share of a row that its bar fills
 
 @styled
 def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Bars against time where the odometer lies, and below them one row an observer where it says so.
+    """Bars against time where a fault acts, and below them one row an observer where it says so.
 
     Args:
         result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
@@ -30,9 +30,9 @@ def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
     Returns:
         The axes.
     """
-    told = {o: v for o in spec.observers if (v := estimate(result, o, DETECTION)) is not None}
+    told = {o: v for o in spec.observers if (v := estimate(result, o, spec.detection)) is not None}
     true = recorded(result, spec.true_fault)
-    rows = [("odometer lies", MARK, true)] if true is not None else []
+    rows = [("fault acts", MARK, true)] if true is not None else []
     rows += [(label(spec, o), observer_line(spec.observers, o)["color"], v) for o, v in told.items()]
     ax = axes_or_new(ax, (8.2, REST + ROW * len(rows)))
     for place, (_, colour, values) in enumerate(rows):
@@ -78,11 +78,11 @@ def bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
 
 
 class FaultsPanel(Panel):
-    """Faults of the odometer."""
+    """Faults, of the odometer say."""
 
     name = "faults"
-    title = "Faults of the odometer"
-    caption = "When the odometer lies, and when each observer says so."
+    title = "Faults"
+    caption = "When a fault acts, and when each observer says so."
     place = 3.4
 
     @staticmethod
@@ -91,7 +91,7 @@ class FaultsPanel(Panel):
 
     @staticmethod
     def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return any_estimate(result, spec, DETECTION) and recorded(result, spec.true_fault) is not None
+        return any_estimate(result, spec, spec.detection) and recorded(result, spec.true_fault) is not None
 
 
 class BoundsPanel(Panel):

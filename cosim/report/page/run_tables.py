@@ -143,13 +143,13 @@ def indicators_table(result: Result, spec: ReportSpec) -> Table:
 
 
 def faults_table(result: Result, spec: ReportSpec) -> Table:
-    """Faults of the odometer: which were found, how late, and what was no fault.
+    """Faults: which were found, how late, and what was no fault.
 
     Args:
         result: the run.
         spec: roles and labels.
     """
-    rows = [[label(spec, found.observer), *cells(found)] for found in fault_detection(result, spec)]
+    rows = [[label(spec, found.observer), *cells(found, spec.delay_limit)] for found in fault_detection(result, spec)]
     return simple_table(["Observer", *HEADINGS], rows, range(1, len(HEADINGS) + 1))
 
 

@@ -87,15 +87,15 @@ def arm_errors(
         batch.set(f"estimated_{name}", beside)
     if predictors:
         batch.set("prediction", np.tile(np.asarray(start, dtype=float), count))
-    members, stamps, nodes, values = [], [], [], []
+    members, sent, stamps, nodes, noises = [], [], [], [], []
     for i, cell in enumerate(cells):
         numbers = np.arange(int((stop - cell.delay) / cell.interval) + 1)
-        noise = np.sqrt(variance) * np.random.default_rng(cell.seed).normal(size=(2, len(numbers)))
         members.append(np.full(len(numbers), i))
+        sent.append(numbers * cell.interval)
         stamps.append(numbers * cell.interval + cell.delay)
         nodes.append(0.0 * numbers if at_once else numbers % 2 + 1.0)
-        values.append(motion(numbers * cell.interval)[:2] + noise)
-    told = np.concatenate(values, axis=1)
+        noises.append(np.sqrt(variance) * np.random.default_rng(cell.seed).normal(size=(2, len(numbers))))
+    told = motion(np.concatenate(sent))[:2] + np.concatenate(noises, axis=1)  # all at once: each call costs
     batch.notify(
         "packet",
         np.concatenate(members),
@@ -108,5 +108,5 @@ def arm_errors(
     batch.start(0.0)
     names = [*STATES, *(f"delayed_{name}" for name in STATES)]
     found = batch.run(t[1:], names, {"drive": 0.1 * np.sin(t + 0.5 * STEP)})
-    ago = np.stack([motion(np.maximum(t - delay, 0.0)).T for delay in delays])
+    ago = motion(np.maximum(t - delays[:, None], 0.0).ravel()).reshape(4, len(cells), len(t)).transpose(1, 2, 0)
     return Errors(t, found[:, :, :4] - motion(t).T, found[:, :, 4:] - ago)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -29,6 +30,27 @@ class Learning(NamedTuple):
     told: np.ndarray
 
 
+@cache
+def oscillation(model: str, end: float) -> Any:
+    """The motion of the oscillator from the published start, a function of time; of many instants at once it is
+    cheapest.
+
+    Args:
+        model: the oscillator or its excited variant, by name. end: of the motion [s].
+    """
+    flow, none = find_state_affine_model(model).flow, np.zeros(1)
+    return solve_ivp(
+        lambda t, x: np.asarray(flow(t, x, RHO, none)),
+        (0.0, end),
+        [20.0, -40.0],
+        "DOP853",
+        rtol=1e-10,
+        atol=1e-9,
+        max_step=0.1,
+        dense_output=True,
+    ).sol
+
+
 def learn(
     observer: HybridSystem,
     periods: Sequence[float],
@@ -42,23 +64,13 @@ def learn(
         observer: adaptive, of the oscillator or of its excited variant. periods: one a member [s]. end: of the runs
             [s]. outputs: by name. preset: of the observer.
     """
-    model = find_state_affine_model(observer.model.name)  # type: ignore[attr-defined]
-    none = np.zeros(1)
-    sol = solve_ivp(
-        lambda t, x: np.asarray(model.flow(t, x, RHO, none)),
-        (0.0, end),
-        [20.0, -40.0],
-        "DOP853",
-        rtol=1e-10,
-        atol=1e-9,
-        max_step=0.1,
-        dense_output=True,
-    ).sol
+    sol = oscillation(observer.model.name, end)  # type: ignore[attr-defined]
     batch = Batch(observer, len(periods), preset)
     batch.start()
-    for i, period in enumerate(periods):
-        stamps = period * np.arange(int(end / period) + 1)
-        batch.notify("sample", i, stamps, x1=sol(stamps)[0])
+    stamps = [period * np.arange(int(end / period) + 1) for period in periods]
+    members = np.repeat(np.arange(len(periods)), [len(own) for own in stamps])
+    told = np.concatenate(stamps)
+    batch.notify("sample", members, told, x1=sol(told)[0])
     t = GRID * np.arange(round(end / GRID) + 1)
     rows = batch.run(t[1:], ["x1", "x2", *outputs])
     error = np.hypot(*(rows[:, :, j] - sol(t)[j] for j in (0, 1)))

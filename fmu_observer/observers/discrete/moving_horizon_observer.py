@@ -60,15 +60,20 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
     A prediction by the event `sampling` alone is a row too.
 
     An unknown parameter is a state without noise, an unknown input one that noise alone drives. The estimate keeps its
-    bounds at every instant, whatever is measured. Innovations, NIS and likelihood are those of the step from the
-    estimate before, as of the extended filter; under a robust loss there is no output `nis`, since what it doubts would
-    be judged with the rest. Where a robust loss judges telegrams, the gate of balises is off unless it is set.
+    bounds at every instant, whatever is measured. So do disturbances, what moves a state from row to row beyond the
+    model; a state whose own bounds leave no room for that keeps its own. Innovations, NIS and likelihood are those of
+    the step from the estimate before, as of the extended filter; under a robust loss there is no output `nis`, since
+    what it doubts would be judged with the rest. Where a robust loss judges telegrams, the gate of balises is off
+    unless it is set.
 
     Args:
         model: name of an observer model or of a plant, or one itself.
         window: rows in the window, 1 to 1000. passes: Gauss-Newton passes at a row, 1 to 20.
         bounds: lowest and highest value by name of a state; None or an infinite one where there is none,
             ``{"x2": [0.0, None]}``. They are starts of the parameters `lower_bounds` and `upper_bounds`.
+        noise_bounds: least and most by which a disturbance moves a state from row to row, by its name, zero between
+            them; where noise is given by its density, for each second between rows. They are starts of the parameters
+            `lower_noise_bounds` and `upper_noise_bounds`.
         loss: ``squares``, ``huber`` or ``geman_mcclure``, for all measurements or for each in a list.
         options: those of `GaussianFilter`.
 
@@ -87,6 +92,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         "window": range(1, MOST_ROWS + 1),
         "passes": range(1, MOST_PASSES + 1),
         "bounds": (),
+        "noise_bounds": (),
         "loss": LOSSES,
     }
 
@@ -97,12 +103,15 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         window: int = WINDOW,
         passes: int = PASSES,
         bounds: Bounds | None = None,
+        noise_bounds: Bounds | None = None,
         loss: Loss | Sequence[Loss] = "squares",
         **options: Any,
     ) -> None:
         require_window(self.name, window, passes)
         self.window, self.passes, self.bounds, self._loss = window, passes, _bounds(self.name, bounds), loss
-        given = {"bounds": {name: list(pair) for name, pair in self.bounds.items()}} if self.bounds else {}
+        self.noise_bounds = _bounds(self.name, noise_bounds, "noise_bounds")
+        both = {"bounds": self.bounds, "noise_bounds": self.noise_bounds}
+        given = {key: {name: list(pair) for name, pair in of.items()} for key, of in both.items() if of}
         listed = loss if isinstance(loss, str) else list(loss)
         super().__init__(model, window=window, passes=passes, loss=listed, **given, **options)
 
@@ -146,6 +155,10 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         for k, name in enumerate(self.bounds):
             text = f"lower_bounds[{k + 1}] must be below upper_bounds[{k + 1}], the bounds of {name}"
             needed[text] = np.where(p.lower_bounds[k] < p.upper_bounds[k], 1.0, 0.0)
+        for k, name in enumerate(self.noise_bounds):
+            text = f"lower_noise_bounds[{k + 1}] <= 0 <= upper_noise_bounds[{k + 1}], the disturbances of {name}"
+            legal = np.logical_and(p.lower_noise_bounds[k] <= 0.0, p.upper_noise_bounds[k] >= 0.0)
+            needed[text] = np.where(legal, 1.0, 0.0)
         return needed
 
     def condition_of(self, p: Any) -> Condition:
@@ -178,6 +191,8 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
             losses=self._losses,
             loss_scale=lambda shared: self.unpack_parameters(shared).loss_scale,
             form="short" if self.form == "short" else "joseph",
+            disturbed=tuple(names.index(name) for name in self.noise_bounds),
+            noise_limits=self._noise_limits,
         )
 
     # -- internals --------------------------------------------------------------------------------------------------
@@ -225,7 +240,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         model, bounds = self.model, self.bounds
         names, q = [s.name for s in model.states], len(model.measurements)
         losses = self._losses = _losses(self.name, self._loss, q)
-        for name, pair in bounds.items():
+        for name, pair in (*bounds.items(), *self.noise_bounds.items()):
             if name not in names:
                 raise ValueError(
                     f"{self.name}: bounds of {name!r} are {pair!r}; expected [lowest, highest] of one of the states "
@@ -234,15 +249,18 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         self.robust = any(loss != "squares" for loss in losses)
         if self.robust:
             self.gate_start = OFF
-        lower = tuple(-UNBOUNDED if low is None else max(float(low), -UNBOUNDED) for low, _ in bounds.values())
-        upper = tuple(UNBOUNDED if high is None else min(float(high), UNBOUNDED) for _, high in bounds.values())
-        listed = ", ".join(bounds)
+        for name, (low, high) in self.noise_bounds.items():
+            if (low or 0.0) > 0.0 or (high or 0.0) < 0.0:
+                raise ValueError(f"{self.name}: noise_bounds of {name!r} are [{low}, {high}]; zero must lie within.")
         self.own_parameters = () if all(loss == "squares" for loss in losses) else (_loss_scale(losses),)
-        if bounds:
-            self.own_parameters += (
-                parameter("lower_bounds", "1", lower, f"Lowest values, SI units: {listed}", size=len(bounds)),
-                parameter("upper_bounds", "1", upper, f"Highest values, SI units: {listed}", size=len(bounds)),
-            )
+        for prefix, of, what in (("", bounds, "values"), ("_noise", self.noise_bounds, "disturbances")):
+            if of:
+                low, high = _starts(of)
+                text, size = f"{what}, SI units: {', '.join(of)}", len(of)
+                self.own_parameters += (
+                    parameter(f"lower{prefix}_bounds", "1", low, f"Lowest {text}", size=size),
+                    parameter(f"upper{prefix}_bounds", "1", high, f"Highest {text}", size=size),
+                )
         super()._declare()
         row_width = RowLayout(len(model.inputs), q).width
         self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
@@ -255,20 +273,33 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         p = self.unpack_parameters(shared)
         return Limits(p.lower_bounds, p.upper_bounds)
 
+    def _noise_limits(self, row: WindowRow, shared: Array) -> Limits:
+        if not self.noise_bounds:
+            return Limits(np.zeros(0), np.zeros(0))
+        p, elapsed = self.unpack_parameters(shared), row.period if self.arrivals.timed else 1.0
+        return Limits(p.lower_noise_bounds * elapsed, p.upper_noise_bounds * elapsed)
 
-def _bounds(who: str, given: Bounds | None) -> dict[str, Sequence[float | None]]:
+
+def _starts(bounds: Bounds) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Start values of lowest and highest, with numbers where there is none."""
+    lower = tuple(-UNBOUNDED if low is None else max(float(low), -UNBOUNDED) for low, _ in bounds.values())
+    upper = tuple(UNBOUNDED if high is None else min(float(high), UNBOUNDED) for _, high in bounds.values())
+    return lower, upper
+
+
+def _bounds(who: str, given: Bounds | None, option: str = "bounds") -> dict[str, Sequence[float | None]]:
     """Bounds by name of a state, each a pair of numbers or None, the lowest below the highest."""
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(
-            f"{who}: bounds = {given!r}; expected [lowest, highest] by name of a state, as in {{'x2': [0.0, 1.0]}}."
+            f"{who}: {option} = {given!r}; expected [lowest, highest] by name of a state, as in {{'x2': [0.0, 1.0]}}."
         )
     for name, pair in (given or {}).items():
         legal = isinstance(pair, list | tuple) and len(pair) == 2
         if not legal or not all(bound is None or is_number(bound) for bound in pair):
-            raise ValueError(f"{who}: bounds of {name!r} are {pair!r}; expected [lowest, highest], both numbers.")
+            raise ValueError(f"{who}: {option} of {name!r} are {pair!r}; expected [lowest, highest], both numbers.")
         low, high = pair
         if low is not None and high is not None and not low < high:
-            raise ValueError(f"{who}: bounds of {name!r} are {pair!r}; the lowest must be below the highest.")
+            raise ValueError(f"{who}: {option} of {name!r} are {pair!r}; the lowest must be below the highest.")
     return dict(given or {})
 
 

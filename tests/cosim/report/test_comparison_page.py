@@ -10,7 +10,6 @@ from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
-import browser
 import numpy as np
 import pytest
 from hand_made_comparison import ALLOWED, crossing, curves, different, differing, equal, missing
@@ -281,4 +280,6 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
 @pytest.mark.browser
 @pytest.mark.parametrize("comparison", [different(), equal()], ids=["different", "equal"])
 def test_the_page_in_a_browser(comparison: Comparison, tmp_path: Path) -> None:
+    import browser
+
     browser.check_page(write_comparison(comparison, tmp_path)["html"])

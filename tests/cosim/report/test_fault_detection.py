@@ -67,6 +67,11 @@ def test_faults_misses_false_alarms_and_delays() -> None:
     assert alone.position_errors == (pytest.approx(3.0),)
     shown = dict(zip(HEADINGS, cells(found), strict=True))
     assert (shown["Faults"], shown["Missed"], shown["False"]) == ("3", "1", "1")
+    assert shown["Delay at start [s]"] == "0.450"
+    assert dict(zip(HEADINGS, cells(found, 1.0), strict=True))["Delay at start [s]"] == "0.450 (not within 1.00)"
+    assert "(within 0.500)" in cells(replace(found, faults=2), 0.5)[5]  # none missed, none later
+    assert "(not within 0.499)" in cells(replace(found, faults=2), 0.499)[5]
+    assert fault_detection(result, replace(SPEC, detection="position"))[0].detected == 3  # never zero then
     assert len(fault_text([found, alone], SPEC).splitlines()) == 4
     assert len(faults_table(result, SPEC).groups[0][1]) == 2
 
@@ -139,7 +144,7 @@ def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that
     assert FaultsPanel.available(result, SPEC)
     assert not FaultsPanel.available(result, replace(SPEC, true_fault=None))
     axes = FaultsPanel.draw(result, replace(SPEC, labels={"o": "Ours"}), None)
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["odometer lies", "Ours"]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["fault acts", "Ours"]
     truth, told = (path.get_paths() for path in axes.collections)
     assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in truth] == [(10.0, 13.0)]
     assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in told] == [(10.4, 13.2), (60.0, 61.0)]

@@ -35,7 +35,7 @@ def rows_of(table: np.ndarray) -> list[tuple[float, float, float]]:
 
 
 def row(number: int) -> tuple[float, float, float]:
-    return 0.1 * number, float(number), -float(number)
+    return 0.1 * number, float(number), -float(number) if number % 11 in (3, 4, 8) else 0.0
 
 
 def add_points(recorder: Recorder, start: int, count: int) -> None:
@@ -48,12 +48,14 @@ def add_points(recorder: Recorder, start: int, count: int) -> None:
 class Reference:
     """What is to be kept, said in the plainest way: all rows with a mark, thinned at the end."""
 
-    def __init__(self, every: int) -> None:
-        self.every, self.all, self.points = every, [], 0
+    def __init__(self, every: int, switching: bool) -> None:
+        self.every, self.switching, self.all, self.points = every, switching, [], 0
 
     def point(self, number: int) -> None:
         follows_event = bool(self.all) and self.all[-1][1] == "event"
-        self.all.append((row(number), "keep" if self.points % self.every == 0 or follows_event else "drop"))
+        switches = self.switching and bool(self.all) and (row(number)[2] == 0.0) != (self.all[-1][0][2] == 0.0)
+        due = self.points % self.every == 0 or follows_event or switches
+        self.all.append((row(number), "keep" if due else "drop"))
         self.points += 1
 
     def event(self, number: int) -> None:
@@ -67,11 +69,12 @@ class Reference:
 OPERATIONS = st.lists(st.tuples(st.sampled_from(["points", "event", "block"]), st.integers(0, 40)), max_size=25)
 
 
-@given(OPERATIONS, st.integers(1, 7), st.sampled_from([1, 30 * ROW, 1e9]), st.integers(0, 50))
+@given(OPERATIONS, st.integers(1, 7), st.booleans(), st.sampled_from([1, 30 * ROW, 1e9]), st.integers(0, 50))
 def test_exactly_the_rows_that_are_due_are_kept(
-    operations: list[tuple[str, int]], every: int, memory: float, expected: int
+    operations: list[tuple[str, int]], every: int, switching: bool, memory: float, expected: int
 ) -> None:
-    recorder, reference, number = Recorder(SIGNALS, expected, memory=memory, every=every), Reference(every), 0
+    recorder = Recorder(SIGNALS, expected, memory=memory, every=every, switching=(1,) if switching else ())
+    reference, number = Reference(every, switching), 0
     for what, count in operations:
         if what == "points":
             add_points(recorder, number, count)
@@ -165,7 +168,7 @@ def disk_of(size: int) -> Iterator[None]:
 @pytest.mark.parametrize("size", [0, 130 * ROW, 200 * ROW])
 @pytest.mark.parametrize("every", [1, 3])
 def test_a_full_disk_ends_the_recording_and_loses_nothing(size: int, every: int) -> None:
-    recorder, reference = Recorder(SIGNALS, 0, memory=100 * ROW, every=every), Reference(every)
+    recorder, reference = Recorder(SIGNALS, 0, memory=100 * ROW, every=every), Reference(every, False)
 
     def fill_up() -> None:
         for number in range(3000):
