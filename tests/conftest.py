@@ -27,8 +27,8 @@ CFLAGS = os.environ.get("CFLAGS", "")
 QUICK = f"{CFLAGS} -O0".strip()
 AS_SHIPPED = (
     "tests/fmus/test_fmu_numbers.py",
-    "tests/fmus/test_batch.py",
-    "tests/project/test_page_blocks.py::test_blocks_of_a_page[README.md]",
+    "tests/fmus/test_batch.py::test_a_member_is_the_fmu_alone[discrete_uio]",
+    "tests/fmus/test_batch.py::test_a_member_is_the_fmu_alone[locomotive]",
 )
 """Tests of the second tier whose FMUs are built with the flags that users get."""
 SECOND_TIER = Path(__file__).with_name("second_tier.txt")
@@ -36,6 +36,7 @@ KEPT = "! "
 FIRST_TIER = "not slow"
 BEGUN = pytest.StashKey[float]()
 SPENT = "processor time [s]"
+ELSEWHERE: list[float] = []
 SAMPLE = 16
 """One test in so many is in the sample, by a digest of its name."""
 
@@ -88,20 +89,16 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"{spent[file]:7.1f} s  {file}")
 
 
-@pytest.fixture
-def charge(request: pytest.FixtureRequest) -> Callable[[float], None]:
-    """Adds to the time of a test what was spent for it in a process that this one does not wait for [s]."""
-
-    def add(spent: float) -> None:
-        request.node.stash[BEGUN] -= spent
-
-    return add
+@pytest.fixture(scope="session")
+def charge() -> Callable[[float], None]:
+    """Adds what was spent for a test in a process that this one has not waited for [s]."""
+    return ELSEWHERE.append
 
 
 def processor_time() -> float:
-    """Of this process and of those that it has waited for [s]."""
+    """Of this process, of those that it has waited for, and what was charged [s]."""
     times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return times.user + times.system + times.children_user + times.children_system + sum(ELSEWHERE)
 
 
 def pytest_collection_finish() -> None:
@@ -124,25 +121,27 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the second tier as slow, and what opens a browser; mark a sample, the first of each file among it. In whole
-    files a line that fits none of the tests is an error.
+    """Mark the second tier as slow, and what opens a browser; mark a sample, of each file one at least: not the first,
+    which pays for what the others share. In whole files a line that fits none of the tests is an error.
     """
     lines, by_file = second_tier(), defaultdict(list)
     for line in lines:
         by_file[line.partition("::")[0]].append(line)
-    used, sampled = set(), set()
+    used, digests = set(), defaultdict(list)
     for item in items:
         name = item.nodeid
         file = name.partition("::")[0]
-        if file not in sampled or crc32(name.encode()) % SAMPLE == 0:
-            sampled.add(file)
-            item.add_marker(pytest.mark.sample)
+        digests[file].append((crc32(name.encode()), item))
         fitting = [beginning for beginning in by_file[file] if name.startswith(beginning)]
         used |= set(fitting)
         if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.slow)
+    for of_a_file in digests.values():
+        drawn = [item for digest, item in of_a_file if digest % SAMPLE == 0]
+        for item in drawn or [min(of_a_file, key=lambda pair: pair[0])[1]]:
+            item.add_marker(pytest.mark.sample)
     # pages and gallery, the longest tests, come first, so that no worker waits for one at the end
     items.sort(key=lambda item: not item.nodeid.startswith("tests/project/"))
-    idle = [line for line in lines if line not in used and line.partition("::")[0] in sampled]
+    idle = [line for line in lines if line not in used and line.partition("::")[0] in digests]
     if idle and not any("::" in argument for argument in config.args):
         raise pytest.UsageError(f"{SECOND_TIER.name}: no test begins with: {'; '.join(idle)}")

@@ -142,8 +142,10 @@ class Component(Described, Slave):
     def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:  # noqa: D102 - see Instance
         return self._counted("get", READ, f"reading {shown(names)}", self._unguarded_reader(names, values))
 
-    def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:  # noqa: D102 - see Instance
-        write, buffer = self._unguarded_writer(names)
+    def writer(  # noqa: D102 - see Instance
+        self, names: Sequence[str], values: np.ndarray | None = None
+    ) -> tuple[Callable[[], None], np.ndarray]:
+        write, buffer = self._unguarded_writer(names, values)
         return self._counted("set", WRITE, f"writing {shown(names)}", write), buffer
 
     def make_derivative_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import repeat
 
 import numpy as np
 
-from cosim.fmu_model.quick_points import Batch, Point, QuickPoints
+from cosim.fmu_model.quick_points import Batch, QuickPoints
 from cosim.fmu_model.quick_restarts import quicken_restarts
 from cosim.fmu_model.sealed import FAR, Array, FmuModelError, SealedModel, Way
 from fmus.check.instance import SlaveError
@@ -40,31 +39,34 @@ class CoSimulationModel(SealedModel):
     def states_after(self, t: float, h: float, points: Array, u: Array) -> Array:  # noqa: D102 - see SealedModel
         if self._quick is None or self._quick.hangs_in:
             return super().states_after(t, h, points, u)
-        found = np.empty((points.shape[1], len(self.states)))
-        if u.ndim == 1:
-            self._input_values[:] = u
         try:
-            self._steps(t, h, points, repeat(None) if u.ndim == 1 else u.T, found, self._slowly)
+            return self._steps(t, h, self._values_of(points, u), self._slowly).T
         except SlaveError as error:
             raise self._in_words(error) from error
-        return found.T
 
-    def outputs_at(self, t: float, points: Array, u: Array, chosen: Sequence[int]) -> Array:  # noqa: D102 - see SealedModel
+    def outputs_at(self, t: float, points: Array, u: Array, chosen: Sequence[int] | None = None) -> Array:  # noqa: D102 - see SealedModel
         if self._quick is None or self._quick.hangs_in:
             return super().outputs_at(t, points, u, chosen)
-        found = np.empty((points.shape[1], len(self.outputs)))
-        self._input_values[:] = u
         try:
-            self._looks(t, 0.0, points, repeat(None), found, self._slowly)
+            found = self._looks(t, 0.0, self._values_of(points, u), self._slowly)
         except SlaveError as error:
             raise self._in_words(error) from error
-        return found.take(chosen, axis=1).T
+        return found.T if chosen is None else found.take(chosen, axis=1).T
 
-    def _slowly(self, t: float, h: float, x: Array) -> None:
-        """A step in the ordinary way from a state, shape (n,), with the inputs that were written last."""
-        super()._restart(t, x, self._input_values.copy())
+    def _values_of(self, points: Array, u: Array) -> Array:
+        """What is written before initialisation at points, shape (n, N), under inputs, shape (m,) or (m, N)."""
+        first, last = len(self._settings), len(self._settings) + len(self.states)
+        found = np.empty((points.shape[1], len(self._values)))
+        found[:, :first], found[:, first:last], found[:, last:] = self._values[:first], points.T, u.T
+        return found
+
+    def _slowly(self, t: float, h: float, written: Array) -> Array:
+        """States after a step in the ordinary way from what is written before initialisation, shape (k,)."""
+        first, last = len(self._settings), len(self._settings) + len(self.states)
+        super()._restart(t, written[first:last], written[last:])
         self.instance.advance(t, t + h)
         self._read_states()
+        return self._states_read
 
     def _restart(self, t: float, x: Array, u: Array) -> None:
         if self._quick is not None:
@@ -108,8 +110,4 @@ class CoSimulationModel(SealedModel):
         if instance.has_event_mode or self.way != "restart":
             return  # initialisation ends in calls that depend on what the FMU answers, or is followed by others
         self._quick = quick = QuickPoints(instance, FAR, self._written, self._write_values)
-        states, inputs = self._state_values, self._input_values
-        self._steps = quick.batch(Point(states, inputs, self._states_read), self.states, self._read_states, step=True)
-        self._looks = quick.batch(
-            Point(states, inputs, self._outputs_read), self.outputs, self._read_outputs, step=False
-        )
+        self._steps, self._looks = quick.batch(self.states, step=True), quick.batch(self.outputs, step=False)

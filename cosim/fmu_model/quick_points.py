@@ -5,7 +5,7 @@ one call that is prepared once. A filter makes it many times a sample. Touches o
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,19 +17,24 @@ from fmus.fmi.native_calls import WARNING, JoinedCalls, prepared_call
 from fmus.fmi.standard import DISCARD
 
 Array = NDArray[np.float64]
-Slowly = Callable[[float, float, Array], None]  # (instant [s], length of the step [s], states)
-Batch = Callable[[float, float, Array, Iterable[Array | None], Array, Slowly], None]
-"""Of instant [s], length of the step [s], states of shape (n, N), inputs of each point or None where they stay, what
-was read, shape (N, k), and who does a point in the ordinary way.
+Slowly = Callable[[float, float, Array], Array]  # (instant [s], length of the step [s], values written) -> read
+Batch = Callable[[float, float, Array, Slowly], Array]
+"""Of instant [s], length of the step [s], what is written before initialisation, shape (N, k), and who does a point in
+the ordinary way; gives what is read, shape (N, q).
 """
+Call = tuple[Callable[..., int], tuple[Any, ...], str]
 
 
-class Point(NamedTuple):
-    """Buffers of a point: states and inputs, written; what is read there."""
+class Prepared(NamedTuple):
+    """Calls of several points, each with memory of its own.
 
-    states: Array
-    inputs: Array
+    Attributes:
+        written: before initialisation, shape (N, k). read: shape (N, q). calls: of each point, in their order.
+    """
+
+    written: Array
     read: Array
+    calls: list[list[Call]]
 
 
 class QuickPoints:
@@ -43,7 +48,7 @@ class QuickPoints:
     """
 
     def __init__(self, instance: Any, far: float, written: Sequence[str], write: Callable[[], None]) -> None:
-        self._instance, self._far = instance, far
+        self._instance, self._far, self._written = instance, far, list(written)
         self._write = [write] if written else []
         slave, three = instance.slave, instance.fmi_version == 3
         prefix, held = f"fmi{instance.fmi_version}", slave.component
@@ -94,50 +99,63 @@ class QuickPoints:
             raise self._explained(error, "", t) from error
         self._instance.note_initialised()
 
-    def batch(self, point: Point, names: Sequence[str], read: Callable[[], None], *, step: bool) -> Batch:
+    def batch(self, names: Sequence[str], *, step: bool) -> Batch:
         """Restarts at many points, a step from each where one is asked for, and what is read there.
 
         Args:
-            point: buffers of states and inputs, which are written, and of what is read.
-            names: what is read. read: reads it. step: whether a step is made.
+            names: what is read. step: whether a step is made.
 
         Returns:
             The call. A point whose step is discarded, ends early or meets an event is given to who knows what to make
             of it. It raises what the instance makes of a failure.
         """
-        calls = [self._reset, *self._write, *self._initialise, *([self._step] if step else [])]
-        steps = JoinedCalls(self._instance.slave, [*calls, read] if names else calls).steps
-        instance, (event, terminate, early), shownames = self._instance, self._flags, shown(names)
+        kept: dict[int, Prepared] = {}
+        instance, (event, terminate, early), told = self._instance, self._flags, shown(names)
 
-        def run(
-            t: float, h: float, points: Array, driven: Iterable[Array | None], found: Array, slowly: Slowly
-        ) -> None:
+        def run(t: float, h: float, written: Array, slowly: Slowly) -> Array:
+            count = len(written)
+            if count not in kept:
+                kept[count] = self._prepared(count, names, step)
+            prepared = kept[count]
+            prepared.written[:] = written
+            apart: list[int] = []
             self._begin(t, h)
             try:
-                for row, x, u in zip(found, points.T, driven, strict=False):
-                    point.states[:] = x
-                    if u is not None:
-                        point.inputs[:] = u
-                    whole = True
-                    for raw, typed, name in steps:
+                for i, calls in enumerate(prepared.calls):
+                    for raw, typed, name in calls:
                         status = raw(*typed)
                         if status > WARNING:
                             if status != DISCARD or not name.endswith("DoStep"):
                                 raise FMICallException(name, status)
-                            whole = False
+                            apart.append(i)
                             break
-                    if not whole or (step and (event.value or terminate.value or early.value)):
-                        slowly(t, h, x)
-                        self._begin(t, h)
-                    row[:] = point.read
+                    else:
+                        if step and (event.value or terminate.value or early.value):
+                            apart.append(i)
+                            event.value = terminate.value = early.value = False
+                found = prepared.read.copy()
+                for i in apart:
+                    found[i] = slowly(t, h, written[i])
             except instance.mistakes:
                 raise
             except Exception as error:
-                raise self._explained(error, shownames, t) from error
+                raise self._explained(error, told, t) from error
             instance.note_initialised()
             instance.time = t + h
+            return found
 
         return run
+
+    def _prepared(self, count: int, names: Sequence[str], step: bool) -> Prepared:
+        """Calls of `count` points."""
+        instance, written, read = self._instance, np.zeros((count, len(self._written))), np.zeros((count, len(names)))
+        around = [*self._initialise, *([self._step] if step else [])]
+        each = []
+        for into, out in zip(written, read, strict=True):
+            write = [instance.writer(self._written, into)[0]] if self._written else []
+            look = [instance.reader(names, out)] if names else []
+            each.append(JoinedCalls(instance.slave, [self._reset, *write, *around, *look]).steps)
+        return Prepared(written, read, each)
 
     def _begin(self, t: float, h: float) -> None:
         self._start.value, self._stop.value, self._length.value, self._reached.value = t, t + self._far, h, t + h

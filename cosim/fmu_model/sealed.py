@@ -209,11 +209,12 @@ class SealedModel(ABC):
             row[:] = self._states_read
         return found.T
 
-    def outputs_at(self, t: float, points: Array, u: Array, chosen: Sequence[int]) -> Array:
+    def outputs_at(self, t: float, points: Array, u: Array, chosen: Sequence[int] | None = None) -> Array:
         """Outputs just after a restart at each of several states; states are not read back.
 
         Args:
-            t: instant [s]. points: states, shape (n, N). u: inputs, shape (m,). chosen: which outputs, k of them.
+            t: instant [s]. points: states, shape (n, N). u: inputs, shape (m,).
+            chosen: which outputs, k of them; None for all.
 
         Returns:
             Outputs, shape (k, N).
@@ -224,7 +225,7 @@ class SealedModel(ABC):
             if self.outputs:
                 self.told(self._read_outputs)
             row[:] = self._outputs_read
-        return np.ascontiguousarray(found[:, chosen]).T
+        return found.T if chosen is None else np.ascontiguousarray(found[:, chosen]).T
 
     @abstractmethod
     def _enter(self, t: float) -> None:

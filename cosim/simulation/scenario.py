@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cosim import ssp, studies
 from cosim.errors import CosimError, ScenarioError
+from cosim.scenario.given import given_component, given_value
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.manifest import read_manifest
-from cosim.scenario.model_name import named, settings_of
 from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.override import case_values, override
 from cosim.scenario.package_names import is_package, stem
-from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file
 from cosim.scenario.run import run_scenario
 from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
@@ -149,8 +148,7 @@ class Scenario:
         """The text of a scenario file that runs identically; files it included and overrides are in it.
 
         Args:
-            folder: where the file will stand: paths in the text are relative to it. Where not given they stay as they
-                are, relative to the folder of this scenario.
+            folder: where the file will stand, which paths are relative to; None for this scenario's.
 
         Raises:
             ScenarioError: something in the scenario cannot be; every fault is named.
@@ -186,8 +184,7 @@ class Scenario:
             CosimError: the scenario cannot be set up, or has something that this version cannot say.
             OutputError: the file cannot be written.
         """
-        written: Path = ssp.export_package(self.table(), self.name, self.folder, self.where, Path(path), version)
-        return written
+        return Path(ssp.export_package(self.table(), self.name, self.folder, self.where, Path(path), version))
 
     @property
     def name(self) -> str:
@@ -207,11 +204,7 @@ class Scenario:
         """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
-        given = {key: named(table[key]) for key in MODEL_KEYS if key in table}
-        for model in given.values():
-            for key, settings in settings_of(getattr(model, "given", "")).items():
-                table[key] = {**settings, **table.get(key, {})}
-        self._data["components"][name] = plain(table | given)
+        self._data["components"][name] = given_component(table)
         return self
 
     def connect(self, *lines: str) -> Self:
@@ -266,14 +259,8 @@ class Scenario:
         Raises:
             ScenarioError: there is no such component or table.
         """
-        key = name.rpartition(".")[2] if name.count(".") == 1 else ""
-        value = named(value) if key in MODEL_KEYS else plain(value)
-        if key in COMPONENT_PATHS:
-            value = absolute(str(value), ".")  # given here, so relative to where the user stands
-        if key in MODEL_KEYS and isinstance(value, str):
-            value = move_file(value, lambda path: absolute(path, "."))
         try:
-            override(self._data, name, value)
+            override(self._data, name, given_value(name, value))
         except ScenarioError as error:
             raise ScenarioError(f"{self.where}: {error}") from error
         return self
@@ -360,8 +347,8 @@ class Scenario:
             building: told of the FMUs of shipped models that are built for the first time, some seconds each; by
                 default the log ``cosim``, as information.
             stream: a results folder to which everything is written while the run goes on, so that it outlives the
-                program; what an earlier run left there is removed when the first step is about to be taken. The table
-                is written as ``table.npy``; `Outcome.write` adds other formats only where the scenario asks for them.
+                program; what an earlier run left there is removed before the first step. The table is written as
+                ``table.npy``; `Outcome.write` adds formats that the scenario asks for.
             finished: called with the outcome before the components are closed, which is what is returned as well: what
                 it writes is not lost where an FMU crashes while it is freed.
             spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it

@@ -13,10 +13,10 @@ from cosim.results.folder import check_writable
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.structure import describe_component
 from cosim.simulation.scenario import Scenario
-from cosim.tuning.bench import seeded, why_whole, with_observer
+from cosim.tuning.bench import Seeded, seeded, why_whole, with_observer
 from cosim.tuning.costs import Cost, make_cost
 from cosim.tuning.evaluation import Evaluator, closing
-from cosim.tuning.parameters import Bounds, tunable
+from cosim.tuning.parameters import Bounds, Tunable, tunable
 from cosim.tuning.progress import Progress
 from cosim.tuning.seeds import seed_settings, with_seed
 from cosim.tuning.study import Study
@@ -45,77 +45,64 @@ def tune(
 ) -> Tuning:
     """Search parameters of a scenario for the smallest mean cost over training seeds, and judge the best with others.
 
-    All candidates see the same seeds (common random numbers). Where one observer is tuned that only listens, the plant
-    side is recorded once for each seed and candidates run beside the recording.
+    All candidates see the same seeds (common random numbers). An observer that only listens runs beside a recording of
+    the plant side of each seed.
 
     Args:
-        scenario: to be tuned.
-        parameters: by name (low, high), or (low, high, True) for a search in the logarithm: ``component.parameter``,
-            or a parameter of `observer`; ``process_covariance[1,1]`` for an entry of a diagonal.
-        observer: component that is tuned, or a shipped observer that joins the scenario for it.
-        method: ``bbo``, ``pso``, ``ga``, ``cma``, ``gradient``, ``hand``, or a name in `OPTIMISERS`.
-        cost: see `cosim.tuning.costs.make_cost`.
+        scenario: to be tuned. parameters: by name (low, high), or (low, high, True) for a search in the logarithm:
+            ``component.parameter``, or one of `observer`; ``process_covariance[1,1]`` for an entry of a diagonal.
+        observer: component that is tuned, or a shipped observer that joins the scenario for it. method: one of
+            `OPTIMISERS`, such as ``bbo`` or ``cma``. cost: see `cosim.tuning.costs.make_cost`.
         seeds: for training; each moves every seed of the scenario by so much, 0 is the scenario as it is.
-        judge: other seeds, with which before and after are compared at the end.
-        seed_names: settings that the seeds move, such as ``wheel.seed``; None for all there are.
-        iterations: populations after the first one.
+        judge: seeds that compare before and after at the end. seed_names: settings that they move; None for all.
+        iterations: populations after the first one. options: of the optimiser, such as ``{"population": 30}``.
         searches: how many times it is searched, with optimiser seeds 0, 1, ...; the best counts, all are told.
-        options: of the optimiser, such as ``{"population": 30}``.
         workers: processes at a time; a script that uses more than 1 needs ``if __name__ == "__main__":``.
-        directory: where history and results are written as they come; None writes nothing.
-        resume: take over the evaluations of an earlier search in `directory`, as far as they are of this one.
-        whole_runs: run the whole scenario for each candidate, also where a recording would do.
+        directory: where history and results are written as they come; None writes nothing. resume: take over the
+            evaluations of an earlier search there, as far as they are of this one. whole_runs: run the whole scenario
+            for each candidate, also where a recording would do.
         progress: called with runs done, runs in all as far as known, and what is done.
 
     Returns:
         What was found; when interrupted, what was found until then.
 
     Raises:
-        ScenarioError: something asked for cannot be: parameters, bounds, seeds, cost. RunError: the plant side fails.
-        KeyboardInterrupt: it was interrupted before anything was found.
+        ScenarioError: something asked for cannot be. RunError: the plant side fails. KeyboardInterrupt: nothing found.
     """
     if observer is not None:
         scenario, observer = with_observer(scenario, observer)
-    asked = tunable(scenario, observer, parameters)
-    heads = sorted({name.partition(".")[0] for name in asked.space.names})
-    training, judging = _seeds(seeds, judge)
-    if resume and directory is None:
-        raise ScenarioError("A search is resumed from its folder: give directory=...")
+    asked, (training, judging) = tunable(scenario, observer, parameters), _seeds(seeds, judge)
     judged_by = make_cost(cost, observer, _outputs(scenario, observer))
-    drawn = seed_settings(scenario, seed_names)
-    if len(training) + len(judging) > 1 and not drawn:
-        raise ScenarioError(
-            f"{scenario.where}: nothing in this scenario draws from a seed; give one training seed only."
-        )
-    benches = {
-        seed: seeded(with_seed(scenario, drawn, seed), seed, observer, heads, whole_runs)
-        for seed in (*training, *judging)
-    }
-    played = benches[training[0]].sides is not None
-    how = (
-        "each beside the recorded plant side of its seed"
-        if played
-        else f"of the whole scenario: {'as asked for' if whole_runs else why_whole(scenario, observer, heads)}"
-    )
-    with _folder(directory) as folder:
+    with _folder(directory, resume) as folder:
+        benches, how = _benches(scenario, observer, asked, (*training, *judging), seed_names, whole_runs)
         evaluator = Evaluator(benches, asked, judged_by, folder, workers=workers, resume=resume)
+        more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": progress}
         with closing(evaluator):
-            study = Study(
-                scenario,
-                asked,
-                evaluator,
-                training,
-                judging,
-                observer=observer,
-                method=method,
-                options=options or {},
-                iterations=iterations,
-                progress=progress,
-            )
+            study = Study(scenario, asked, evaluator, training, judging, observer=observer, method=method, **more)
             found = study.run(searches, how)
         if directory is not None:
             write_tuning(found, asked.settings(found.best), folder)
-    return found
+        return found
+
+
+def _benches(
+    scenario: Scenario,
+    observer: str | None,
+    asked: Tunable,
+    seeds: Sequence[int],
+    seed_names: Sequence[str] | None,
+    whole_runs: bool,
+) -> tuple[dict[int, Seeded], str]:
+    """What candidates run with each seed, and in words how they do."""
+    heads, drawn = sorted({name.partition(".")[0] for name in asked.space.names}), seed_settings(scenario, seed_names)
+    if len(seeds) > 1 and not drawn:
+        raise ScenarioError(
+            f"{scenario.where}: nothing in this scenario draws from a seed; give one training seed only."
+        )
+    found = {seed: seeded(with_seed(scenario, drawn, seed), seed, observer, heads, whole_runs) for seed in seeds}
+    if found[seeds[0]].sides is not None:
+        return found, "each beside the recorded plant side of its seed"
+    return found, f"of the whole scenario: {'as asked for' if whole_runs else why_whole(scenario, observer, heads)}"
 
 
 def _seeds(seeds: Sequence[int], judge: Sequence[int]) -> tuple[list[int], list[int]]:
@@ -142,8 +129,10 @@ def _outputs(scenario: Scenario, observer: str | None) -> list[str]:
 
 
 @contextmanager
-def _folder(directory: str | Path | None) -> Iterator[Path]:
+def _folder(directory: str | Path | None, resume: bool) -> Iterator[Path]:
     """The folder of history and results; one that is thrown away where none is wanted."""
+    if resume and directory is None:
+        raise ScenarioError("A search is resumed from its folder: give directory=...")
     if directory is not None:
         yield check_writable(Path(directory)).absolute()
         return

@@ -137,6 +137,10 @@ class WindTurbineDiagnosis(HybridSystem):
     pitch actuators, two for speeds, three for the torque. The thesis prints no threshold; these come from runs without
     a fault [ours].
 
+    Presets: `repaired` (default) compares actuators with references half a sample late; `as_published` does not
+    (`centring` 0), so that each step of a reference shows as if there were a fault. Limits are the same: none is
+    printed.
+
     Source: Omar 2012, (7.6.1)-(7.8.1), Table 7.1; thresholds, persistence and the filters' Tustin rule are ours.
     """
 
@@ -200,6 +204,8 @@ class WindTurbineDiagnosis(HybridSystem):
             for way, start in zip(("raise", "clear"), starts, strict=True)
         ),
     )
+    presets: Mapping[str, Mapping[str, Any]] = {"repaired": {}, "as_published": {"centring": 0.0}}
+    default_preset = "repaired"
     events = (
         PeriodicEvent("sampling", "sample_period", description="Readings are taken, residuals and alarms follow"),
         PeriodicEvent("block_end", "block_period", description="The long window moves on"),

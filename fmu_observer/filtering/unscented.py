@@ -26,6 +26,12 @@ def _ones(count: int) -> Array:
     return np.ones(count)
 
 
+@cache
+def _signs(n: int) -> Array:
+    """By which the columns of a factor become the distances of the points from the centre, shape (n, 2 n + 1)."""
+    return np.hstack([np.zeros((n, 1)), np.eye(n), -np.eye(n)])
+
+
 class Weights(NamedTuple):
     """Weights of the scaled unscented transform of n numbers: Allaoui 2024, (2.37)-(2.39).
 
@@ -76,8 +82,7 @@ def sigma_points(x: Array, S: Array, spread: Array) -> Array:
         Shape (n, 2 n + 1), the centre first.
     """
     n = x.shape[0]
-    centre = x.reshape(n, 1)
-    return np.hstack([centre, centre + spread * S, centre - spread * S])
+    return x.reshape(n, 1) + (spread * S) @ _signs(n)  # a third of the time of stacking them
 
 
 def scattered(function: Function, points: Array) -> Scattered:
@@ -115,9 +120,23 @@ def covariance(found: Scattered, other: Scattered, w: Weights) -> Array:
         found: values of the one, m of them. other: values of the other, k of them. w: weights.
     """
     apart = shift(found, w)
-    along = apart if other is found else shift(other, w)
+    return _covariance(found, other, apart, apart if other is found else shift(other, w), w)
+
+
+def _covariance(found: Scattered, other: Scattered, apart: Array, along: Array, w: Weights) -> Array:
+    """That of two functions whose shifts are known already."""
     bend = (w.bend * apart).reshape(apart.shape[0], 1) * along  # np.outer takes three times as long
     return w.each * (found.deviations @ other.deviations.T) + bend
+
+
+def moments(found: Scattered, w: Weights) -> tuple[Array, Array]:
+    """Mean, shape (m,), and covariance, shape (m, m), of a function at sigma points.
+
+    Args:
+        found: values at the points. w: weights.
+    """
+    apart = shift(found, w)
+    return found.centre + apart, symmetric(_covariance(found, found, apart, apart, w))
 
 
 def root_columns(found: Scattered, w: Weights) -> Array:
@@ -139,8 +158,7 @@ def unscented_transform(x: Array, P: Array, function: Function, w: Weights) -> t
     Returns:
         Mean of shape (m,) and covariance of shape (m, m).
     """
-    found = scattered(function, sigma_points(x, factor(P), w.spread))
-    return mean(found, w), symmetric(covariance(found, found, w))
+    return moments(scattered(function, sigma_points(x, factor(P), w.spread)), w)
 
 
 def correct(x: Array, P: Array, states: Scattered, seen: Scattered, y: Array, RN: Array, w: Weights) -> Corrected:
@@ -154,10 +172,11 @@ def correct(x: Array, P: Array, states: Scattered, seen: Scattered, y: Array, RN
     Returns:
         Estimate, covariance, gain and covariance of the innovation.
     """
-    S = symmetric(covariance(seen, seen, w)) + RN
-    cross = covariance(states, seen, w)
+    along = shift(seen, w)
+    S = symmetric(_covariance(seen, seen, along, along, w)) + RN
+    cross = _covariance(states, seen, shift(states, w), along, w)
     K = solved(S, cross.T).T
-    return Corrected(x + K @ (y - mean(seen, w)), symmetric(P - K @ cross.T), K, S)
+    return Corrected(x + K @ (y - (seen.centre + along)), symmetric(P - K @ cross.T), K, S)
 
 
 def correct_root(

@@ -142,24 +142,35 @@ def fit(
     weights = 1.0 / (np.where(spreads > 0.0, spreads, 1.0) if noise is None else noise)
     found, converged = start / sizes, False
     for _ in range(1 if noise is not None or len(measured) == 1 else REPEATS):
-        result = scipy.optimize.least_squares(
-            lambda z, w=weights: np.nan_to_num((residuals(z * sizes) * w[:, None]).ravel(), nan=1e9),
-            np.clip(found, *bounds),
-            jac=lambda z, w=weights: (jacobian(z * sizes) * w[:, None, None] * sizes).reshape(-1, len(start)),
-            bounds=bounds,
-            x_scale="jac",
-            xtol=1e-10,
-        )
-        found, converged = result.x, bool(result.success)
+        found, converged = _weighted(residuals, jacobian, found, weights, sizes, bounds)
         left = residuals(found * sizes)
         seen = _deviations(left, known, 0)
         weights = weights if noise is not None else 1.0 / np.maximum(seen, 1e-12 * np.maximum(spreads, 1e-300))
-    parameters = found * sizes
-    left, slopes = residuals(parameters), -jacobian(parameters)
+    left, slopes = residuals(parameters := found * sizes), -jacobian(parameters)
     freedom = max(1, int(known.sum()) - len(start))
     seen = _deviations(left, known, len(start) / max(1, int(known.sum())))
     covariance = _covariance(slopes, weights, seen**2 * serial_enlargement(left), sizes)
     return Fit(parameters, covariance, sizes, left, seen, serial_correlation(left), slopes, freedom, runs[0], converged)
+
+
+def _weighted(
+    residuals: Callable[[Array], Array],
+    jacobian: Callable[[Array], Array],
+    found: Array,
+    weights: Array,
+    sizes: Array,
+    bounds: tuple[Array, Array],
+) -> tuple[Array, bool]:
+    """Parameters in their sizes for the least weighted squares, from a guess on, shape (p,); whether it converged."""
+    result = scipy.optimize.least_squares(
+        lambda z: np.nan_to_num((residuals(z * sizes) * weights[:, None]).ravel(), nan=1e9),
+        np.clip(found, *bounds),
+        jac=lambda z: (jacobian(z * sizes) * weights[:, None, None] * sizes).reshape(-1, len(found)),
+        bounds=bounds,
+        x_scale="jac",
+        xtol=1e-10,
+    )
+    return result.x, bool(result.success)
 
 
 def _deviations(residuals: Array, known: NDArray[np.bool_], share: float) -> Array:

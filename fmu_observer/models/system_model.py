@@ -62,11 +62,7 @@ def system_model(
     Raises:
         ValueError: a name is unknown, nothing is measured, or the system does not move so; the message says which.
     """
-    if isinstance(outputs, str) or not outputs:
-        raise ValueError(
-            f"{system.name}: outputs = {outputs!r}; expected a list of what is measured, some of: "
-            f"{', '.join(scalar_names(system.outputs))}."
-        )
+    _require_list(system, outputs)
     require_whole(f"Filter model of {system.name}", substeps=substeps)
     moving = _Moving(system, substeps, preset)
     noisy = (*process_noises, *measurement_noises)
@@ -93,6 +89,14 @@ def system_model(
         sample_period=moving.sample_period,
         any_period=moving.event is None,
     )
+
+
+def _require_list(system: HybridSystem, outputs: Sequence[str]) -> None:
+    if isinstance(outputs, str) or not outputs:
+        raise ValueError(
+            f"{system.name}: outputs = {outputs!r}; expected a list of what is measured, some of: "
+            f"{', '.join(scalar_names(system.outputs))}."
+        )
 
 
 def find_filter_model(

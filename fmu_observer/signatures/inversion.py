@@ -8,10 +8,12 @@ unknown number of steps: every curve, cell or candidate is looked at, and the be
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
 TINY = 1e-300
@@ -70,12 +72,31 @@ def curve_distances(curves: Sequence[Array], point: Array) -> Array:
     Returns:
         Shape (c,).
     """
-    along = [values[:, 1:] - values[:, :-1] for values in curves]
-    to = [point[i] - curves[i][:, :-1] for i in range(2)]
+    count, corners = curves[0].shape
+    flat = [np.reshape(values, (count * corners,)) for values in curves]
+    return np.hstack(enclosed(_all_distances(corners), *flat, point))
+
+
+@lru_cache
+def _all_distances(corners: int) -> Callable[..., tuple[Array, ...]]:
+    """Distances of a point from all curves of so many corners, a loop; the same function for the same number."""
+
+    def distances(abscissas: Array, ordinates: Array, point: Array) -> tuple[Array, ...]:
+        starts = range(0, abscissas.shape[0], corners)
+        rows = [(abscissas[i : i + corners], ordinates[i : i + corners]) for i in starts]
+        return tuple(found[0] for found in scan(_distance, (), rows, (point,))[1])
+
+    return distances
+
+
+def _distance(_carry: Any, curve: Any, shared: Any) -> Any:
+    """Distance of a point from one polygonal line."""
+    along = [values[1:] - values[:-1] for values in curve]
+    to = [shared[0][i] - curve[i][:-1] for i in range(2)]
     share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + TINY)
     share = np.clip(share, 0.0, 1.0)
     square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
-    return np.sqrt(np.min(square, axis=1))
+    return (), (np.stack([np.sqrt(np.min(square))]),)
 
 
 def place_on_curve(nodes: np.ndarray, curve: Array, point: Array) -> Array:
@@ -129,35 +150,40 @@ def network_inverse(
     Returns:
         `values` of shape (2,), and `outside`.
     """
-    best: tuple[Array, ...] | None = None
+    cells = []
     for i in range(len(first) - 1):
         for j in range(len(second) - 1):
-            corner, next_first, next_second, opposite = (
-                np.stack([values[a, b] for values in network])
-                for a, b in ((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1))
-            )
-            right, up, twist = next_first - corner, next_second - corner, opposite - next_first - next_second + corner
-            s, t = 0.5, 0.5
-            for _ in range(2):
-                error = point - (corner + s * right + t * up + s * t * twist)
-                by_s, by_t = right + t * twist, up + s * twist
-                area = by_s[0] * by_t[1] - by_s[1] * by_t[0]
-                area = np.where(np.abs(area) > TINY, area, TINY)
-                s = s + (error[0] * by_t[1] - error[1] * by_t[0]) / area
-                t = t + (by_s[0] * error[1] - by_s[1] * error[0]) / area
-            beyond = np.maximum(np.maximum(np.abs(s - 0.5), np.abs(t - 0.5)) - 0.5, 0.0)
-            place = (
-                beyond,
-                first[i] + (first[i + 1] - first[i]) * np.clip(s, -extrapolated, 1.0 + extrapolated),
-                second[j] + (second[j + 1] - second[j]) * np.clip(t, -extrapolated, 1.0 + extrapolated),
-            )
-            if best is None:
-                best = place
-            else:
-                nearer = place[0] < best[0]
-                best = tuple(np.where(nearer, a, b) for a, b in zip(place, best, strict=True))
-    assert best is not None
+            corners = ((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1))
+            place = np.array([first[i], first[i + 1] - first[i], second[j], second[j + 1] - second[j]])
+            cells.append((np.stack([values[c] for c in corners for values in network]), place))
+
+    def nearer(carry: Any, cell: Any, shared: Any) -> Any:
+        found = _in_cell(cell[0], cell[1], shared[0], extrapolated)
+        return (np.where(found[0] < carry[0][0], found, carry[0]),), ()
+
+    begin = np.array([np.inf, first[0], second[0]])
+    best = scan(nearer, (begin,), cells, (point,))[0][0]
     return Found(np.stack([best[1], best[2]]), best[0])
+
+
+def _in_cell(corners: Array, cell: Array, point: Array, extrapolated: float) -> Array:
+    """How far a place lies beyond a cell, and the place brought into it, shape (3,).
+
+    `corners`: properties at the four corners, both of each, shape (8,). `cell`: beginning and width in both quantities.
+    """
+    corner, next_first, next_second, opposite = (corners[2 * k : 2 * k + 2] for k in range(4))
+    right, up, twist = next_first - corner, next_second - corner, opposite - next_first - next_second + corner
+    s, t = 0.5, 0.5
+    for _ in range(2):
+        error = point - (corner + s * right + t * up + s * t * twist)
+        by_s, by_t = right + t * twist, up + s * twist
+        area = by_s[0] * by_t[1] - by_s[1] * by_t[0]
+        area = np.where(np.abs(area) > TINY, area, TINY)
+        s = s + (error[0] * by_t[1] - error[1] * by_t[0]) / area
+        t = t + (by_s[0] * error[1] - by_s[1] * error[0]) / area
+    beyond = np.maximum(np.maximum(np.abs(s - 0.5), np.abs(t - 0.5)) - 0.5, 0.0)
+    low, high = -extrapolated, 1.0 + extrapolated
+    return np.stack([beyond, cell[0] + cell[1] * np.clip(s, low, high), cell[2] + cell[3] * np.clip(t, low, high)])
 
 
 def nearest_two(distances: Sequence[Array], labels: np.ndarray) -> Array:

@@ -155,8 +155,10 @@ class FMI1Slave(Slave):
 
         return read_or_show
 
-    def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        write, buffer = super()._unguarded_writer(names)
+    def _unguarded_writer(
+        self, names: Sequence[str], values: np.ndarray | None = None
+    ) -> tuple[Callable[[], None], np.ndarray]:
+        write, buffer = super()._unguarded_writer(names, values)
 
         def write_and_hold() -> None:
             write()

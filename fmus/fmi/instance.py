@@ -143,16 +143,13 @@ class Instance(Described):
         """
         return self.guarded(f"reading {shown(names)}", self._unguarded_reader(names, values))
 
-    def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        """A call that writes scalars and elements.
+    def writer(self, names: Sequence[str], values: np.ndarray | None = None) -> tuple[Callable[[], None], np.ndarray]:
+        """A call that writes scalars and elements, prepared once, and the array that it writes from.
 
         Args:
-            names: what is written.
-
-        Returns:
-            The call, prepared once, and the array of shape (len(names),) it writes from.
+            names: what is written. values: that array, shape (len(names),), contiguous; None for one of its own.
         """
-        write, buffer = self._unguarded_writer(names)
+        write, buffer = self._unguarded_writer(names, values)
         return self.guarded(f"writing {shown(names)}", write), buffer
 
     def exact_reader(self, name: str) -> Callable[[], Values]:
@@ -381,8 +378,10 @@ class Instance(Described):
     def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
         return element_reader(self, names, values)
 
-    def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        return element_writer(self, names)
+    def _unguarded_writer(
+        self, names: Sequence[str], values: np.ndarray | None = None
+    ) -> tuple[Callable[[], None], np.ndarray]:
+        return element_writer(self, names, values)
 
     def _quietly(self, what: str, call: Callable[[], Any]) -> None:
         """Run a call that changes nothing any more where it fails."""

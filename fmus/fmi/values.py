@@ -44,14 +44,16 @@ def element_reader(instance: Instance, names: Sequence[str], values: np.ndarray)
     return read_and_pick
 
 
-def element_writer(instance: Instance, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+def element_writer(
+    instance: Instance, names: Sequence[str], values: np.ndarray | None = None
+) -> tuple[Callable[[], None], np.ndarray]:
     """A call that writes scalars and elements, and the array of shape (len(names),) it writes from.
 
     Args:
-        instance: instantiated.
+        instance: instantiated. values: that array, contiguous; None for one of its own.
     """
     spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
-    slave, version, buffer = instance.slave, instance.fmi_version, np.zeros(len(names))
+    slave, version, buffer = instance.slave, instance.fmi_version, np.zeros(len(names)) if values is None else values
     if spread.is_whole and turn is None:
         return make_writer(slave, version, spread.variables, buffer), buffer
     whole, signed = np.zeros(spread.total), np.zeros(len(names))

@@ -166,9 +166,7 @@ def rosenbrock_step(
     k2 = np.where(ahead == 0.0, np.where(fixed > 0.0, 0.0, k2), k2)
     smooth = x + 0.5 * h * (3.0 * k1 + k2)
     change, predicted = ahead - flow, h * (by_all @ k1 + by_time)
-    # negative where it came back over zero
-    turned = implicit * np.where(change * k1 < 0.0, np.minimum(flow * ahead, 0.0), 0.0)
-    bent = np.where(np.abs(change - predicted) > np.abs(flow), turned, 0.0)
+    bent = _turned_round(flow, ahead, k1, predicted, implicit)
     known = predicted if stiff is None else h * (by_state @ k1 + by_time)
     missing = implicit * np.where(np.sum(bent) < 0.0, BEND_STEEPNESS * change - known, 0.0)
     if at_rest is None:
@@ -178,6 +176,13 @@ def rosenbrock_step(
     let_go = np.where(np.sum(held * np.abs(ahead)) > 0.0, 1.0, 0.0)
     still_held = np.where(np.sum(held * np.abs(derivative(t + h, damped))) > 0.0, 0.0, 1.0)
     return np.where(np.sum(bent) - let_go * still_held < 0.0, damped, smooth)
+
+
+def _turned_round(flow: Array, ahead: Array, stage: Array, predicted: Array, implicit: Array) -> Array:
+    """Negative where a stage has turned a derivative round, by more than the Jacobian predicted, shape (nc,)."""
+    change = ahead - flow
+    turned = implicit * np.where(change * stage < 0.0, np.minimum(flow * ahead, 0.0), 0.0)
+    return np.where(np.abs(change - predicted) > np.abs(flow), turned, 0.0)
 
 
 def damped_step(by_state: Array, move: Array, missing: Array, h: Array, x: Array, flow: Array) -> Array:

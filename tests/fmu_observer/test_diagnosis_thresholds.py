@@ -1,9 +1,13 @@
 """Thresholds, false alarms with their intervals, and the observer over a finite window."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy
 
+from fmu_observer.detection import TrainDiagnosis
 from fmu_observer.diagnosis.finite_window_observer import finite_window_observer, sampled
 from fmu_observer.diagnosis.thresholds import (
     alarm_rate,
@@ -98,3 +102,14 @@ def test_what_a_window_does_not_show_is_told() -> None:
         finite_window_observer(A, B, np.eye(2), 0)
     with pytest.raises(ValueError, match="do not fit"):
         finite_window_observer(A, B, np.eye(3), 2)
+
+
+def test_the_thresholds_in_use_are_those_of_the_study_rounded_up() -> None:
+    """The sweep is long, so its table stands for it: what it asks for, and what is in use."""
+    page = (Path(__file__).parents[2] / "docs" / "train_diagnosis.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(threshold_\w+|balise_floor)` \| (\S+) \| (\S+) \|", page, re.MULTILINE)
+    starts = {s.name: s.start for s in TrainDiagnosis().parameters}
+    assert len(rows) == 8
+    for name, used, asked in rows:
+        assert starts[name] == pytest.approx(float(used), rel=1e-4), name  # printed with four digits
+        assert float(asked) <= float(used) <= 1.5 * float(asked), name

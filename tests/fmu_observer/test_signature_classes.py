@@ -219,6 +219,13 @@ def test_a_jam_and_a_skid_are_told_from_their_begin_to_their_end():
     assert wheel([10.0] * 10 + [0.0] * 90)[10:] == [-1.0] * 76 + [0.0] * 14  # given up after 15 s
 
 
+def test_another_period_than_that_of_the_training_is_refused():
+    runtime = Runtime(WheelSignature())
+    runtime.p[0] = 0.1
+    with pytest.raises(ValueError, match=r"odometer_period must be 0\.2 s: the classes were trained"):
+        runtime.start(0.0)
+
+
 def test_the_detector_decides_as_its_classifier():
     records = np.random.default_rng(4).normal(-0.2, 1.0, (4, 300))
     classified = WHEEL_CLASSES.classify(records, strip=0.0).index

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from forked import Done, Forked, Run
 
 
 @pytest.fixture(scope="session")
-def server() -> Iterator[Forked]:
-    """One server for all tests of a worker."""
+def server(charge: Callable[[float], None]) -> Iterator[Forked]:
+    """One server for all tests of a worker; waited for at the end, it brings the time of its children a second time."""
     forked = Forked()
     yield forked
     forked.close()
+    charge(-forked.spent)
 
 
 @pytest.fixture
-def run_script(server: Forked, tmp_path: Path, charge: Callable[[float], None]) -> Run:
-    """Runs a script to its end, with these arguments."""
+def run_forked(server: Forked, tmp_path: Path, charge: Callable[[float], None]) -> Run:
+    """Runs a command line to its end; see `Forked.run`, which is told of the file for the output here."""
 
-    def run(script: Path, arguments: Sequence[str]) -> Done:
-        done = server.run(script, arguments, tmp_path / "written.txt")
+    def run(words: Sequence[str], **where: Any) -> Done:
+        done = server.run(words, tmp_path / "written.txt", **where)
         charge(done.spent)
         return done
 

@@ -1,9 +1,8 @@
-"""Scripts in processes of their own that need not import the packages anew: a server imports them once, and forks for
-each script.
+"""Scripts and commands in processes of their own that need not import the packages anew: a server imports them once,
+and forks for each.
 
 As a script this file is the server; as a module it is the handle on it. A script finds modules loaded that it does not
-import itself, but no name of them: what it uses it must import. That scripts start alone, the tests of imports and of
-commands show.
+import itself, but no name of them: what it uses it must import. That commands start alone, the tests of commands show.
 """
 
 from __future__ import annotations
@@ -18,8 +17,10 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.metadata import entry_points
 from io import BytesIO
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 LOADED = (
@@ -46,31 +47,45 @@ ROOMS = (("plant_models", "PLANTS"), ("fmu_observer", "OBSERVERS"))
 
 @dataclass(frozen=True)
 class Done:
-    """What a script left behind: its exit code, all that it wrote, and its processor time [s]."""
+    """What a command left behind: its exit code, all that it wrote, and its processor time [s]."""
 
     returncode: int
     output: str
     spent: float
 
 
-Run = Callable[[Path, Sequence[str]], Done]
-"""Runs a script with its arguments to its end."""
+Run = Callable[..., Done]
+"""Runs a command line to its end; see `Forked.run`."""
 
 
 class Forked:
-    """The handle on a server, begun with the first script."""
+    """The handle on a server, begun with the first command.
+
+    Attributes:
+        spent: processor time of all commands together [s].
+    """
 
     def __init__(self) -> None:
+        self.spent = 0.0
         self._server: subprocess.Popen[str] | None = None
 
-    def run(self, script: Path, arguments: Sequence[str], output: Path) -> Done:
-        """Run a script to its end.
+    def run(
+        self,
+        words: Sequence[str],
+        output: Path,
+        folder: Path | None = None,
+        environment: Mapping[str, str] = os.environ,
+    ) -> Done:
+        """Run a command to its end.
 
         Args:
-            script: its path. arguments: what stands behind it on the command line. output: a file for what it writes.
+            words: ``python FILE ...``, ``python -c CODE`` or a program that the package installs, with its arguments.
+            output: a file for what it writes. folder: where it runs. environment: its variables.
         """
-        order = {"script": str(script), "arguments": [*arguments], "output": str(output)}
-        return self._asked(order | {"folder": str(Path.cwd()), "environment": dict(os.environ)})
+        place = str(folder or Path.cwd())
+        return self._asked(
+            {"words": [*words], "output": str(output), "folder": place, "environment": dict(environment)}
+        )
 
     def close(self) -> None:
         """End the server."""
@@ -86,12 +101,13 @@ class Forked:
         self._server.stdin.write(json.dumps(order) + "\n")
         self._server.stdin.flush()
         answer = json.loads(self._server.stdout.readline())
+        self.spent += answer["spent"]
         written = Path(order["output"]).read_text(encoding="utf-8", errors="replace")
         return Done(answer["returncode"], written, answer["spent"])
 
 
 def serve() -> None:
-    """Load what scripts use, then run one a line, each in a child."""
+    """Load what scripts use, then run one command a line, each in a child."""
     for name in LOADED:
         import_module(name)
     for module, room in ROOMS:
@@ -110,7 +126,7 @@ def serve() -> None:
 
 
 def run(order: Mapping[str, Any]) -> None:
-    """Be the process of the script, to its end."""
+    """Be the process of the command, to its end."""
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     written = os.open(order["output"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     for stream in (1, 2):
@@ -118,11 +134,9 @@ def run(order: Mapping[str, Any]) -> None:
     os.environ.clear()
     os.environ.update(order["environment"])
     os.chdir(order["folder"])
-    sys.argv = [order["script"], *order["arguments"]]
-    sys.path[0] = str(Path(order["script"]).parent)
     code = 0
     try:
-        runpy.run_path(order["script"], run_name="__main__")
+        obey(order["words"])
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
         if isinstance(end.code, str):
@@ -134,6 +148,22 @@ def run(order: Mapping[str, Any]) -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def obey(words: Sequence[str]) -> None:
+    """Do what a shell would do with these words; a program ends with its exit code."""
+    if words[0] != "python":
+        (program,) = entry_points(group="console_scripts", name=words[0])
+        sys.argv = [*words]
+        sys.exit(program.load()())
+    if words[1] == "-c":
+        sys.argv, sys.path[0] = ["-c"], ""
+        main = sys.modules["__main__"] = ModuleType("__main__")
+        exec(compile(words[2], "<string>", "exec", dont_inherit=True), main.__dict__)
+        return
+    sys.argv = [*words[1:]]
+    sys.path[0] = str(Path(words[1]).resolve().parent)
+    runpy.run_path(words[1], run_name="__main__")
 
 
 if __name__ == "__main__":

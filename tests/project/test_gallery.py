@@ -36,8 +36,8 @@ def module_of(name: str) -> ModuleType:
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda s: f"{s.parent.name}/{s.stem}")
-def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path, run_script: Run) -> None:
-    done = run_script(script, ["--out", str(tmp_path)])
+def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path, run_forked: Run) -> None:
+    done = run_forked(["python", str(script), "--out", str(tmp_path)])
     assert done.returncode == 0, done.output
     fresh = json.loads((tmp_path / f"{script.stem}.json").read_text())
     kept = json.loads((script.parent / "numbers" / f"{script.stem}.json").read_text())

@@ -6,18 +6,21 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 import sysconfig
 from pathlib import Path
 
 import pytest
+from forked import Done, Run
 from pages import TUTORIALS, Block, blocks
 
 import fmus
 
 FILE = re.compile(r"# (?P<name>[\w.-]+\.(?:py|toml|csv))\n")
 """The first line of a block that is a file."""
+FORKED = ("cosim", "fmus", "python")
 
 
 def exits(page: Path, block: Block) -> int:
@@ -38,18 +41,24 @@ def environment(folder: Path) -> dict[str, str]:
     return inherited | own | {"MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
+def run_line(line: str, folder: Path, run_forked: Run) -> Done:
+    """Run a line of a shell. Programs of the package and Python are forked from a process that has imported it."""
+    words = shlex.split(line)
+    if words[0] in FORKED and not set("|&;<>$*`") & set(line):
+        return run_forked(words, folder=folder, environment=environment(folder))
+    done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", line],
         cwd=folder,
         env=environment(folder),
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         check=False,
     )
+    return Done(done.returncode, done.stdout, 0.0)
 
 
-def follow(page: Path, folder: Path) -> None:
+def follow(page: Path, folder: Path, run_forked: Run) -> None:
     """Do everything the page says."""
     for block in blocks(page):
         named = FILE.match(block.code)
@@ -57,27 +66,20 @@ def follow(page: Path, folder: Path) -> None:
         if named is not None:
             (folder / named["name"]).write_text(block.code[named.end() :], encoding="utf-8")
         elif block.language == "python":
-            done = subprocess.run(
-                [sys.executable, "-c", block.code],
-                cwd=folder,
-                env=environment(folder),
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            assert done.returncode == 0, f"{place}:\n{done.stdout}\n{done.stderr}"
+            done = run_forked(["python", "-c", block.code], folder=folder, environment=environment(folder))
+            assert done.returncode == 0, f"{place}:\n{done.output}"
         elif block.language == "sh":
             for line in block.code.splitlines():
-                done = run_line(line, folder)
-                assert done.returncode == exits(page, block), f"{place}: {line}\n{done.stdout}\n{done.stderr}"
+                done = run_line(line, folder, run_forked)
+                assert done.returncode == exits(page, block), f"{place}: {line}\n{done.output}"
 
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda p: p.stem)
-def test_a_tutorial_from_start_to_end(page: Path, tmp_path: Path) -> None:
+def test_a_tutorial_from_start_to_end(page: Path, tmp_path: Path, run_forked: Run) -> None:
     folder = tmp_path / "reader"
     folder.mkdir()
-    follow(page, folder)
+    follow(page, folder, run_forked)
 
 
 def test_there_are_tutorials() -> None:
@@ -85,17 +87,17 @@ def test_there_are_tutorials() -> None:
 
 
 @pytest.mark.parametrize("command", ["false", "cosim run no_such_scenario", "no_such_program"])
-def test_a_command_that_fails_is_noticed(command: str, tmp_path: Path) -> None:
+def test_a_command_that_fails_is_noticed(command: str, tmp_path: Path, run_forked: Run) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"text\n\n```sh\n{command}\n```\n", encoding="utf-8")
     with pytest.raises(AssertionError, match=r"page.md, line 4"):
-        follow(page, tmp_path)
+        follow(page, tmp_path, run_forked)
 
 
-def test_a_promised_exit_code_is_demanded(tmp_path: Path) -> None:
+def test_a_promised_exit_code_is_demanded(tmp_path: Path, run_forked: Run) -> None:
     page = tmp_path / "page.md"
     page.write_text("text\n\n<!-- exits: 1 -->\n```sh\nfalse\n```\n", encoding="utf-8")
-    follow(page, tmp_path)
+    follow(page, tmp_path, run_forked)
     page.write_text("text\n\n<!-- exits: 1 -->\n```sh\ntrue\n```\n", encoding="utf-8")
     with pytest.raises(AssertionError):
-        follow(page, tmp_path)
+        follow(page, tmp_path, run_forked)

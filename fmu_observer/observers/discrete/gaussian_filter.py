@@ -282,10 +282,8 @@ class GaussianFilter(GatedObserver):
 
     def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
         """The covariance of the first estimate is one; of a factor every value is legal."""
-        if self.rooted:
-            return {}
         n = self.model.order
-        return positive("estimate_covariance", x[n : n + n * n], n, definite=False)
+        return {} if self.rooted else positive("estimate_covariance", x[n : n + n * n], n, definite=False)
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Whether the filter has a stable steady state with the gains of a preset, some replaced.

@@ -121,14 +121,11 @@ class CascadeSignature(SignatureObserver):
         rows = [(np.asarray(numbers), slope) for numbers in self.tables.envelopes for slope in slopes]
         starts = (0, POINTS // 2 - 1, POINTS // 2, POINTS - 1)
 
-        def point(_carry: Any, row: Any, _shared: Any) -> Any:
-            return (), (pencil_point(row[0][:ORDER], row[0][ORDER], eps, self.scaling),)
-
         def distance(_carry: Any, row: Any, shared: Any) -> Any:
             return (), (np.stack([class_distance(shared[0], row[0], row[1])]),)
 
         def read(samples: Array) -> tuple[Array, ...]:
-            points = [found[0] for found in scan(point, (), [(samples[i : i + ORDER + 1],) for i in starts])[1]]
+            points = [pencil_point(samples[i : i + ORDER], samples[i + ORDER], eps, self.scaling) for i in starts]
             return (*points, *(d[0] for d in scan(distance, (), rows, (0.5 * (points[1] + points[2]),))[1]))
 
         found = enclosed(read, window)
@@ -139,19 +136,12 @@ class CascadeSignature(SignatureObserver):
         """Median lines, a pair of shape (x1, x3), and chords, a pair of lists over x1, at a value of x2."""
         count, nodes = len(self.nodes), self.nodes
         rows = [
-            (
-                np.concatenate([*(values.ravel() for values in middle), np.stack(chords, axis=1).ravel()]),
-                np.array([node]),
-            )
-            for middle, chords, node in zip(self.tables.middles, self.tables.chords, nodes, strict=True)
+            np.concatenate([*(values.ravel() for values in middle), np.stack(chords, axis=1).ravel()])
+            for middle, chords in zip(self.tables.middles, self.tables.chords, strict=True)
         ]
 
-        def add(carry: Any, row: Any, shared: Any) -> Any:
-            weight = np.maximum(1.0 - np.abs(shared[0][0] - row[1][0]) / (nodes[1] - nodes[0]), 0.0)
-            return (carry[0] + weight * row[0],), ()
-
         def weighted(place: Array) -> tuple[Array, ...]:
-            return (scan(add, (np.zeros(4 * count**2),), rows, (place,))[0][0],)
+            return (interpolated(nodes, rows, place),)
 
         found = enclosed(weighted, np.stack([second]))[0]
         parts = [np.reshape(found[k * count**2 : (k + 1) * count**2], (count, count)) for k in range(4)]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
-from fmu_observer.signatures.inversion import network_inverse
+from fmu_observer.signatures.inversion import Found, network_inverse
 from fmu_observer.signatures.pencil import NextScaling
 from plant_models.benchmarks.ecoli_culture import HOUR, EcoliCulture
 from plant_models.hybrid import parameter, vector
@@ -73,32 +73,40 @@ class CultureSignature(SignatureObserver):
         """Glycerol and enzyme at the oldest sample, of its biomass and the light of the window."""
         X, count = past[0][0], len(self.nodes)
         target = self.properties(past[1], p.regularisation)
-        S0, P0 = (course(X, p.nominal_biomass, values) for values in (p.nominal_glycerol, p.nominal_enzyme))
+        S0, P0 = (
+            enclosed(course, np.stack([X]), p.nominal_biomass, values)[0][0]
+            for values in (p.nominal_glycerol, p.nominal_enzyme)
+        )
         model = self.model_parameters((), p)
         fields = self._model._fields
         places = [(a, b) for a in self.nodes for b in self.nodes]
 
-        def node(_carry: Any, row: Any, shared: Any) -> Any:
-            given = shared[0]
+        def sample(carry: Any, row: Any, shared: Any) -> Any:
+            given, begins = shared[0], row[0][0]
             values = self._model(*(given[i] for i in range(len(fields))))
-            X_, S_, P_, wide, narrow, eps = (given[len(fields) + i] for i in range(6))
-            start = in_tube(X_, S_ + wide * row[0][0], P_ + narrow * row[0][1])
-            light = np.stack(
-                [self.plant.measured_under(z, values)[1] for z in self.moved(start, self.window - 1, values)]
-            )
-            return (), (self.properties(light, eps),)
+            X_, S_, P_, wide, narrow = (given[len(fields) + i] for i in range(5))
+            start = in_tube(X_, S_ + wide * row[0][1], P_ + narrow * row[0][2])
+            now = np.where(begins > 0.5, start, self.moved(carry[0], 1, values)[-1])
+            return (now,), (np.stack([self.plant.measured_under(now, values)[1]]),)
 
-        def network(shared: Array) -> tuple[Array, ...]:
-            return tuple(result[0] for result in scan(node, (), [(np.array(place),) for place in places], (shared,))[1])
+        def read(_carry: Any, row: Any, shared: Any) -> Any:
+            return (), (self.properties(row[0], shared[0][-1]),)
+
+        def network(shared: Array, target: Array) -> tuple[Array, ...]:
+            rows = [(np.array([k == 0, *place], dtype=float),) for place in places for k in range(self.window)]
+            light = [found[0] for found in scan(sample, (np.ones(3),), rows, (shared,))[1]]
+            windows = [(np.hstack(light[i : i + self.window]),) for i in range(0, len(light), self.window)]
+            found = [result[0] for result in scan(read, (), windows, (shared,))[1]]
+            table = [np.reshape(np.hstack([r[k] for r in found]), (count, count)) for k in range(2)]
+            told = network_inverse(self.nodes, self.nodes, table, target)
+            return told.values, np.stack([told.outside])
 
         shared = vector(
             *(getattr(model, name) for name in fields), X, S0, P0, p.glycerol_width, p.enzyme_width, p.regularisation
         )
-        found = enclosed(network, shared)
-        table = [np.reshape(np.stack([r[k] for r in found]), (count, count)) for k in range(2)]
-        told = network_inverse(self.nodes, self.nodes, table, target)
+        told = Found(*enclosed(network, shared, target))
         state = in_tube(X, S0 + p.glycerol_width * told.values[0], P0 + p.enzyme_width * told.values[1])
-        return Inverted(state, told.outside)
+        return Inverted(state, told.outside[0])
 
     def adopted(self, now: Array, u: Any) -> Array:
         """With the biomass as it is measured."""
@@ -123,14 +131,17 @@ def in_tube(X: Array, S: Array, P: Array) -> Array:
     return vector(X, np.maximum(S, 0.0), np.maximum(P, LEAST_ENZYME))
 
 
-def course(X: Array, biomass: Array, values: Array) -> Array:
-    """Value of a nominal run where its biomass is X, linear between places, the end value beyond them.
+def course(X: Array, biomass: Array, values: Array) -> tuple[Array]:
+    """Value of a nominal run where its biomass is X, linear between places, the end value beyond them; for `enclosed`.
 
     Args:
-        X: [kg/m3]. biomass: of the run, rising, shape (k,). values: there, shape (k,).
+        X: [kg/m3], shape (1,). biomass: of the run, rising, shape (k,). values: there, shape (k,).
+
+    Returns:
+        The value, shape (1,).
     """
-    shares = np.clip((X - biomass[:-1]) / (biomass[1:] - biomass[:-1]), 0.0, 1.0)
-    return values[0] + np.sum(shares * (values[1:] - values[:-1]))
+    shares = np.clip((X[0] - biomass[:-1]) / (biomass[1:] - biomass[:-1]), 0.0, 1.0)
+    return (np.stack([values[0] + np.sum(shares * (values[1:] - values[:-1]))]),)
 
 
 def nominal_run(start: Sequence[float] = (0.05, 2.0, 0.01), hours: float = 7.5) -> np.ndarray:

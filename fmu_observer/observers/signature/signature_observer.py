@@ -105,14 +105,7 @@ class SignatureObserver(HybridSystem):
         self.inputs = tuple(input_signal(s.name, s.unit, 0.0, s.description) for s in measured)
         self.outputs = (*_told(named), *own_outputs)
         self._own_outputs = tuple(s.name for s in own_outputs)
-        period = next(s for s in plant.parameters if s.name == "sample_period")
-        self.parameters = (
-            *(s for s in plant.parameters if s.name not in (*NO_MODEL, *known)),
-            parameter("sample_period", "s", period.start, "Time tau between two samples", min=1e-6),
-            parameter("gain", "1", gain, "Gain q of the signature's estimate; 0 for the model alone", min=0.0),
-            parameter("regularisation", "1", eps, "eps of the pencil map, in the unit of the samples", min=1e-9),
-            *own_parameters,
-        )
+        self.parameters = (*_settings(plant, known, gain, eps), *own_parameters)
         self.events = (PeriodicEvent("sampling", "sample_period", description="A sample is read"),)
         self._places = {
             s.name: i for s, i in zip(self.states, np.cumsum([0, *(s.width for s in self.states)]), strict=False)
@@ -259,6 +252,17 @@ class SignatureObserver(HybridSystem):
     def _counts(self, x: Array) -> tuple[Array, Array, Array, list[Array]]:
         first = self._places["samples_held"]
         return x[first], x[first + 1], x[first + 2], [x[i] for i in range(first + 3, len(scalar_names(self.states)))]
+
+
+def _settings(plant: NoisyPlant, known: Sequence[str], gain: float, eps: float) -> tuple[Signal, ...]:
+    """Parameters of the model but those `known`, the sampling period, the gain and the regularisation."""
+    period = next(s for s in plant.parameters if s.name == "sample_period")
+    return (
+        *(s for s in plant.parameters if s.name not in (*NO_MODEL, *known)),
+        parameter("sample_period", "s", period.start, "Time tau between two samples", min=1e-6),
+        parameter("gain", "1", gain, "Gain q of the signature's estimate; 0 for the model alone", min=0.0),
+        parameter("regularisation", "1", eps, "eps of the pencil map, in the unit of the samples", min=1e-9),
+    )
 
 
 def _remembered(pairs: Sequence[tuple[Signal, Signal]], measured: Sequence[Signal], window: int) -> tuple[Signal, ...]:

@@ -15,8 +15,10 @@ from fmu_observer.signatures.clouds import Coordinate
 from fmu_observer.signatures.pencil import pencil_point
 from fmu_observer.signatures.properties import PROPERTIES
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
+TRAINED_PERIOD = 0.2  # [s]
 CODES: Mapping[str, float] = {STEADY: 0.0, DROP: -1.0, RISE: 1.0}
 
 
@@ -30,8 +32,9 @@ class WheelSignature(HybridSystem):
     mean over the period in which the fault began. A fault that does not end is given up after `hold_limit`.
 
     The detector knows neither effort nor model, so it serves where no observer runs, and it is worse than
-    `jam_detector` where one does: docs/signatures.md has both error rates. The classes were trained at 5 Hz: with
-    another period the same faults give other changes.
+    `jam_detector` where one does: docs/signatures.md has both error rates. The classes were trained at 5 Hz, and
+    another period is refused: the change by the effort grows with it, noise and the step of a fault do not, so that no
+    factor makes one record the other.
     """
 
     name = "wheel_signature"
@@ -48,7 +51,7 @@ class WheelSignature(HybridSystem):
         output_signal("fault_time", "s", "Time since the fault was told", variability="discrete"),
     )
     parameters = (
-        parameter("odometer_period", "s", 0.2, "Time between two readings of the odometer", min=1e-3),
+        parameter("odometer_period", "s", TRAINED_PERIOD, "Time between two readings of the odometer", min=1e-3),
         parameter("hold_limit", "s", 15.0, "Longest time for which a fault is held that does not end", min=0.0),
     )
     states = (
@@ -61,6 +64,16 @@ class WheelSignature(HybridSystem):
     )
     events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Parameters keep their bounds, and the period is that of the training."""
+        trained = (
+            f"odometer_period must be {TRAINED_PERIOD:g} s: the classes were trained on changes over that time, and "
+            "say nothing about others. Read the odometer at that rate, or train classes of your own "
+            "(docs/gallery/moving_horizon/wheel_records.py)"
+        )
+        kept = np.where(np.abs(p.odometer_period - TRAINED_PERIOD) < 1e-6, 1.0, 0.0)
+        return super().requirements(p) | within_bounds(self.parameters, p) | {trained: kept}
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A reading is judged."""

@@ -5,6 +5,7 @@ Pure functions, traced like any equation, and one function in Python for who pla
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import NamedTuple
@@ -116,6 +117,22 @@ def plan_stop(
         "final_speed": final_speed,
         "position": position,
     }
+    _check_numbers(numbers)
+    _check_braking(speed, distance, drag_rate, final_speed)
+    plan = constant_brake(speed, distance, drag_rate, final_speed)
+    deceleration = float(plan.deceleration)
+    return StoppingPlan(
+        -deceleration * mass / brake_coefficient,
+        float(plan.duration),
+        deceleration,
+        float(speed),
+        float(position),
+        float(drag_rate),
+    )
+
+
+def _check_numbers(numbers: Mapping[str, float]) -> None:
+    """Refuse numbers of a plan that are not finite or have the wrong sign."""
     wrong = [f"{name} = {value!r}" for name, value in numbers.items() if not isfinite(value)]
     wrong += [f"{name} = {numbers[name]!r}" for name in ("drag_rate", "final_speed") if numbers[name] < 0.0]
     wrong += [f"{name} = {numbers[name]!r}" for name in ("brake_coefficient", "mass") if numbers[name] <= 0.0]
@@ -124,6 +141,10 @@ def plan_stop(
             f"Stopping plan: {', '.join(wrong)}; expected finite numbers, drag_rate and final_speed not negative, "
             f"brake_coefficient and mass positive."
         )
+
+
+def _check_braking(speed: float, distance: float, drag_rate: float, final_speed: float) -> None:
+    """Refuse a stop that no brake makes."""
     if distance <= 0.0:
         raise NoBrakingSolutionError(
             f"No braking solution: the mark is {-distance:g} m behind the train; plan earlier, or brake with all there "
@@ -142,16 +163,6 @@ def plan_stop(
             f"(c = 1 - drag_rate distance / (speed - final_speed) = "
             f"{1.0 - drag_rate * distance / (speed - final_speed):g}, must be positive); let it roll, and brake later."
         )
-    plan = constant_brake(speed, distance, drag_rate, final_speed)
-    deceleration = float(plan.deceleration)
-    return StoppingPlan(
-        -deceleration * mass / brake_coefficient,
-        float(plan.duration),
-        deceleration,
-        float(speed),
-        float(position),
-        float(drag_rate),
-    )
 
 
 def constant_brake(speed: Array, distance: Array, drag_rate: Array, final_speed: Array = 0.0) -> BrakePlan:

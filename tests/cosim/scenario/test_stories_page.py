@@ -13,7 +13,8 @@ pytestmark = pytest.mark.compiler
 DOCS = Path(__file__).parents[3] / "docs"
 
 
-@pytest.mark.parametrize("name", ["freight_sc1", "freight_sc2", "freight_sc3", "freight_sc4"])
+# the gallery repeats the numbers of all four; these have all that the table tells, without and with estimates
+@pytest.mark.parametrize("name", ["freight_sc2", "freight_sc3"])
 def test_the_shipped_seed_is_within_the_table_of_twenty_seeds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(DOCS / "studies"))
     monkeypatch.syspath_prepend(str(DOCS / "gallery" / "freight_trains"))
