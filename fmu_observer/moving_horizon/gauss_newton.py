@@ -239,9 +239,10 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
         force = forces + np.reshape(K, (n, q)).T @ adjoint
         adjoint = adjoint - np.reshape(H, (q, n)).T @ force
         if disturbed:
-            push, added, *held = disturbed
+            push, added, noise_gains, noise_pulls = disturbed
             w, limits = push - np.reshape(added, (n, n)) @ adjoint, problem.noise_limits(row, shared)
-            _, more = _let_go(w, adjoint, *held, problem.disturbed, limits, active[len(problem.bounded) :])
+            on_noise = active[len(problem.bounded) :]
+            _, more = _let_go(w, adjoint, noise_gains, noise_pulls, problem.disturbed, limits, on_noise)
             taken = [*taken, *more]
         adjoint = np.reshape(F, (n, n)).T @ adjoint
         x = problem.clipped(x, shared)
