@@ -88,7 +88,10 @@ class ModelName(str):
                 return load_class(self, EXPECTED, self.folder)
         except (RegistryError, UserFileError) as error:
             raise ScenarioError(f"{where}: {error}") from error
-        raise ScenarioError(f"{where}: unknown {kind} {str(self)!r}; {nearest(self, registry)}")
+        raise ScenarioError(
+            f"{where}: unknown {kind} {str(self)!r}; {nearest(self, registry)} A class of no registry is named "
+            "package.module:Class."
+        )
 
 
 def settings_of(given: Any) -> dict[str, dict[str, Any]]:

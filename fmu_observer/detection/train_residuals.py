@@ -116,7 +116,8 @@ def speed_ratios(
 
 
 def voted_speed(read: Readings, raised: list[Array]) -> Array:
-    """Speed of the source that fewest alarms are about; of equals the radar, the second, the first odometer [m/s].
+    """Speed by a vote, two out of three: of the source that fewest alarms are about; of equals the radar, then the
+    second odometer, then the first [m/s].
 
     Args:
         read: of the sensors. raised: alarms of the first six residuals of `MOTION`.

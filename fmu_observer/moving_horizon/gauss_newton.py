@@ -303,15 +303,15 @@ def _held(
     for k, i in enumerate(places):
         free = np.where(np.abs(active[k]) > 0.5, P[i, i], 0.0)
         holds = free > 0.0
-        divisor = np.where(holds, free, 1.0)
-        gain = np.where(holds, P[:, i] / divisor, 0.0 * P[:, i])
+        inverse = np.where(holds, 1.0 / np.where(holds, free, 1.0), 0.0)
+        gain = P[:, i] * inverse
         error = np.where(active[k] > 0.0, limits.upper[k], limits.lower[k]) - mean[i]
-        mean = np.where(holds, mean + gain * error, mean)
+        mean = mean + gain * error
         known = np.eye(n)[i]
         stays = np.where(holds, 1.0 - known, 1.0 + 0.0 * known)  # a known state has no rounding left either
         P = symmetric(P - np.outer(gain, P[i])) * np.outer(stays, stays)
         gains.extend(gain[j] for j in range(n))
-        pulls.append(np.where(holds, error / divisor, 0.0))
+        pulls.append(error * inverse)
     return mean, P, vector(*gains), vector(*pulls)
 
 

@@ -120,6 +120,7 @@ def generate_model(
         '#include "model.h"\n',
         f"#define FMI_VERSION {str(description.fmiVersion)[0]}\n",
         "#include <stddef.h>",
+        "#include <string.h>",
         "#define casadi_int int\n",
         _equations_source(system.name, equations),
         _start_arrays(system, preset),

@@ -28,7 +28,7 @@ class _Line(NamedTuple):
 class _Run(NamedTuple):
     first: int  # line
     length: int  # lines of the block that repeats
-    count: int  # how often
+    times: int  # how often
     strides: tuple[int, ...]  # of the numbers of a block, from one repetition to the next
 
 
@@ -62,9 +62,9 @@ def _rolled(function: str) -> str:
     written, done = [lines[0], *head], 1
     for run in (*runs, _Run(len(lines), 0, 0, ())):
         written += [_as_elements(line, in_loops) for line in lines[done : run.first]]
-        if run.count:
+        if run.times:
             written += _loop(lines[run.first : run.first + run.length], run, in_loops)
-        done = run.first + run.length * run.count
+        done = run.first + run.length * run.times
     return "\n".join(written)
 
 
@@ -86,7 +86,7 @@ def _runs(lines: list[_Line]) -> list[_Run]:
         run = next((run for length in range(1, LONGEST + 1) if (run := _run(lines, first, length))), None)
         if run is not None:
             found.append(run)
-        first += run.length * run.count if run is not None else 1
+        first += run.length * run.times if run is not None else 1
     return found
 
 
@@ -118,7 +118,7 @@ def _in_loops(lines: list[_Line], runs: list[_Run]) -> set[int]:
             for kind, place in zip(kinds, line.places, strict=True):
                 stride = next(strides)
                 if kind == "a" and stride:
-                    numbers.update(range(place, place + stride * run.count, stride))
+                    numbers.update(range(place, place + stride * run.times, stride))
     return numbers
 
 
@@ -134,7 +134,7 @@ def _loop(block: list[str], run: _Run, in_loops: set[int]) -> list[str]:
         return f"a{index}" if match[1] else index
 
     statements = [f"  {PLACE.sub(indexed, line)}" for line in block]
-    return [f"  for (casadi_int i = 0; i < {run.count}; ++i) {{", *statements, "  }"]
+    return [f"  for (casadi_int i = 0; i < {run.times}; ++i) {{", *statements, "  }"]
 
 
 def _as_elements(line: str, in_loops: set[int]) -> str:
