@@ -34,7 +34,7 @@ from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalma
 from fmu_observer.observers.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import parameter, vector
+from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.signal import width
@@ -252,15 +252,16 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         for name, (low, high) in self.noise_bounds.items():
             if (low or 0.0) > 0.0 or (high or 0.0) < 0.0:
                 raise ValueError(f"{self.name}: noise_bounds of {name!r} are [{low}, {high}]; zero must lie within.")
-        self.own_parameters = () if all(loss == "squares" for loss in losses) else (_loss_scale(losses),)
+        own: tuple[Signal, ...] = () if all(loss == "squares" for loss in losses) else (_loss_scale(losses),)
         for prefix, of, what in (("", bounds, "values"), ("_noise", self.noise_bounds, "disturbances")):
             if of:
-                low, high = _starts(of)
+                lowest, highest = _starts(of)
                 text, size = f"{what}, SI units: {', '.join(of)}", len(of)
-                self.own_parameters += (
-                    parameter(f"lower{prefix}_bounds", "1", low, f"Lowest {text}", size=size),
-                    parameter(f"upper{prefix}_bounds", "1", high, f"Highest {text}", size=size),
+                own += (
+                    parameter(f"lower{prefix}_bounds", "1", lowest, f"Lowest {text}", size=size),
+                    parameter(f"upper{prefix}_bounds", "1", highest, f"Highest {text}", size=size),
                 )
+        self.own_parameters = own
         super()._declare()
         row_width = RowLayout(len(model.inputs), q).width
         self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
