@@ -48,11 +48,15 @@ def warnings_after(
 
 
 def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning) -> Iterator[str]:
-    """What an output warns of, with the instant of the first row that is not zero and the values there."""
+    """What an output warns of: what it never reached, or the first row that is not zero and the values there."""
     column, fields = f"{name}.{signal}", table.dtype.names or ()
     if column not in fields or not len(table):
         return
     values = np.asarray(table[column], dtype=float)
+    if warning.reaches is not None:
+        if np.nanmax(values, initial=-np.inf) < warning.reaches:
+            yield f"{name}: {warning.text}; {signal} came to {np.nanmax(values):.6g} of {warning.reaches:.6g}."
+        return
     raised = np.flatnonzero(values != 0.0)
     if warning.at_end:
         raised = raised[raised == len(values) - 1]

@@ -83,10 +83,20 @@ def window_memory(start: Array, covariance: Array, row_width: int, window: int) 
     )
 
 
-def told_outputs() -> tuple[Signal, ...]:
-    """The outputs `TOLD`."""
+def told_outputs(window: int) -> tuple[Signal, ...]:
+    """The outputs `TOLD`.
+
+    Args:
+        window: rows of the window.
+    """
+    filled = OutputWarning(
+        "its window never filled: losses and unknown parameters were judged by fewer measurements than asked for. Let "
+        "the run last longer, or take a smaller window",
+        reaches=float(window),
+    )
+    warnings = {**WARNINGS, "rows_in_window": filled}
     return tuple(
-        output_signal(name, "1", text, variability="discrete", warning=WARNINGS.get(name))
+        output_signal(name, "1", text, variability="discrete", warning=warnings.get(name))
         for name, text in TOLD.items()
     )
 

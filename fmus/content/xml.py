@@ -208,7 +208,11 @@ def _annotations(element: Element, variable: ModelVariable, tag: str, key: str) 
     warning = variable.warning
     if warning is not None:
         check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")
-        attributes = {"shows": " ".join(warning.shows) or None, "atEnd": "true" if warning.at_end else None}
+        attributes = {
+            "shows": " ".join(warning.shows) or None,
+            "atEnd": "true" if warning.at_end else None,
+            "reaches": None if warning.reaches is None else repr(float(warning.reaches)),
+        }
         _element(SubElement(annotations, tag, {key: ANNOTATION}), ELEMENT, attributes).text = warning.text
 
 

@@ -112,7 +112,13 @@ def _complete_annotations(description: ModelDescription, root: ElementTree.Eleme
         optional = _annotation(entry, OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT) is not None
         warning = None
         if told is not None and told.text:
-            warning = OutputWarning(told.text, tuple(told.get("shows", "").split()), told.get("atEnd") in TRUE)
+            reaches = told.get("reaches")
+            warning = OutputWarning(
+                told.text,
+                tuple(told.get("shows", "").split()),
+                told.get("atEnd") in TRUE,
+                None if reaches is None else float(reaches),
+            )
         if warning is not None or optional:
             made[variable.name] = AnnotatedVariable.of(variable, warning, optional)
     description.modelVariables = [made.get(v.name, v) for v in description.modelVariables]

@@ -502,6 +502,12 @@ def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Compon
 
 
 @pytest.fixture
+def handle() -> type[Component]:
+    """The handle on an instance itself, for an FMU that the test has unpacked."""
+    return Component
+
+
+@pytest.fixture
 def exchange(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Exchange]]:
     """Model exchange instances, freed at the end: ``exchange(name, system or path, fmi_version)``; not yet
     initialised.

@@ -9,6 +9,7 @@ import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from c_hosts import Unpacked, Wiring, compile_host, run
@@ -192,12 +193,12 @@ def test_any_bytes_are_read_or_refused(text: bytes, loop: Path, readers: dict[in
     assert done.returncode == 0 or b"balises.csv, line" in done.stderr
 
 
-def test_a_reset_keeps_the_file_and_a_set_parameter_wins(readers: dict[int, Unpacked], tmp_path: Path) -> None:
-    from conftest import Component  # the handle on an instance; its fixture would build its own FMU
-
+def test_a_reset_keeps_the_file_and_a_set_parameter_wins(
+    readers: dict[int, Unpacked], handle: type[Any], tmp_path: Path
+) -> None:
     folder = Path(shutil.copytree(readers[2].folder, tmp_path / "other"))
     (folder / "resources" / "balises.csv").write_text("position\n5\n", encoding="utf-8")
-    one = Component(folder, folder)
+    one = handle(folder, folder)
     one.instantiate()
     one.set(**{"positions[1]": 3.0})
     assert one.get("positions[1]") == [3.0]

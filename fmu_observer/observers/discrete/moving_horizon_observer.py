@@ -266,7 +266,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         row_width = RowLayout(len(model.inputs), q).width
         self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
         self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
-        self.outputs = (*(s for s in self.outputs if not (self.robust and s.name == "nis")), *told_outputs())
+        self.outputs = (*(s for s in self.outputs if not (self.robust and s.name == "nis")), *told_outputs(self.window))
 
     def _limits(self, shared: Array) -> Limits:
         if not self.bounds:

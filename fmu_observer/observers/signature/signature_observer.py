@@ -42,6 +42,10 @@ MOSTLY = OutputWarning(
     shows=("outside_count", "window_count"),
     at_end=True,
 )
+NEVER = OutputWarning(
+    "its window never filled, and its estimates are the start values and the model alone. Let the run last longer",
+    reaches=1.0,
+)
 NO_MODEL = ("sample_period", "process_noise", "measurement_noise")
 
 
@@ -288,7 +292,11 @@ def _told(named: Sequence[Signal]) -> tuple[Signal, ...]:
             for s in named
         ),
         output_signal(
-            "window_full", "1", "1 once the window is full, and estimates are corrected", variability="discrete"
+            "window_full",
+            "1",
+            "1 once the window is full, and estimates are corrected",
+            variability="discrete",
+            warning=NEVER,
         ),
         output_signal("window_count", "1", "Full windows so far", variability="discrete"),
         output_signal("outside_count", "1", "Full windows beyond the table so far", variability="discrete"),

@@ -101,7 +101,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     description = "Moving-horizon observer of odometer and balises, with disturbance and creep"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
     parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
-    outputs = (*BaliseOdometerEkf.outputs, *told_outputs())
+    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW))
     iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
@@ -115,8 +115,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
             raise ValueError(f"{self.name}: loss = {loss!r}; expected one of {', '.join(LOSSES)}.")
         self.window, self.passes, self.loss = window, passes, loss
         self.gate_start = OFF
-        if loss != "squares":
-            self.outputs = tuple(s for s in self.outputs if s.name != "nis")
+        told_of = {s.name: s for s in told_outputs(window)}
+        judged = (s for s in self.outputs if loss == "squares" or s.name != "nis")
+        self.outputs = tuple(told_of.get(s.name, s) for s in judged)
         super().__init__()
         self.options = {"window": window, "passes": passes, "loss": loss}
 

@@ -39,6 +39,7 @@ class Kettle(HybridSystem):
         output_signal("temperature", "K"),
         output_signal("hot", warning=OutputWarning("is hot & boils", ("temperature",)), unit="1"),
         output_signal("empty", warning=OutputWarning("is empty < at the end", at_end=True), unit="1"),
+        output_signal("ready", warning=OutputWarning("was never ready", reaches=0.5), unit="1"),
     )
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
@@ -46,7 +47,7 @@ class Kettle(HybridSystem):
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         hot, empty = np.where(x[0] > p.alarm_at, 1.0, 0.0), np.where(x[0] > p.empty_at, 1.0, 0.0)
-        return {"temperature": x[0], "hot": hot, "empty": empty}
+        return {"temperature": x[0], "hot": hot, "empty": empty, "ready": 0.5 * x[0]}
 
 
 def _warnings(scenario: cosim.Scenario) -> list[str]:
@@ -57,13 +58,14 @@ def _warnings(scenario: cosim.Scenario) -> list[str]:
 
 HOT = "kettle: is hot & boils; first at 2.5 s (temperature = 2.5), for 1.5 s in all."
 FORGOTTEN = "Unconnected inputs keep their start values: kettle.sun."
+NOT_READY = "kettle: was never ready; ready came to 0.25 of 0.5."
 EMPTY = "kettle: is empty < at the end; seen at the end, 6 s."
 
 
-@pytest.mark.parametrize("stop", [1.0, 4.0, 6.0])
+@pytest.mark.parametrize("stop", [0.5, 1.0, 4.0, 6.0])
 def test_a_run_tells_what_was_not_zero(stop: float) -> None:
     told = _warnings(cosim.Scenario(stop=stop, step=0.5).add("kettle", model=Kettle()))
-    assert told == {1.0: [], 4.0: [HOT], 6.0: [HOT.replace("1.5 s in", "3.5 s in"), EMPTY]}[stop]
+    assert told == {0.5: [NOT_READY], 1.0: [], 4.0: [HOT], 6.0: [HOT.replace("1.5 s in", "3.5 s in"), EMPTY]}[stop]
 
 
 @pytest.mark.compiler
@@ -74,7 +76,7 @@ def test_an_exported_fmu_carries_its_warnings(version: int) -> None:
     description = read_description(Path(path))
     assert declared_warnings(description) == declared_warnings(describe(Kettle(), version))  # type: ignore[arg-type]
     assert declared_warnings(deepcopy(description)) == declared_warnings(description)
-    assert [u.variable.name for u in description.outputs] == ["temperature", "hot", "empty"]
+    assert [u.variable.name for u in description.outputs] == ["temperature", "hot", "empty", "ready"]
     assert [v.name for v in deepcopy(description).modelVariables if is_optional(v)] == ["draught"]
     assert all(known in description.modelVariables for u in description.outputs for known in u.dependencies)
     scenario = cosim.Scenario(stop=4.0, step=0.5).add("kettle", fmu=str(path))
