@@ -51,7 +51,7 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
     """Measure whether the states determine what follows.
 
     A run of some steps is left at one of them, started again from the states read there, and compared with the run that
-    went on. The inputs move at each step: a sample that is held equals a fresh one where they do not. Then each state is
+    went on. The inputs move at each step: where they do not, a held sample equals a fresh one. Then each state is
     moved, read back, and must change the step that follows.
 
     Args:
