@@ -51,7 +51,8 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
     """Measure whether the states determine what follows.
 
     A run of some steps is left at one of them, started again from the states read there, and compared with the run that
-    went on. Then each state is moved, read back, and must change the step that follows.
+    went on. The inputs move at each step: where they do not, a held sample equals a fresh one. Then each state is
+    moved, read back, and must change the step that follows.
 
     Args:
         model: the FMU. h: length of the steps [s]. t: start of the run [s].
@@ -63,18 +64,19 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
         FmuModelError: the states are not taken, do not determine what follows, or change nothing. The message says
             which finding it was and what to do.
     """
-    u = model.start_inputs + 1.0
-    _demand_own_steps_fit(model, t, u, h)
-    model.restart(t, model.start, u)
+    _demand_own_steps_fit(model, t, model.start_inputs + 1.0, h)
+    model.restart(t, model.start, _moving(model, 0))
     rows = [model.read()]
     for k in range(2 * STEPS):
+        model.set_inputs(_moving(model, k))
         model.advance(t + k * h, h)
         rows.append(model.read())
-    at, (x, _) = t + STEPS * h, rows[STEPS]
+    at, (x, _), u = t + STEPS * h, rows[STEPS], _moving(model, STEPS)
     _demand_read_back(model, at, x, u)
     model.restart(at, x, u)
     worst, exact = 0.0, True
     for k in range(STEPS, 2 * STEPS):
+        model.set_inputs(_moving(model, k))
         model.advance(t + k * h, h)
         deviation, same = _deviation(model, rows, k + 1, model.read(), t + (k + 1) * h)
         worst, exact = max(worst, deviation), exact and same
@@ -97,7 +99,7 @@ def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:
         FmuModelError: it saves no states, or what follows a restored one is something else.
     """
     names = (*model.states, *model.outputs)
-    model.restart(t, model.start, model.start_inputs + 1.0)
+    model.restart(t, model.start, _moving(model, 0))
     model.advance(t, h)
     if not model.instance.can_save:
         raise FmuModelError(
@@ -109,8 +111,8 @@ def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:
     for again in (False, True):
         if again:
             model.told(partial(model.instance.restore, saved))
-        model.set_inputs(model.start_inputs + 1.0)
         for k in range(1, 1 + STEPS):
+            model.set_inputs(_moving(model, k))
             model.advance(t + k * h, h)
         runs.append(np.concatenate(model.read()))
     model.told(partial(model.instance.release, saved))
@@ -121,6 +123,11 @@ def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:
             f"{model.path}: restored and stepped again, {names[i]} is {float(runs[1][i])!r}, and {float(runs[0][i])!r} "
             "before: its states cannot be saved and restored honestly, so no particle filter can select among them."
         )
+
+
+def _moving(model: SealedModel, k: int) -> Array:
+    """Inputs of step k, shape (m,): others at each step, and other differences between inputs."""
+    return model.start_inputs + 1.0 + 0.5 * np.sin(2.0 * k + 3.0 * np.arange(len(model.inputs)))
 
 
 def _demand_own_steps_fit(model: SealedModel, t: float, u: Array, h: float) -> None:

@@ -342,14 +342,14 @@ def test_contradictory_bounds_are_refused_in_words() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"bounds": {"y": [0, 1]}}, "expected .lowest, highest. of one of the states angle, rate"),
+        ({"bounds": {"y": [0, 1]}}, " bounds: no state 'y'; states: angle, rate"),
         ({"bounds": {"angle": [0, 1, 2]}}, "expected .lowest, highest."),
         ({"bounds": {"rate": [1.0, -1.0]}}, "bounds of 'rate' are .1.0, -1.0.; the lowest must be below the highest"),
         ({"bounds": {"rate": [0.0, float("nan")]}}, "bounds of 'rate' are .0.0, nan.; expected .lowest, highest."),
         ({"bounds": {"rate": 3.0}}, "bounds of 'rate' are 3.0; expected .lowest, highest."),
         ({"bounds": "rate"}, "bounds = 'rate'; expected .lowest, highest. by name of a state"),
         ({"noise_bounds": {"rate": [0.1, 1.0]}}, "noise_bounds of 'rate' are .0.1, 1.0.; zero must lie within"),
-        ({"noise_bounds": {"y": [-0.1, 1.0]}}, "expected .lowest, highest. of one of the states angle, rate"),
+        ({"noise_bounds": {"y": [-0.1, 1.0]}}, " noise_bounds: no state 'y'; states: angle, rate"),
         ({"loss": "tukey"}, "expected one of squares, huber, geman_mcclure"),
         ({"window": 0}, "window must be 1 to 1000"),
         ({"passes": 0}, "passes must be 1 to 20"),

@@ -240,12 +240,9 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         model, bounds = self.model, self.bounds
         names, q = [s.name for s in model.states], len(model.measurements)
         losses = self._losses = _losses(self.name, self._loss, q)
-        for name, pair in (*bounds.items(), *self.noise_bounds.items()):
+        for option, name in (*(("bounds", n) for n in bounds), *(("noise_bounds", n) for n in self.noise_bounds)):
             if name not in names:
-                raise ValueError(
-                    f"{self.name}: bounds of {name!r} are {pair!r}; expected [lowest, highest] of one of the states "
-                    f"{', '.join(names)}."
-                )
+                raise ValueError(f"{self.name}: {option}: no state {name!r}; states: {', '.join(names)}.")
         self.robust = any(loss != "squares" for loss in losses)
         if self.robust:
             self.gate_start = OFF
