@@ -99,6 +99,15 @@ def test_more_state_than_declared_is_found(tmp_path: Path) -> None:
     model.close()
 
 
+def test_a_sample_that_is_held_shows_where_inputs_move() -> None:
+    """A constant input would give the sample that the restart takes the value of the one that is held."""
+    slow = {"sample_period": 0.5}
+    model = open_model(fmus.cached_fmu(PLANTS["odometer"](), fmi_version=3), "co-simulation", parameters=slow)
+    with pytest.raises(FmuModelError, match=r"started again from its states .* reading is"):
+        check_states(model, 0.2)
+    model.close()
+
+
 def test_states_without_start_values_are_refused(tmp_path: Path) -> None:
     path = linear_fmu(tmp_path, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], inputs=["force"])
     with pytest.raises(FmuModelError, match="declares no continuous state"):
@@ -134,6 +143,9 @@ class OwnSteps:
 
     def restart(self, t: float, x: np.ndarray, _u: np.ndarray) -> None:
         self.begin, self.done, self.x = t, 0, x.copy()
+
+    def set_inputs(self, _u: np.ndarray) -> None:
+        """There are none."""
 
     def advance(self, t: float, h: float) -> None:
         while self.begin + 0.1 * (self.done + 1) < t + h + 1e-9:
