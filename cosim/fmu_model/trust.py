@@ -127,7 +127,8 @@ def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:
 
 def _moving(model: SealedModel, k: int) -> Array:
     """Inputs of step k, shape (m,): others at each step, and other differences between inputs."""
-    return model.start_inputs + 1.0 + 0.5 * np.sin(2.0 * k + 3.0 * np.arange(np.size(model.start_inputs)))
+    turned = 2.0 * k + 3.0 * np.arange(np.size(model.start_inputs))
+    return np.asarray(model.start_inputs + 1.0 + 0.5 * np.sin(turned))
 
 
 def _demand_own_steps_fit(model: SealedModel, t: float, u: Array, h: float) -> None:
