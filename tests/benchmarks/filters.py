@@ -1,5 +1,5 @@
 """Benchmark: native Kalman filters of a synchronous motor (4 states, 2 measurements) beside those of filterpy, filters
-of 20 members of it, and the filter of odometer and balises.
+of 20 members of it, both over its sealed FMU too, and the filter of odometer and balises.
 
 ``python tests/benchmarks/filters.py [SAMPLES]``. Those of the motor take one Runge-Kutta step a period, on the same
 equations; filterpy has no particle filter, so that one stands beside its ensemble, and of the train it computes the
@@ -16,12 +16,14 @@ from typing import Any
 import filterpy.kalman
 import numpy as np
 
+from cosim.fmu_filter.component import FmuFilterModel
+from cosim.fmu_filter.settings import FilterTable
 from fmu_observer.observers.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.discrete.particle_filter import ParticleFilter
 from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.train.balise_odometer_ekf import ODOMETER_ROW, BaliseOdometerEkf, transition
-from fmus import Batch
+from fmus import Batch, cached_fmu
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem
 
@@ -50,6 +52,13 @@ def main(arguments: list[str]) -> None:
     for drawn in (EnsembleKalmanFilter, ParticleFilter):
         own = native(drawn(members=DRAWN, **MOTOR), max(10, samples // 10))
         print(f"  {drawn.name}: {1e6 * own:.3f} us a sample, {theirs['ensemble'] / own:.0f} times faster", flush=True)
+    theirs["particle"] = theirs["ensemble"]
+    for name, other in {"ekf": "extended", "ukf": "unscented", "ensemble": "ensemble", "particle": "particle"}.items():
+        own = over_fmu(name, max(10, samples // 10))
+        print(
+            f"{name} over the sealed FMU: {1e6 * own:.1f} us a sample, {own / theirs[other]:.2f} times filterpy's",
+            flush=True,
+        )
     theirs["train"] = by_filterpy(train(), samples)
     print(f"the matrices of {BaliseOdometerEkf.name} by filterpy: {1e6 * theirs['train']:.1f} us a reading", flush=True)
     own = native(BaliseOdometerEkf(), samples, {"effort": 2e4, "odometer": 20.0}, period=0.1)
@@ -68,6 +77,30 @@ def native(system: HybridSystem, samples: int, values: Mapping[str, float] = DRI
     spent = seconds(lambda: batch.run([samples * period]))
     assert not batch.failures
     return spent / (samples * MEMBERS)
+
+
+def over_fmu(kind: str, samples: int) -> float:
+    """CPU seconds of a sample of a filter that moves the FMU by its calls, and has it started anew at each."""
+    motor, driven = PLANTS["synchronous_motor"](), {"voltage_d": 1.0, "voltage_q": 0.0, "load_torque": 0.0}
+    states = [signal.name for signal in motor.states]
+    settings: dict[str, Any] = {
+        "kind": kind,
+        "measurements": dict.fromkeys(MOTOR["outputs"], 0.3),
+        "members": DRAWN,
+        "sample_period": T,
+    }
+    if kind == "particle":
+        settings["input_noise"] = {"voltage_d": 1.0}
+    else:
+        settings |= {"process_noise": dict.fromkeys(states, 0.03), "start_deviation": dict.fromkeys(states, 1.0)}
+    filter_ = FmuFilterModel(cached_fmu(motor, fmi_version=3), FilterTable.model_validate(settings), {"voltage_d": 1.0})
+    readings = np.random.default_rng(0).normal(size=(samples, 2))
+
+    def run() -> None:
+        for k, (d, q) in enumerate(readings):
+            filter_.step(k * T, {**driven, "measured_current_d": d, "measured_current_q": q}, T)
+
+    return seconds(run) / samples
 
 
 def by_filterpy(step: Callable[[np.ndarray], None], samples: int) -> float:
