@@ -219,7 +219,8 @@ def _made(model: type[HybridSystem], options: Mapping[str, Any], where: str) -> 
         try:
             return model(**options)
         except ValueError as error:  # options that no list of choices can check, such as the model of a filter
-            raise ScenarioError(f"{where}: {model.name}: {error}") from error
+            said = str(error).removeprefix(f"{model.name}: ")  # systems begin with their name, formulas do not
+            raise ScenarioError(f"{where}: {model.name}: {said}") from error
     try:
         made: HybridSystem = make(model, options)
     except UserFileError as error:

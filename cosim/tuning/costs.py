@@ -181,7 +181,7 @@ class MeasureCost(Cost):
         """The cost, see `Cost.of`."""
         measures = error_measures(outcome)
         if self.name not in measures:
-            raise ScenarioError(f"The run has no measure {self.name!r}; {nearest(self.name, measures)}")
+            raise ScenarioError(f"The run has no measure {self.name!r}; {nearest(self.name, [*KINDS, *measures])}")
         return self.sign * measures[self.name]
 
 
