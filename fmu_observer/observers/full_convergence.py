@@ -170,6 +170,11 @@ def iterated_fully(
     rows, states = np.reshape(window, (-1, layout.width)), np.reshape(points, (-1, n))
     before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
     rows, guesses = np.vstack([rows[1:], row]), np.vstack([states[1:], point])
+    for k in range(
+        len(rows) - 1
+    ):  # a row that does not move, such as one that is not filled yet, has the state before it
+        if layout.unpacked(rows[k]).moves <= 0.5:
+            guesses[k] = guesses[k - 1] if k else before.mean
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
     step = found.step if found.iterations else 0.0  # no step, no change: the prediction is the answer
     against = contradicted(np.array([found.active]), np.array([found.far]))

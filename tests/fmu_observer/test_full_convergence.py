@@ -83,6 +83,12 @@ def test_a_deadline_that_is_missed_is_told_and_bounds_are_kept():
     assert 0.0 <= speed <= 10.0
 
 
+@pytest.mark.parametrize("window", [5, 12, 40])
+def test_what_a_missed_deadline_leaves_keeps_transitions_and_bounds_before_the_window_is_full(window: int):
+    full = _followed(FullBaliseMovingHorizon(window=window, deadline=0.0))
+    assert _told(full, "deadline_missed", "feasible") == [1.0, 1.0]
+
+
 def test_a_deadline_before_the_first_row_gives_the_prediction():
     system = FullBaliseMovingHorizon(window=3, deadline=0.0)
     full = _followed(system)
