@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from cosim.balises.service import BaliseService
 from cosim.compiled.choice import choose_stepper
@@ -29,6 +28,7 @@ from cosim.master.system import System
 from cosim.network.service import NetworkService
 from cosim.results.data import SignalInfo
 from cosim.results.recorder import Recorder
+from cosim.results.stream import Stream
 from cosim.scenario.roles import switching_signals
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import MasterTable
@@ -61,7 +61,7 @@ def make_master(
         algorithm=lambda plan: make_algorithm(table.master, plan, choice),
         control=_control(table.master),
         stepper=partial(choose_stepper, table.master.stepper),
-        recorder=partial(Recorder, memory=1e6 * table.master.record_memory, **kept_rows(table, plan.signals)),
+        recorder=partial(make_recorder, table),
         events=table.master.events,
         network=network,
     )
@@ -71,14 +71,23 @@ def make_master(
     return master
 
 
-def kept_rows(table: ScenarioTable, signals: Sequence[SignalInfo]) -> dict[str, Any]:
-    """Which rows a recorder keeps, as its arguments.
+def make_recorder(
+    table: ScenarioTable, signals: Sequence[SignalInfo], expected_rows: int, stream: Stream | None = None
+) -> Recorder:
+    """The recorder that keeps the rows which a scenario asks for.
 
     Args:
-        table: of the scenario, with its roles. signals: that are recorded.
+        table: of the scenario, with its roles. signals: that are recorded. expected_rows: room made at once.
+        stream: where rows are to appear as they come, or None.
     """
-    names = [signal.name for signal in signals]
-    return {"every": table.master.record_every, "switching": switching_signals(table, names)}
+    return Recorder(
+        signals,
+        expected_rows,
+        memory=1e6 * table.master.record_memory,
+        every=table.master.record_every,
+        switching=switching_signals(table, [signal.name for signal in signals]),
+        stream=stream,
+    )
 
 
 def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> Algorithm:

@@ -34,7 +34,6 @@ from cosim.network.outputs import NAME as NETWORK
 from cosim.network.service import NetworkService
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
-from cosim.results.recorder import Recorder
 from cosim.results.result import Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
 from cosim.results.stream import Stream
@@ -46,7 +45,7 @@ from cosim.scenario.connections import parse_connections
 from cosim.scenario.coupling_warnings import coupling_warnings, interpolation_note, late_telegram_warnings
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
-from cosim.scenario.master import idle_settings, kept_rows, make_master, stepping_groups
+from cosim.scenario.master import idle_settings, make_master, make_recorder, stepping_groups
 from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.network import Network, connect_over, make_network, network_summary, network_warnings
 from cosim.scenario.outcome import INTERRUPTED, Outcome
@@ -378,8 +377,7 @@ class _Setup:
         folder, begun = self.streaming
         packets = None if self.packets is None else self.packets.settled
         self.stream = Stream(folder, master.plan.signals, self._unit, summary, lambda: events, logs, packets)
-        signals = master.plan.signals
-        master.recorder = Recorder(signals, 0, **kept_rows(self.table, signals), stream=self.stream)
+        master.recorder = make_recorder(self.table, master.plan.signals, 0, self.stream)
         begun()
 
     # -- after the run ----------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from fmu_observer.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_a
 from fmu_observer.moving_horizon.full_solver import Effort, FullSolution, FullSolver
 from fmu_observer.moving_horizon.gauss_newton import passed
 from fmu_observer.moving_horizon.window import WindowRow
-from fmu_observer.moving_horizon.window_program import WindowProgram
+from fmu_observer.moving_horizon.window_program import Programme, WindowProgram
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, Shared
 
 PAGE = Path(__file__).parents[1] / "moving_horizon.md"
@@ -41,17 +41,9 @@ HEADING = (
 class ClarabelProgram(WindowProgram):
     """The quadratic programme handed to Clarabel."""
 
-    def handed(
-        self,
-        h: np.ndarray,
-        g: np.ndarray,
-        a: np.ndarray,
-        sides: tuple[np.ndarray, np.ndarray],
-        lower: np.ndarray,
-        upper: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """See `WindowProgram.handed`; no disturbance has bounds here."""
-        right = sides[0]
+        h, g, a, (right, _), lower, upper = given
         P, E = _matrix(self.cost, h), _matrix(self.transitions, a)
         eye = scipy.sparse.eye(len(g), format="csr")
         has_low, has_high = np.isfinite(lower), np.isfinite(upper)
@@ -78,18 +70,11 @@ class IpoptProgram(WindowProgram):
         problem = {"x": z, "p": ca.vertcat(g, h, a), "f": cost, "g": ca.MX(self.transitions, a) @ z}
         self._ipopt = ca.nlpsol("window", "ipopt", problem, options)
 
-    def handed(
-        self,
-        h: np.ndarray,
-        g: np.ndarray,
-        a: np.ndarray,
-        sides: tuple[np.ndarray, np.ndarray],
-        lower: np.ndarray,
-        upper: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """See `WindowProgram.handed`; no disturbance has bounds here."""
+        h, g, a, (least, most), lower, upper = given
         p = np.concatenate([g, h, a])
-        told = self._ipopt(x0=np.zeros(len(g)), p=p, lbx=lower, ubx=upper, lbg=sides[0], ubg=sides[1])
+        told = self._ipopt(x0=np.zeros(len(g)), p=p, lbx=lower, ubx=upper, lbg=least, ubg=most)
         status = str(self._ipopt.stats()["unified_return_status"])
         return told["x"].full().ravel(), told["lam_g"].full().ravel(), status
 
@@ -97,17 +82,9 @@ class IpoptProgram(WindowProgram):
 class TrustRegionProgram(WindowProgram):
     """The same programme as bounded least squares of SciPy: equations weighted by 1e6, `lsq_linear` with LSMR."""
 
-    def handed(
-        self,
-        h: np.ndarray,
-        g: np.ndarray,
-        a: np.ndarray,
-        sides: tuple[np.ndarray, np.ndarray],
-        lower: np.ndarray,
-        upper: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """See `WindowProgram.handed`; no disturbance has bounds here."""
-        right = sides[0]
+        h, g, a, (right, _), lower, upper = given
         size = len(g)
         blocks = h[: size // 2 * self.order].reshape(self.count, self.order, self.order)
         values, vectors = np.linalg.eigh(blocks)

@@ -226,8 +226,7 @@ class _Search:
 
     def at(self, states: np.ndarray, noises: np.ndarray | None) -> _Point:
         """A trajectory with all that follows from it; noises that explain it best where none are given."""
-        led = bool(self.disturbed)
-        stages = self.stages.along(states, self.arrival, self.rows, self.shared, led=led)
+        stages = self.stages.along(states, self.arrival, self.rows, self.shared, empty_first=bool(self.disturbed))
         if noises is None:
             roots = np.where(np.abs(stages.G.diagonal(0, 1, 2)) > 0.0, stages.G.diagonal(0, 1, 2), inf)
             noises = forward_substituted(stages.G, states - stages.moved, roots)

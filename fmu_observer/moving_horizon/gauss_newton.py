@@ -65,7 +65,7 @@ class Limits(NamedTuple):
     upper: Array
 
 
-def _none(_row: WindowRow, _shared: Array) -> Limits:
+def _no_limits(_row: WindowRow, _shared: Array) -> Limits:
     """Limits of no disturbance."""
     return Limits(np.zeros(0), np.zeros(0))
 
@@ -95,7 +95,7 @@ class WindowProblem:
     loss_scale: Callable[[Array], Array]
     form: Form = "joseph"
     disturbed: tuple[int, ...] = ()
-    noise_limits: Callable[[WindowRow, Array], Limits] = _none
+    noise_limits: Callable[[WindowRow, Array], Limits] = _no_limits
 
     @property
     def bounds(self) -> int:

@@ -38,6 +38,23 @@ class Step(NamedTuple):
         return self.status == "SOLVER_RET_SUCCESS"
 
 
+class Programme(NamedTuple):
+    """``min z' H z / 2 + g' z`` with ``A z`` between two sides, and bounds of z.
+
+    Attributes:
+        h: nonzeros of H as in `WindowProgram.cost`. g: shape (2 N n,). a: nonzeros of A as in its `transitions`.
+        sides: of the transitions, equal, then of the noises with bounds, shape (N n + N d,).
+        lower, upper: bounds of z, shape (2 N n,).
+    """
+
+    h: np.ndarray
+    g: np.ndarray
+    a: np.ndarray
+    sides: tuple[np.ndarray, np.ndarray]
+    lower: np.ndarray
+    upper: np.ndarray
+
+
 class WindowProgram:
     """Quadratic programmes of one size: ``min sum (dx' A dx + w' w) / 2 + b' dx`` with ``dx = F dx_before + G w + c``.
 
@@ -107,38 +124,30 @@ class WindowProgram:
         none = FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without sides
         low, high = (-none, none) if noise is None else (np.maximum(noise[0], -none), np.minimum(noise[1], none))
         free, zero = np.full(N * n, np.inf), np.zeros(N * n)
-        found, prices, status = self.handed(
-            np.concatenate([A.ravel(), zero + 1.0]),
-            np.concatenate([b.ravel(), zero]),
-            coupling,
-            (np.concatenate([-c.ravel(), low.ravel()]), np.concatenate([-c.ravel(), high.ravel()])),
-            np.concatenate([lower.ravel(), -free]),
-            np.concatenate([upper.ravel(), free]),
+        given = Programme(
+            h=np.concatenate([A.ravel(), zero + 1.0]),
+            g=np.concatenate([b.ravel(), zero]),
+            a=coupling,
+            sides=(np.concatenate([-c.ravel(), low.ravel()]), np.concatenate([-c.ravel(), high.ravel()])),
+            lower=np.concatenate([lower.ravel(), -free]),
+            upper=np.concatenate([upper.ravel(), free]),
         )
+        found, prices, status = self.handed(given)
         changes, noises = found.reshape(2, N, n)
         return Step(changes, noises, prices[: N * n].reshape(N, n), status)
 
-    def handed(
-        self,
-        h: np.ndarray,
-        g: np.ndarray,
-        a: np.ndarray,
-        sides: tuple[np.ndarray, np.ndarray],
-        lower: np.ndarray,
-        upper: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, str]:
-        """``min z' H z / 2 + g' z`` with ``A z`` between two sides and bounds, by the solver.
+    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
+        """What the solver finds.
 
         Args:
-            h: nonzeros of H as in `cost`. g: shape (2 N n,). a: nonzeros of A as in `transitions`.
-            sides: of the transitions, equal, then of the noises with bounds, shape (N n + N d,).
-            lower, upper: shape (2 N n,).
+            given: the programme.
 
         Returns:
             z, the multipliers of the rows of A, and the solver's status.
         """
-        nothing, none = np.zeros(len(g)), np.zeros(len(sides[0]))
-        told = self._call(h, g, a, *sides, lower, upper, nothing, nothing, none, *self._rest)
+        h, g, a, (least, most), lower, upper = given
+        nothing, none = np.zeros(len(g)), np.zeros(len(least))
+        told = self._call(h, g, a, least, most, lower, upper, nothing, nothing, none, *self._rest)
         status = str(self._solver.stats(self._call.memory)["unified_return_status"])
         return told[0].copy(), told[2].copy(), status
 

@@ -86,27 +86,27 @@ class WindowStages:
         self._shared_count = 0
 
     def along(
-        self, states: Numbers, arrival: ArrivalCost, rows: Numbers, shared: Numbers, *, led: bool = False
+        self, states: Numbers, arrival: ArrivalCost, rows: Numbers, shared: Numbers, *, empty_first: bool = False
     ) -> Stages:
         """The stages along a trajectory.
 
         Args:
             states: of each row, shape (N, n). arrival: what is known before the first row. rows: shape (N, width).
             shared: what all rows share, shape (s,).
-            led: whether the first row is an empty one that stands for the state before the window; the transition out
+            empty_first: whether the first row is empty and stands for the state before the window; the transition out
                 of it stays linearised at the arrival cost's point.
         """
         count, n, q = len(rows), self.problem.order, self.problem.layout.measurements
         shared = np.asarray(shared, dtype=float)
         self._shared_count = len(shared)
         before = np.vstack([np.reshape(arrival.point, (1, n)), states[:-1]])
-        if led:
+        if empty_first:
             before[1] = arrival.point
         moved, F, added = self._called("transition", count, n, before, rows, shared)
         mean, P = np.asarray(arrival.mean, dtype=float), np.reshape(np.asarray(arrival.covariance, dtype=float), (n, n))
         moved, G = moved[:, :, 0], added
         moved[0] += F[0] @ (mean - before[0])
-        if led:
+        if empty_first:
             moved[1] += F[1] @ (states[0] - before[1])
         G[0] = factor(symmetric(F[0] @ P @ F[0].T + added[0] @ added[0].T))
         F[0] = 0.0

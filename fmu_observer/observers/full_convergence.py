@@ -170,9 +170,8 @@ def iterated_fully(
     rows, states = np.reshape(window, (-1, layout.width)), np.reshape(points, (-1, n))
     before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
     rows, guesses = np.vstack([rows[1:], row]), np.vstack([states[1:], point])
-    for k in range(
-        len(rows) - 1
-    ):  # a row that does not move, such as one that is not filled yet, has the state before it
+    # the search begins where transitions are kept: a row that does not move, or is not filled yet, has the one before
+    for k in range(len(rows) - 1):
         if layout.unpacked(rows[k]).moves <= 0.5:
             guesses[k] = guesses[k - 1] if k else before.mean
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
