@@ -186,6 +186,42 @@ def _in_cell(corners: Array, cell: Array, point: Array, extrapolated: float) -> 
     return np.stack([beyond, cell[0] + cell[1] * np.clip(s, low, high), cell[2] + cell[3] * np.clip(t, low, high)])
 
 
+def weighted_inverse(
+    places: np.ndarray, properties: Sequence[Array], point: Sequence[Array], sharpness: Array
+) -> Array:
+    """Mean of known quantities, weighted by the nearness of their properties: the weights of Omar 2012, (4.6.5), on the
+    nodes themselves [ours].
+
+    Each property is scaled by its range over the nodes, so that ``mu`` has the meaning it has in `soft_inverse`. Under
+    noise a mean draws towards the middle of the nodes, which costs a bias and takes away more of the variance.
+
+    Args:
+        places: quantities at k nodes, shape (k, m). properties: of the nodes, shape (k, ...) each. point: properties
+            looked up, shape (...) each. sharpness: mu [1].
+
+    Returns:
+        The quantities, shape (m, ...).
+    """
+    square = sum(
+        ((values - read) / (np.max(values, axis=0) - np.min(values, axis=0))) ** 2
+        for values, read in zip(properties, point, strict=True)
+    )
+    distance = np.sqrt(square)
+    weights = np.exp(-sharpness * (distance - np.min(distance, axis=0)))
+    return (places.T @ weights) / np.sum(weights, axis=0)
+
+
+def polynomial_refinement(nodes: np.ndarray, fine: np.ndarray) -> np.ndarray:
+    """Matrix that makes of values at some nodes those of the polynomial through them at other places, shape (f, a).
+
+    Args:
+        nodes: shape (a,). fine: the other places, shape (f,).
+    """
+    others = [np.delete(nodes, i) for i in range(len(nodes))]
+    columns = [np.prod((fine[:, None] - others[i]) / (node - others[i]), axis=1) for i, node in enumerate(nodes)]
+    return np.stack(columns, axis=1)
+
+
 def nearest_two(distances: Sequence[Array], labels: np.ndarray) -> Array:
     """Mean of the labels with the two smallest distances, each weighted by the distance of the other: Omar 2012,
     (4.6.14) and (4.6.15).

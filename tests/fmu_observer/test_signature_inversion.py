@@ -183,7 +183,7 @@ def test_the_culture_is_told_by_literal_scaling_only() -> None:
 
 
 def test_glycerol_and_enzyme_come_back_from_a_clean_window() -> None:
-    observer = CultureSignature()
+    observer = CultureSignature(look_up="cell")
     p = parameters(observer)
     state = np.array([0.5, 1.6, 0.13])
     measured = [observer.plant.measured_under(x, p) for x in observer.moved(state, 7, p)]
@@ -191,6 +191,30 @@ def test_glycerol_and_enzyme_come_back_from_a_clean_window() -> None:
     told = observer.inverted(past, observer.start_state(), p)
     np.testing.assert_allclose(told.state, state, rtol=0.06)  # a 3 x 3 network is bent between its nodes
     assert told.outside == 0.0
+
+
+def test_the_sharpness_of_the_culture_is_that_of_the_smallest_error_under_its_noise() -> None:
+    observer = CultureSignature()
+    candidates = (5.0, 10.0, 20.0, 40.0, 80.0)
+    errors = [np.hypot(*observer.look_up_errors(candidates, noise).T) for noise in (0.0, 0.01, 0.03)]
+    best = [candidates[int(np.argmin(e))] for e in errors]
+    assert best[0] > best[1] > best[2]  # the more noise, the flatter the weights
+    assert best[1] == observer.model_values().sharpness
+    assert errors[1].min() < 0.75 * np.hypot(*observer.look_up_errors((0.0,))[0])  # of the middle of the tube
+
+
+def test_weights_take_the_mean_of_all_nodes_or_the_nearest() -> None:
+    places = RNG.normal(size=(9, 2))
+    properties = [RNG.normal(size=9), 100.0 * RNG.normal(size=9)]  # each on its own scale
+    node = (properties[0][4], properties[1][4])
+    np.testing.assert_allclose(inversion.weighted_inverse(places, properties, node, 0.0), places.mean(axis=0))
+    np.testing.assert_allclose(inversion.weighted_inverse(places, properties, node, 1e4), places[4])
+    first = inversion.weighted_inverse(places, properties, (0.3, 40.0), 2.0)
+    stretched = inversion.weighted_inverse(places, [properties[0], properties[1] / 100.0], (0.3, 0.4), 2.0)
+    np.testing.assert_allclose(first, stretched)  # whatever the unit of a property
+    nodes, fine = np.linspace(-1.0, 1.0, 3), np.linspace(-1.0, 1.0, 7)
+    made = inversion.polynomial_refinement(nodes, fine) @ (2.0 - nodes + 3.0 * nodes**2)
+    np.testing.assert_allclose(made, 2.0 - fine + 3.0 * fine**2, atol=ROUNDING)
 
 
 def test_a_table_follows_its_parameters_and_tells_a_node_from_its_window() -> None:
