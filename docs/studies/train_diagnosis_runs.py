@@ -72,6 +72,29 @@ OUTSIDE = (
     Journey(45.0, 1100.0, 0.5, 0.3, grade=-0.001),
 )
 """Other missions, other rails, other loads: none of them made a threshold."""
+WET_INSIDE = (
+    Journey(30.0, 1000.0, 0.3, rail=0.15),
+    Journey(50.0, 1000.0, 0.35, rail=0.15, mass=1.03, grade=0.001),
+    *(
+        journey
+        for rail in (0.2, 0.25)
+        for journey in (
+            Journey(30.0, 1000.0, 0.3, rail=rail),
+            Journey(50.0, 1000.0, 0.35, rail=rail, mass=1.03, grade=0.001),
+            Journey(40.0, 1000.0, 0.45, 0.35, rail=rail, mass=0.97, grade=-0.001),
+            Journey(60.0, 1500.0, 0.3, 0.5, rail=rail),
+        )
+    ),
+)
+"""Fault-free journeys on wet rails, from which the preset `wet_rails` comes. Rail and effort are such that wheels
+creep, by 0.3 m/s at most, and do not spin."""
+WET_OUTSIDE = (
+    *(journey for journey in OUTSIDE if journey.rail > 0.0),
+    Journey(35.0, 900.0, 0.4, rail=0.17),
+    Journey(55.0, 1300.0, 0.35, 0.5, rail=0.22, mass=0.98, grade=0.0008),
+    Journey(25.0, 600.0, 0.35, rail=0.18, mass=1.02),
+)
+"""Others on wet rails."""
 
 
 def recorded(journey: Journey) -> dict[str, np.ndarray]:

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import cosim
+from cosim.evaluation.fault_detection import fault_detection
 from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_diagnosis_signals import SHARES
 from fmu_observer.detection.train_efficiency import MotionWindow, brake_share, traction_share
-from fmu_observer.detection.train_isolation import BRAKE, MOTION, SENSORS, isolability
+from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, SENSORS, isolability
 from fmu_observer.diagnosis.isolation_table import IsolationTable
 from plant_models.hybrid import Runtime
 
@@ -186,17 +187,31 @@ def test_a_share_outside_of_the_grid_is_unknown() -> None:
     assert last["shares_unknown"] == 3.0 == sum(last[f"{s}_unknown"] for s in SHARES)
 
 
-@pytest.mark.parametrize("case", ["fault_free", "radar_gain", "pressure_low"])
-def test_a_case_of_the_scenario_meets_its_own_expectations(case: str) -> None:
+@pytest.mark.parametrize("case", ["radar_gain", "false_balise", "pressure_low"])
+def test_a_case_of_the_scenario_is_told_in_time_and_alone(case: str) -> None:
     outcome = cosim.Scenario.load("train_diagnosis").set("case", case).run().check()
-    assert len(outcome.expectations) == (1 if case == "fault_free" else 3)
+    assert len(outcome.expectations) == 5  # quiet before, in time, code from both sides, nothing else
     assert not any("not checked against the balise gaps" in warning for warning in outcome.warnings)
+    (told,) = fault_detection(outcome.result, outcome.spec)
+    assert (told.faults, told.missed, told.false) == (1, 0, 0)
+    assert outcome.spec.delay_limit is not None
+    assert told.within(outcome.spec.delay_limit)
 
 
-def test_only_faults_of_the_first_odometer_are_judged_as_its_faults() -> None:
+def test_each_case_of_the_scenario_is_judged_by_the_output_of_its_own_fault() -> None:
     tables = tomllib.loads(Path(cosim.__file__).with_name("scenarios").joinpath("train_diagnosis.toml").read_text())
-    judged = {case: values["report"]["true_fault"] for case, values in tables["cases"].items() if "report" in values}
-    assert judged == {"jam": "wheel.active", "skid": "wheel.active"}
-    assert tables["report"]["true_fault"] == "first_odometer.active"
-    own = {"odometer_1_gain"}  # that of the scenario itself
-    assert all("expect" in values for case, values in tables["cases"].items() if case not in own)
+    seen = set()
+    for case, values in tables["cases"].items():
+        report = tables["report"] | values.get("report", {})
+        expect = {e["name"]: e for e in values.get("expect", tables["expect"])}
+        if case == "fault_free":
+            continue
+        in_time = expect["it is suspected in time"]
+        assert in_time["signal"] == f"diagnosis.{report['detection']}"
+        assert in_time["before"] - in_time["from"] == pytest.approx(report["delay_limit"])
+        component = values.get(
+            report["true_fault"].partition(".")[0], tables["components"]["first_odometer"]["parameters"]
+        )
+        assert component["fault_onset"] == in_time["from"] == expect["nothing is told before the fault"]["end"]
+        seen.add(report["detection"].removesuffix("_fault"))
+    assert seen == set(FAULTS)
