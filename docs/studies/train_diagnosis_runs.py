@@ -82,12 +82,13 @@ WET_INSIDE = (
             Journey(30.0, 1000.0, 0.3, rail=rail),
             Journey(50.0, 1000.0, 0.35, rail=rail, mass=1.03, grade=0.001),
             Journey(40.0, 1000.0, 0.45, 0.35, rail=rail, mass=0.97, grade=-0.001),
-            Journey(60.0, 1500.0, 0.3, 0.5, rail=rail),
         )
     ),
+    Journey(60.0, 1500.0, 0.4, 0.5, rail=0.2),
+    Journey(60.0, 1500.0, 0.5, 0.5, rail=0.25, mass=1.03),
 )
 """Fault-free journeys on wet rails, from which the preset `wet_rails` comes. Rail and effort are such that wheels
-creep, by 0.3 m/s at most, and do not spin."""
+creep, by 0.5 m/s or 3 % at most, and do not spin."""
 WET_OUTSIDE = (
     *(journey for journey in OUTSIDE if journey.rail > 0.0),
     Journey(35.0, 900.0, 0.4, rail=0.17),

@@ -154,15 +154,16 @@ class WindTurbineLoop(HybridSystem):
         return [LAYOUT[f"{part}_{s.name}"] for s in system.states]
 
     def _part(self, part: str, x: Array) -> Array:
-        return vector(*(x[i] for slot in self._slots(part) for i in range(slot.start, slot.stop)))
+        return np.hstack([x[slot] for slot in self._slots(part)])
 
     def _with(self, x: Array, **parts: Array) -> Array:
-        values = [x[i] for i in range(self.state_count)]
+        pieces = {slot.start: x[slot] for slot in LAYOUT.values()}
         for part, new in parts.items():
-            places = [i for slot in self._slots(part) for i in range(slot.start, slot.stop)]
-            for k, place in enumerate(places):
-                values[place] = new[k]
-        return vector(*values)
+            first = 0
+            for slot in self._slots(part):
+                pieces[slot.start] = new[first : first + slot.stop - slot.start]
+                first += slot.stop - slot.start
+        return np.hstack([pieces[start] for start in sorted(pieces)])
 
     def _wind(self, p: Any) -> Any:
         names = ("mean_from", "mean_to", "sine_amplitude", "turbulence_std", "sample_period")

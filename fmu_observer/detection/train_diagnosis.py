@@ -65,7 +65,9 @@ class TrainDiagnosis(HybridSystem):
     Raises:
         ValueError: a window is not a whole number in its range.
 
-    Presets: `swept` (default; thresholds from fault-free runs, see docs/train_diagnosis.md).
+    Presets: `swept` (default; thresholds from fault-free runs, nearly all on dry rails), `wet_rails` (from fault-free
+    runs on wet rails, where wheels creep by up to 3 %: wider where wheels are compared with what does not slip); see
+    docs/train_diagnosis.md for the false alarms and the delays of both.
 
     Source: Omar 2012, chapter 7 (redundancy, windowed residuals, grid inversion), for a train; table and thresholds
     ours.
@@ -79,7 +81,15 @@ class TrainDiagnosis(HybridSystem):
     outputs = OUTPUTS
     parameters = PARAMETERS
     events = EVENTS
-    presets: Mapping[str, Mapping[str, Any]] = {"swept": {}}
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "swept": {},
+        "wet_rails": {
+            "threshold_wheels": 0.55,
+            "threshold_radar": 1.2,
+            "threshold_traction": 0.16,
+            "balise_floor": 1.7,
+        },
+    }
     default_preset = "swept"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "speed_window": range(2, 51),

@@ -109,7 +109,8 @@ def test_the_thresholds_in_use_are_those_of_the_study_rounded_up() -> None:
     page = (Path(__file__).parents[2] / "docs" / "train_diagnosis.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(threshold_\w+|balise_floor)` \| (\S+) \| (\S+) \|", page, re.MULTILINE)
     starts = {s.name: s.start for s in TrainDiagnosis().parameters}
-    assert len(rows) == 8
-    for name, used, asked in rows:
-        assert starts[name] == pytest.approx(float(used), rel=1e-4), name  # printed with four digits
+    assert len(rows) == 16  # of the preset `swept`, then of `wet_rails`
+    for i, (name, used, asked) in enumerate(rows):
+        preset = starts if i < 8 else starts | dict(TrainDiagnosis.presets["wet_rails"])
+        assert preset[name] == pytest.approx(float(used), rel=1e-4), name  # printed with four digits
         assert float(asked) <= float(used) <= 1.5 * float(asked), name

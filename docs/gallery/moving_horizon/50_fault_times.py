@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -29,6 +30,7 @@ REFERENCES = {  # the same of the six references, in the order of the table
     7: "yy yy yy yy yx yy",
     8: "-- x- yx yy yy x-",
     9: "-- x- yx -- yx yx",
+    10: "-- yy -- -- -- --",
 }
 TIMES = (
     "the two sensors disagree at the first faulty sample, and the model of each tells which; the alarm clears after "
@@ -45,8 +47,13 @@ TORQUE = (
 )
 ACTUATOR = (
     "excitation decides: here 14 m/s with turbulence and a controller that the fault disturbs; the wind of the thesis "
-    "is not available. Three seeds, fault from 60 to 160 s; with ten seeds and the fault from 500 to 600 s the medians "
-    "are 18.5 s and 18 s, the largest 97.1 s and 28.9 s (docs/wind_turbine.md): the alarm waits until the pitch moves"
+    "is not available. Three seeds of 100 s, fault from 60 s on; with ten seeds and the fault from 500 to 600 s the "
+    "medians are 18.5 s and 18 s, the largest 97.1 s and 28.9 s (docs/wind_turbine.md): the alarm waits until the "
+    "pitch moves"
+)
+EFFICIENCY = (
+    "measured by sheet 51; the table sets no limit, and counts it as kept where the fault is detected. Ten seeds find "
+    "it within 230 s each (docs/wind_turbine.md)"
 )
 STRONG = {"mean_from": 14.0, "mean_to": 14.0, "sine_amplitude": 0.0}
 
@@ -55,8 +62,8 @@ def main() -> None:
     """Medians over seeds, in samples where they are short."""
     sheet = Sheet(__file__, "Wind turbine: when its faults are found", "Omar 2012, Tables 7.1, 7.2, Figs. 7.4-7.37")
     numbers = [n for n in PUBLISHED for _ in SEEDS]
-    short = run_members(numbers, [*SEEDS] * len(PUBLISHED), 50.0, (30.0, 40.0))
-    slow = run_members([8] * 3 + [9] * 3, [*SEEDS] * 2, 170.0, (60.0, 160.0), **STRONG)
+    short = run_members(numbers, [*SEEDS] * len(PUBLISHED), 41.0, (30.0, 40.0))
+    slow = run_members([8] * 3 + [9] * 3, [*SEEDS] * 2, 100.0, (60.0, 160.0), **STRONG)
     onsets, verdicts = {}, {}
     for i, (number, (onset, gone)) in enumerate(PUBLISHED.items()):
         part = slice(i * len(SEEDS), (i + 1) * len(SEEDS))
@@ -81,6 +88,12 @@ def main() -> None:
         published = f"{TABLE[number]} (references 1 to 6: {REFERENCES[number]})"
         verdict = f"{verdicts[number]} (ten seeds at the benchmark's instant: y x)" if number == 2 else verdicts[number]
         sheet.add(f"fault {number}: detected, limit kept", "", published, verdict, why)
+    lost = json.loads((Path(__file__).parent / "numbers" / "51_efficiency.json").read_text(encoding="utf-8"))["lines"][
+        0
+    ]
+    told = "y" if lost["quantity"] == "0.97 to 0.25" and lost["measured"] < np.inf else "x"
+    published = f"{TABLE[10]} (references 1 to 6: {REFERENCES[10]})"
+    sheet.add("fault 10: detected, limit kept", "", published, f"{told} {told}", EFFICIENCY)
     false = float(short.false.sum() + slow.false.sum())
     sheet.add("other alarms than the fault's own, all runs", "1", None, false, "limits from ten other runs of 4400 s")
 
