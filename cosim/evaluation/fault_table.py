@@ -36,6 +36,18 @@ SHORT = (
     "max |p| [m]",
 )
 
+POSITIONS = 2
+"""How many columns at the end are of positions."""
+
+
+def columns(found: Sequence[FaultDetection]) -> int:
+    """How many of `HEADINGS` are shown: those of positions only where an observer has any before a balise.
+
+    Args:
+        found: of all observers.
+    """
+    return len(HEADINGS) - (0 if any(one.position_errors for one in found) else POSITIONS)
+
 
 def cells(found: FaultDetection, limit: float | None = None) -> list[str]:
     """The numbers of an observer, in the order of `HEADINGS`; delays are means.
@@ -73,8 +85,9 @@ def fault_text(found: Sequence[FaultDetection], spec: ReportSpec) -> str:
     if not found:
         return ""
     heading = spec.detection.replace("_", " ") + "s" if spec.detection == ReportSpec.detection else spec.detection
+    last = columns(found) + 1
     rows = [[heading, *SHORT], *([label(spec, f.observer), *cells(f, spec.delay_limit)] for f in found)]
-    return "\n".join(text_table(rows, (0,), heading=True))
+    return "\n".join(text_table([row[:last] for row in rows], (0,), heading=True))
 
 
 def _span(interval: Interval) -> str:

@@ -13,7 +13,7 @@ from cosim.evaluation.cost import KINDS, cost_rows
 from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.facts import list_entry, mapping_entry
 from cosim.evaluation.fault_detection import fault_detection
-from cosim.evaluation.fault_table import HEADINGS, cells
+from cosim.evaluation.fault_table import HEADINGS, cells, columns
 from cosim.evaluation.indicators import indicator_statistics
 from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import label
@@ -149,8 +149,10 @@ def faults_table(result: Result, spec: ReportSpec) -> Table:
         result: the run.
         spec: roles and labels.
     """
-    rows = [[label(spec, found.observer), *cells(found, spec.delay_limit)] for found in fault_detection(result, spec)]
-    return simple_table(["Observer", *HEADINGS], rows, range(1, len(HEADINGS) + 1))
+    found = fault_detection(result, spec)
+    shown = columns(found)
+    rows = [[label(spec, one.observer), *cells(one, spec.delay_limit)[:shown]] for one in found]
+    return simple_table(["Observer", *HEADINGS[:shown]], rows, range(1, shown + 1))
 
 
 def consistency_table(result: Result, spec: ReportSpec) -> Table:

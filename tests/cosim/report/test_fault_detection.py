@@ -72,7 +72,11 @@ def test_faults_misses_false_alarms_and_delays() -> None:
     assert "(within 0.500)" in cells(replace(found, faults=2), 0.5)[5]  # none missed, none later
     assert "(not within 0.499)" in cells(replace(found, faults=2), 0.499)[5]
     assert fault_detection(result, replace(SPEC, detection="position"))[0].detected == 3  # never zero then
-    assert len(fault_text([found, alone], SPEC).splitlines()) == 4
+    text = fault_text([found, alone], SPEC)
+    assert len(text.splitlines()) == 4
+    nowhere = [replace(one, position_errors=()) for one in (found, alone)]
+    left = fault_text(nowhere, SPEC)  # a turbine has no position
+    assert ("mean |p|" in text, "mean |p|" in left, "outside [s]" in left) == (True, False, True)
     assert len(faults_table(result, SPEC).groups[0][1]) == 2
 
 
