@@ -1,21 +1,18 @@
-"""A cart with an inverted double pendulum, without friction, in its repaired and its printed equations. Knows only the
+"""A cart with an inverted double pendulum, without friction, with its signs repaired or as printed. Knows only the
 hybrid foundation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any
 
 import numpy as np
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant, solved_3
 from plant_models.hybrid import input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
-
-Equations = Literal["repaired", "as_printed_4_13", "as_printed_4_11"]
-EQUATIONS: tuple[Equations, ...] = ("repaired", "as_printed_4_13", "as_printed_4_11")
 
 
 @dataclass(frozen=True)
@@ -24,7 +21,8 @@ class DoublePendulumConstants:
 
     Attributes:
         cart_mass: M [kg]. first_mass: m1 [kg]. second_mass: m2 [kg]. first_length: l1, joint to mass centre [m].
-        second_length: l2 [m]. gravity: g [m/s2].
+        second_length: l2 [m]. gravity: g [m/s2]. coupling_sign: of the coupling to the cart in A(q) [1].
+        centrifugal_sign: of the terms with ``sin(a2 - a1)`` in b2 and b3 [1].
     """
 
     cart_mass: float = 1.5
@@ -33,6 +31,8 @@ class DoublePendulumConstants:
     first_length: float = 0.5
     second_length: float = 0.75
     gravity: float = 9.81
+    coupling_sign: float = 1.0
+    centrifugal_sign: float = 1.0
 
 
 SECTION_IV_2_2_3 = DoublePendulumConstants()
@@ -47,14 +47,10 @@ class CartDoublePendulum(NoisyPlant):
     towards -x, and the centrifugal terms of b1 those of angles that count towards +x: 335.2 J. The thesis prints no
     start, input or noise: (0.3, -0.2) rad at rest and no noise are ours.
 
-    Presets: `free_fall` (default); `annex_c`, with m1 = 0.2 kg as the annex has it; `noisy`, with noise of variance
-    1e-6 on each state and 1e-2 on each measurement [ours]; `upright`, at rest.
-
-    Args:
-        equations: ``repaired``; ``as_printed_4_13``, which is (4.13) with (4.14); ``as_printed_4_11``.
-
-    Raises:
-        ValueError: another word.
+    Presets: `repaired` (default), free fall from there; `as_published`, the same with the signs of (4.13) and (4.14);
+    `as_published_4_11`, with those of (4.11); `annex_c`, repaired, with m1 = 0.2 kg as the annex has it; `noisy`,
+    repaired, with noise of variance 1e-6 on each state and 1e-2 on each measurement [ours]; `upright`, repaired, at
+    rest.
     """
 
     name = "cart_double_pendulum"
@@ -80,18 +76,16 @@ class CartDoublePendulum(NoisyPlant):
         output_signal("energy", "J", "Kinetic and potential energy; zero height is that of the lower joint"),
     )
     presets: Mapping[str, Mapping[str, Any]] = {
-        "free_fall": {},
+        "repaired": {},
+        "as_published": {"centrifugal_sign": -1.0},
+        "as_published_4_11": {"coupling_sign": -1.0},
         "annex_c": {"first_mass": 0.2},
         "noisy": {"process_noise": 1e-3, "measurement_noise": 0.1},
         "upright": {"lower_angle": 0.0, "upper_angle": 0.0},
     }
-    default_preset = "free_fall"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"equations": EQUATIONS}
+    default_preset = "repaired"
 
-    def __init__(self, equations: Equations = "repaired") -> None:
-        if equations not in EQUATIONS:
-            raise ValueError(f"{self.name}: unknown equations {equations!r}; choose one of: {', '.join(EQUATIONS)}.")
-        self.equations = equations
+    def __init__(self) -> None:
         values = SECTION_IV_2_2_3
         self.declare(
             (
@@ -108,14 +102,30 @@ class CartDoublePendulum(NoisyPlant):
                 parameter("first_length", "m", values.first_length, "Half length l1 of the lower rod", min=1e-3),
                 parameter("second_length", "m", values.second_length, "Half length l2 of the upper rod", min=1e-3),
                 parameter("gravity", "m/s2", values.gravity, "Acceleration of gravity", min=0.0),
+                parameter(
+                    "coupling_sign",
+                    "1",
+                    1.0,
+                    "Sign of the coupling to the cart; -1 as (4.11) prints it",
+                    min=-1.0,
+                    max=1.0,
+                ),
+                parameter(
+                    "centrifugal_sign",
+                    "1",
+                    1.0,
+                    "Sign of the terms with sin(a2 - a1); -1 as (4.14) prints it",
+                    min=-1.0,
+                    max=1.0,
+                ),
             ),
             period=1e-3,
         )
-        super().__init__(equations=equations)
+        super().__init__()
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of the six states, shape (6,) or (6, members)."""
-        return double_pendulum_flow(x, u.force, p, self.equations)
+        return double_pendulum_flow(x, u.force, p)
 
     def measured(self, x: Array) -> tuple[Array, ...]:
         """Position and both angles: (4.18)."""
@@ -123,7 +133,7 @@ class CartDoublePendulum(NoisyPlant):
 
     def plain(self, x: Array, p: Any) -> dict[str, Array]:
         """The states and the energy, as the mass matrix in use has it."""
-        a11, a12, a13, a22, a23, a33 = mass_matrix(x, p, self.equations)
+        a11, a12, a13, a22, a23, a33 = mass_matrix(x, p)
         kinetic = 0.5 * (a11 * x[1] ** 2 + a22 * x[3] ** 2 + a33 * x[5] ** 2)
         coupled = a12 * x[1] * x[3] + a13 * x[1] * x[5] + a23 * x[3] * x[5]
         heights = both_masses(p) * p.first_length * np.cos(x[2]) + p.second_mass * p.second_length * np.cos(x[4])
@@ -142,35 +152,32 @@ def both_masses(p: Any) -> Array:
     return p.first_mass + 2.0 * p.second_mass
 
 
-def mass_matrix(x: Array, p: Any, equations: Equations = "repaired") -> tuple[Array, ...]:
+def mass_matrix(x: Array, p: Any) -> tuple[Array, ...]:
     """Entries 11, 12, 13, 22, 23, 33 of the symmetric matrix A(q): (4.13).
 
     Args:
-        x: state, shape (6,) or (6, members). p: constants by the names of `DoublePendulumConstants`. equations: see
-            `CartDoublePendulum`.
+        x: state, shape (6,) or (6, members). p: constants by the names of `DoublePendulumConstants`.
     """
-    towards = -1.0 if equations == "as_printed_4_11" else 1.0
     lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
     return (
         p.cart_mass + p.first_mass + p.second_mass,
-        towards * lower * np.cos(x[2]),
-        towards * upper * np.cos(x[4]),
+        p.coupling_sign * lower * np.cos(x[2]),
+        p.coupling_sign * upper * np.cos(x[4]),
         4.0 * (p.first_mass / 3.0 + p.second_mass) * p.first_length**2,
         2.0 * upper * p.first_length * np.cos(x[4] - x[2]),
         4.0 / 3.0 * upper * p.second_length,
     )
 
 
-def right_hand_side(x: Array, force: Array, p: Any, equations: Equations = "repaired") -> tuple[Array, Array, Array]:
+def right_hand_side(x: Array, force: Array, p: Any) -> tuple[Array, Array, Array]:
     """b1, b2 and b3: (4.14), with its signs repaired or not.
 
     Args:
         x: state, shape (6,) or (6, members). force: on the cart [N]. p: constants by the names of
-            `DoublePendulumConstants`. equations: see `CartDoublePendulum`.
+            `DoublePendulumConstants`.
     """
     lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
-    sign = -1.0 if equations == "as_printed_4_13" else 1.0
-    centrifugal = sign * 2.0 * upper * p.first_length * np.sin(x[4] - x[2])
+    centrifugal = p.centrifugal_sign * 2.0 * upper * p.first_length * np.sin(x[4] - x[2])
     return (
         force + lower * x[3] ** 2 * np.sin(x[2]) + upper * x[5] ** 2 * np.sin(x[4]),
         lower * p.gravity * np.sin(x[2]) + centrifugal * x[5] ** 2,
@@ -178,13 +185,13 @@ def right_hand_side(x: Array, force: Array, p: Any, equations: Equations = "repa
     )
 
 
-def double_pendulum_flow(x: Array, force: Array, p: Any, equations: Equations = "repaired") -> Array:
+def double_pendulum_flow(x: Array, force: Array, p: Any) -> Array:
     """Derivatives of position, speed, both angles and their rates, shape (6,) or (6, members): (4.12) solved.
 
     Args:
         x: state, shape (6,) or (6, members). force: on the cart [N]. p: constants by the names of
-            `DoublePendulumConstants`. equations: see `CartDoublePendulum`.
+            `DoublePendulumConstants`.
     """
-    matrix, right = mass_matrix(x, p, equations), right_hand_side(x, force, p, equations)
+    matrix, right = mass_matrix(x, p), right_hand_side(x, force, p)
     acceleration, lower, upper = solved_3(matrix, right)
     return vector(x[1], acceleration, x[3], lower, x[5], upper)
