@@ -70,7 +70,7 @@ def _response(actuator: ActuatorParameters, reference: np.ndarray, sample_period
     square, slope = actuator.frequency**2, 2.0 * actuator.damping * actuator.frequency
     held = scipy.signal.cont2discrete(([square], [1.0, slope, square]), sample_period)
     ahead = np.append(reference[1:], 0.0) - reference[0]  # what acts from this sample on
-    return reference[0] + scipy.signal.lfilter(held[0].ravel(), held[1], ahead)
+    return np.asarray(reference[0] + scipy.signal.lfilter(held[0].ravel(), held[1], ahead))
 
 
 def _terms(filters: ResidualFilter, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:

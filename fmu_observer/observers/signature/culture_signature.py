@@ -183,7 +183,7 @@ class CultureSignature(SignatureObserver):
             errors.append(np.sqrt(np.mean(((told - true)[1:] / widths) ** 2, axis=1)))
         return np.array(errors)
 
-    def _at(self, X: np.ndarray, places: np.ndarray, p: Any) -> np.ndarray:
+    def _at(self, X: np.ndarray, places: np.ndarray, p: Any) -> Array:
         """States at places of the tube, of shape (2, ..., m) from -1 to 1, shape (3, ..., m)."""
         S = np.interp(X, p.nominal_biomass, p.nominal_glycerol) + p.glycerol_width * places[0]
         P = np.interp(X, p.nominal_biomass, p.nominal_enzyme) + p.enzyme_width * places[1]
