@@ -152,6 +152,56 @@ def checked(
     return alarm_rate(alarms, sum(map(len, kept)) * sample_period / HOUR, confidence)
 
 
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A window of a residual that sees all faults it was shown.
+
+    Attributes:
+        samples: its length N. threshold: of the sum of squares. delays: of each fault, samples from its onset on.
+    """
+
+    samples: int
+    threshold: float
+    delays: tuple[int, ...]
+
+
+def smallest_window(
+    free: Sequence[np.ndarray],
+    faulty: Sequence[np.ndarray],
+    onset: int,
+    windows: Sequence[int],
+    margin: float = 1.05,
+) -> Window | None:
+    """Shortest window whose sum of squares shows every fault: Omar 2012, 7.5.1 (iv), begin with the window that keeps
+    the limit of the delay, and enlarge it until it detects.
+
+    Args:
+        free: residuals x without a fault, each of shape (samples,). faulty: residuals with one from sample `onset` on.
+        onset: its place. windows: lengths N in the order in which they are tried. margin: see `largest_threshold`.
+
+    Returns:
+        The first that sees all faults, with the threshold that its fault-free sums ask for; None where none does.
+
+    Raises:
+        ValueError: there is no recording, a window is longer than one, or a value is not finite.
+    """
+    quiet, loud = _checked(free), _checked(faulty)
+    for samples in windows:
+        if not 1 <= samples <= min(map(len, (*quiet, *loud))):
+            raise ValueError(f"smallest_window: a window of {samples} samples; expected 1 to the shortest recording.")
+        threshold = largest_threshold([_sums(x, samples) for x in quiet], margin)
+        # The sum of index i ends at sample i + N - 1 and is the first to hold the fault where that is the onset.
+        above = [np.flatnonzero(_sums(x, samples)[max(onset - samples + 1, 0) :] > threshold) for x in loud]
+        if all(found.size for found in above):
+            return Window(samples, threshold, tuple(int(found[0]) for found in above))
+    return None
+
+
+def _sums(residual: np.ndarray, samples: int) -> np.ndarray:
+    """Sums of squares over windows, one for each that is full."""
+    return np.convolve(residual**2, np.ones(samples), "valid")
+
+
 def _checked(recordings: Sequence[np.ndarray]) -> list[np.ndarray]:
     kept = [np.asarray(values, dtype=float).ravel() for values in recordings]
     if not kept or any(values.size == 0 for values in kept):

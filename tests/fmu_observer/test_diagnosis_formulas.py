@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
+from fmu_observer.diagnosis.actuator_identification import ActuatorParameters, identified_actuator
 from fmu_observer.diagnosis.redundancy import larger
 from fmu_observer.diagnosis.residual_filters import filtered, residual_filter, settled
 from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
@@ -85,3 +86,20 @@ def test_a_grid_that_does_not_bracket_is_told() -> None:
         grid_around(1.0, 1)
     with pytest.raises(ValueError, match="equally many"):
         invert([1.0, 2.0], [0.0], 1.0)
+
+
+def test_a_nominal_response_takes_the_bias_of_the_noise_off_the_actuators_parameters() -> None:
+    rng = np.random.default_rng(1)
+    reference = np.repeat(rng.uniform(0.0, 1.5, 100), 50)  # [deg]: steps each 0.5 s
+    held = scipy.signal.cont2discrete(([11.11**2], [1.0, 2.0 * 0.6 * 11.11, 11.11**2]), 0.01)
+    true = scipy.signal.lfilter(held[0].ravel(), held[1], np.append(reference[1:], 0.0))
+    assert identified_actuator(true, reference, 0.01) == pytest.approx((11.11, 0.6), rel=5e-3)  # of Tustin's rule
+    noisy = true + 0.2 * rng.standard_normal(true.size)
+    biased = identified_actuator(noisy, reference, 0.01)
+    assert biased.damping < 0.9 * 0.6
+    nominal = ActuatorParameters(5.73, 0.45)  # far off
+    assert identified_actuator(noisy, reference, 0.01, nominal=nominal) == pytest.approx((11.11, 0.6), rel=0.03)
+    with pytest.raises(ValueError, match="one length"):
+        identified_actuator(noisy[:-1], reference, 0.01)
+    with pytest.raises(ValueError, match="does not move"):
+        identified_actuator(np.ones(200), np.ones(200), 0.01)

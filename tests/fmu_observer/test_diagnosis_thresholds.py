@@ -16,6 +16,7 @@ from fmu_observer.diagnosis.thresholds import (
     largest_threshold,
     proportion_interval,
     rate_threshold,
+    smallest_window,
 )
 
 
@@ -114,3 +115,18 @@ def test_the_thresholds_in_use_are_those_of_the_study_rounded_up() -> None:
         preset = starts if i < 8 else starts | dict(TrainDiagnosis.presets["wet_rails"])
         assert preset[name] == pytest.approx(float(used), rel=1e-4), name  # printed with four digits
         assert float(asked) <= float(used) <= 1.5 * float(asked), name
+
+
+def test_a_window_is_enlarged_until_it_shows_the_fault() -> None:
+    rng = np.random.default_rng(0)
+    free = [rng.normal(size=4000) for _ in range(4)]
+    faulty = [np.concatenate([rng.normal(size=100), 1.6 * rng.normal(size=60)]) for _ in range(3)]
+    found = smallest_window(free, faulty, 100, (1, 3, 10, 30, 60))
+    assert found is not None
+    assert 1 < found.samples < 60  # no single sample of 60 is larger than the largest of 16000 without a fault
+    for x, delay in zip(faulty, found.delays, strict=True):
+        sums = [np.sum(x[max(k - found.samples + 1, 0) : k + 1] ** 2) for k in range(100, 160)]
+        assert int(np.argmax(np.array(sums) > found.threshold)) == delay
+    assert smallest_window(free, [x[:160] for x in free], 100, (1, 30)) is None
+    with pytest.raises(ValueError, match="shortest recording"):
+        smallest_window(free, faulty, 100, (501,))
