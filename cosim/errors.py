@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-ALIKE = 0.6
+ALIKE = 0.65
 """Share of letters, as difflib counts them, from which on two names are near: below it, a hint leads astray."""
 MOST_HINTS = 3
 SHORTEST_PART = 3
