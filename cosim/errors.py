@@ -5,6 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+ALIKE = 0.65
+"""Share of letters, as difflib counts them, from which on two names are near: below it, a hint leads astray."""
+MOST_HINTS = 3
+SHORTEST_PART = 3
+"""Letters from which on a part of a name is a hint."""
+
 
 class CosimError(Exception):
     """Base of all errors that are explained to the user without a traceback."""
@@ -62,11 +68,15 @@ class RunError(CosimError, RuntimeError):
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint with the names nearest to a misspelt one, or all of them, 20 at most, where none is near.
 
+    Near is a name of which most letters stand in the same order, or that holds the given one whole.
+
     Args:
         name: as it was given. known: names that exist.
     """
     names = list(known)
-    close = get_close_matches(name, names, 3, 0.5)
+    close = get_close_matches(name, names, MOST_HINTS, ALIKE)
+    if not close and len(name) >= SHORTEST_PART:
+        close = [n for n in names if name.lower() in n.lower()][:MOST_HINTS]
     if close:
         return f"did you mean {', '.join(repr(n) for n in close)}?"
     shown = ", ".join(names[:20]) + (f", and {len(names) - 20} more" if len(names) > 20 else "")

@@ -58,8 +58,8 @@ def recipe(name: str, **options: Any) -> HybridSystem:
     known = recipe_options(name)
     for option in options:
         if option not in known:
-            has = ", ".join(known) or "none"
-            raise UnknownRecipeError(f"{name} has no option {option!r}{_nearest(option, known)}; it has: {has}.")
+            hint, has = _nearest(option, known) or ".", ", ".join(known) or "none"
+            raise UnknownRecipeError(f"{name} has no option {option!r}{hint} It has: {has}.")
     return RECIPES[name](**options)
 
 

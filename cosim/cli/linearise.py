@@ -31,7 +31,8 @@ def register(commands: Any) -> None:
     """
     text = (
         "Linearise an FMU, a plant or an observer at a point. Model exchange and models of ours give matrices of "
-        "continuous time, an FMU with co-simulation only those from one communication step to the next."
+        "continuous time, an FMU with co-simulation only those from one communication step to the next. Events, such "
+        "as samples, are left out, and said."
     )
     epilog = "Exit codes: 0 done, 2 error."
     parser = commands.add_parser("linearise", description=text, epilog=epilog)

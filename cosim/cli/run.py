@@ -190,6 +190,10 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
+    if outcome.failure is not None and summary["reached"] <= summary["start"]:
+        print(f"cosim: the run could not begin: {plain(outcome.failure)}", file=sys.stderr)
+        _list(paths)  # figures of a run that did not take a step would hide why
+        return
     print(_headline(summary))
     if outcome.result.table.size:
         metrics = [m for m in phase_metrics(outcome.result, outcome.spec) if m.speed or m.position]
@@ -206,10 +210,14 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         print(study.text())
     if outcome.expectations:
         print(outcome.expectations_text(), end="\n\n")
-    for kind, path in paths.items():
-        print(f"{kind:>10}: {path}")
+    _list(paths)
     if outcome.failure is not None:
         print(f"cosim: the run ended early: {plain(outcome.failure)}", file=sys.stderr)
+
+
+def _list(paths: dict[str, Path]) -> None:
+    for kind, path in paths.items():
+        print(f"{kind:>10}: {path}")
 
 
 def _headline(summary: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,9 @@ from fmus.check.derivatives import RELATIVE_STEP, compare
 from fmus.check.findings import Verdict
 
 Array = NDArray[np.float64]
+HELD_TYPES = ("Real", "Float64", "Float32")
+MOST_NAMED = 6
+"""Names of held variables in a sentence."""
 Function = Callable[[Array, Array], tuple[Array, Array]]  # (states, inputs) -> (rates or next states, outputs)
 
 
@@ -88,8 +92,10 @@ def linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: floa
     method: Method = "central differences"
     if isinstance(model, ExchangeModel):
         model.restart(t, x, u)
+        remarks += _held_between_events(model)
         function, length = _continuous(model, t), 0.0
     else:
+        remarks += _held_between_events(model)
         function, length = _sampled(model, t, step), step
         remarks += _doubts(model, step)
     rates, y = function(x, u)
@@ -169,6 +175,48 @@ def _sampled(model: SealedModel, t: float, step: float) -> Function:
         return model.read()[0], y
 
     return function
+
+
+def _held_between_events(model: SealedModel) -> list[str]:
+    """What the matrices leave out of an FMU with samples of its own: values and clocks that only an event changes.
+
+    Args:
+        model: the FMU; one of model exchange stands at a restart, where it has told its next event.
+
+    Returns:
+        One sentence or none.
+    """
+    variables = model.instance.description.modelVariables
+    held = [
+        v.name
+        for v in variables
+        if v.type in HELD_TYPES
+        and v.variability == "discrete"
+        and v.name not in model.states
+        and v.causality in ("output", "local")
+    ]
+    clocks = [v.name for v in variables if v.type == "Clock"]
+    announced = getattr(model.instance, "next_event", inf)
+    if not held and not clocks and not isfinite(announced):
+        return []
+    found = [f"it holds {_some(held)} between events"] if held else []
+    found += [f"it has clocks ({_some(clocks)})"] if clocks else []
+    found += [f"it announces an event at t = {announced:.9g} s"] if isfinite(announced) else []
+    if isinstance(model, ExchangeModel):
+        advice = (
+            "What an event does is not in these matrices. For a sampled signal take A and B over one sampling period, "
+            "and C of the signal before it is sampled."
+        )
+    else:
+        advice = (
+            "A and B hold what falls into this one step, C and D what is held at its begin: a sample or a quantiser "
+            "has no slope. Where the FMU has model exchange, --interface model-exchange gives what lies between events."
+        )
+    return [f"The FMU has events of its own: {', '.join(found)}. {advice}"]
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
 
 
 def _doubts(model: SealedModel, step: float) -> list[str]:

@@ -267,7 +267,10 @@ class SealedModel(ABC):
             try:
                 self.instance.variables.element(name)
             except KeyError as error:
-                hint = nearest(name, own or [v.name for v in self.instance.description.modelVariables])
+                found = self.instance.description.modelVariables
+                settable = [v.name for v in found if v.causality != "input" and v.initial in ("exact", "approx")]
+                every = settable if what == "parameter" else [v.name for v in found]
+                hint = nearest(name, own or every)
                 raise FmuModelError(f"{self.path}: no {what} {name!r}; {hint}") from error
         return given
 

@@ -26,16 +26,21 @@ class WindowObservability(NamedTuple):
     states: tuple[str, ...]
 
     def explain(self) -> str:
-        """In words: every state, or the directions that are not told."""
+        """In words, with a window as the subject: it tells every state, or which directions it does not."""
         if not self.unseen.shape[1]:
-            return "its rows alone tell every state"
+            return "tells all of them without the arrival cost"
         directions = "; ".join(self._direction(column) for column in self.unseen.T)
-        return f"its rows alone do not tell {directions}, which only the arrival cost knows"
+        return (
+            f"tells {self.rank} without the arrival cost; it does not tell {directions}, which is known only from what "
+            "was measured before. A longer window may tell it"
+        )
 
     def _direction(self, column: np.ndarray) -> str:
         largest = column[np.argmax(np.abs(column))]
-        named = zip(self.states, column / largest, strict=True)
-        return " ".join(f"{value:+.3g} {name}" for name, value in named if abs(value) > PART)
+        parts = [(name, v) for name, v in zip(self.states, column / largest, strict=True) if abs(v) > PART]
+        if len(parts) == 1:
+            return parts[0][0]
+        return "the combination " + " ".join(f"{value:+.3g} {name}" for name, value in parts)
 
 
 def window_observability(model: FilterModel, known: Known, period: float, rows: int) -> WindowObservability:

@@ -29,16 +29,18 @@ def steady_condition(
     steady, matrix = steady_filter(F, H, Q, R), observability_matrix(F, H)
     where = "" if model.linear else ", linearised at the start of the estimates"
     driven = observability_matrix(F.T, Q)
+    rank, reached = int(np.linalg.matrix_rank(matrix)), int(np.linalg.matrix_rank(driven))
     return Condition(
         holds=steady is not None,
         values={
-            "rank": int(np.linalg.matrix_rank(matrix)),
+            "rank": rank,
             "order": model.order,
-            "driven": int(np.linalg.matrix_rank(driven)),
+            "driven": reached,
             "smallest_singular_value": float(np.linalg.svd(matrix)[1][-1]),
             "spectral_radius": np.inf if steady is None else steady.spectral_radius,
         },
-        statement="the Riccati equation has a stabilising solution (spectral_radius of A (I - K C) < 1); rank states "
-        f"are measured, driven states are reached by the process noise{where}",
+        statement="the gain settles and errors die out: the stationary Riccati equation has a stabilising solution, "
+        f"with spectral_radius of A (I - K C) below 1{where}. Of {model.order} states the measurements observe {rank}, "
+        f"and the process noise drives {reached}",
         source=source,
     )

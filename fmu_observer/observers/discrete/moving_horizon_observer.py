@@ -171,10 +171,11 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         inputs = stacked(tuple(float(s.start_values[0]) for s in model.inputs))
         known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))
         told_by = window_observability(model, known, float(p.sample_period), self.window)
+        rows = f"A window of {self.window} full row{'s' if self.window > 1 else ''}"
         return replace(
             steady,
             values={**steady.values, "window_rank": told_by.rank},
-            statement=f"{steady.statement}; of a window of {self.window} full rows {told_by.explain()}",
+            statement=f"{steady.statement}. {rows} {told_by.explain()}",
         )
 
     @cached_property

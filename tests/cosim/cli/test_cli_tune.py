@@ -59,6 +59,7 @@ def test_two_workers_find_what_one_does(file: Path, capsys: pytest.CaptureFixtur
         (["--parameters", "train.mass"], "expected NAME=LOW:HIGH"),
         (["--parameters", "train.mass=3:1", "--cost", "expectation:1"], "the lower one first"),
         (["--parameters", "train.mas=1:3", "--cost", "expectation:1"], "did you mean 'mass'"),
+        (["--parameters", "train.fuss=1:3", "--cost", "expectation:1"], "no 'fuss'; known: "),
         (["--parameters", "trian.mass=1:3", "--cost", "expectation:1"], "did you mean 'train'"),
         (["--parameters", "train.mass=60e3:70e3"], "name it (--observer NAME)"),
         (["--parameters", "train.mass=60e3:70e3", "--cost", "expectation:2"], "known: 1 (it is fast)"),

@@ -168,5 +168,16 @@ def test_a_model_without_states_is_told(capsys: pytest.CaptureFixture[str]) -> N
     assert "inverter: it has no continuous states" in capsys.readouterr().err
 
 
+def test_samples_of_an_fmu_are_told(locomotive: Path) -> None:
+    path = fmus.cached_fmu(PLANTS["odometer"](), fmi_version=3)
+    between = " ".join(linearise_fmu(path).remarks)
+    assert "it holds " in between
+    assert "it announces an event at t = " in between
+    assert "not in these matrices" in between
+    within = " ".join(linearise_fmu(path, interface="co-simulation").remarks)
+    assert "has no slope" in within
+    assert "events of its own" not in " ".join(linearise_fmu(locomotive).remarks)
+
+
 def test_a_kink_is_not_called_a_lie(locomotive: Path) -> None:
     assert "the model has a kink here" in linearise_fmu(locomotive).remarks[0]  # the train stands

@@ -127,5 +127,5 @@ def test_vectors_of_scalars_and_structural_parameters_first() -> None:
         start_values(made, {"count": 5})
     with pytest.raises(CouplingError, match=r"mock.count = 0 is outside of what the component declares: 1 to 4"):
         made.configure({"count": 0})
-    with pytest.raises(CouplingError, match=r"mock: no variable 'mas'; did you mean 'mass\[2\]', 'mass\[1\]'\?"):
+    with pytest.raises(CouplingError, match=r"mock: no variable 'mas'; did you mean 'mass\[1\]', 'mass\[2\]'\?"):
         start_values(made, {"mas": 1.0})
