@@ -41,6 +41,7 @@ from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.balise_summary import all_telegrams, balise_summary
 from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.conditions import check_conditions
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.coupling_warnings import coupling_warnings, interpolation_note, late_telegram_warnings
 from cosim.scenario.instances import check_instances
@@ -171,8 +172,7 @@ class _Setup:
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
         order = [name for group in groups for name in group.names]
         starts = {n: self._start_values(n, c) for n, c in self.components.items()}
-        if layout is not None:
-            self._check_certificates(layout, receivers)
+        self._check_certificates(layout, receivers)
         self._instantiate(starts, connections)
         self.plan = self._make_plan(routed, order, clocks)
         doubts, notes = coupling_warnings(table, self.components, connections)
@@ -344,12 +344,12 @@ class _Setup:
         plant = watched_plant(balises, self.components, self.where)
         return find_receivers(balises, self.components, plant, self.where), plant
 
-    def _check_certificates(self, layout: Layout, receivers: list[str]) -> None:
-        assert self.table.balises is not None
-        gap = expected_gap(layout, self.table.balises, self.table.start)
-        tables = {n: self.table.components[n] for n in receivers}
-        self.certificates, warnings = check_certificates(tables, gap, self.table.certificates, self.where)
-        for warning in warnings:
+    def _check_certificates(self, layout: Layout | None, receivers: list[str]) -> None:
+        table, of_gaps = self.table, list[str]()
+        if layout is not None and table.balises is not None:
+            gap, tables = expected_gap(layout, table.balises, table.start), {n: table.components[n] for n in receivers}
+            self.certificates, of_gaps = check_certificates(tables, gap, table.certificates, self.where)
+        for warning in (*of_gaps, *check_conditions(table.components, table.certificates, self.where)):
             self._warn(warning)
 
     def _add_balises(self, layout: Layout, plant: str, receivers: list[str], starts: dict[str, StartValue]) -> None:

@@ -172,10 +172,12 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))
         told_by = window_observability(model, known, float(p.sample_period), self.window)
         rows = f"A window of {self.window} full row{'s' if self.window > 1 else ''}"
+        told = f"{rows} {told_by.explain()}"
         return replace(
             steady,
             values={**steady.values, "window_rank": told_by.rank},
-            statement=f"{steady.statement}. {rows} {told_by.explain()}",
+            statement=f"{steady.statement}. {told}",
+            doubts=(told,) if told_by.unseen.size else (),
         )
 
     @cached_property

@@ -1,0 +1,57 @@
+"""Conditions before the run: observers whose states their measurements do not tell, or whose gains cannot be stable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cosim.errors import CertificateError
+from cosim.scenario.certificates import given_parameters
+from cosim.scenario.models import make_system
+from cosim.scenario.tables import ComponentTable
+from plant_models.disk_cache.entries import remembered
+from plant_models.disk_cache.identity import identity
+
+
+def check_conditions(components: Mapping[str, ComponentTable], mode: str, where: str) -> list[str]:
+    """What speaks against the observers that state a condition; those with a certificate are judged by that instead.
+
+    Args:
+        components: tables of all components by name. mode: ``warn``, ``require`` or ``ignore``.
+        where: name of the scenario, for messages.
+
+    Returns:
+        Warnings: conditions that do not hold, and states that a window does not tell.
+
+    Raises:
+        CertificateError: `mode` is ``require`` and there is such a warning.
+    """
+    warnings: list[str] = []
+    if mode == "ignore":
+        return warnings
+    for name, table in components.items():
+        if table.observer is None:
+            continue
+        system: Any = make_system(table, where)
+        if hasattr(system, "condition") and not hasattr(system, "certify"):
+            warnings += [f"{name}: {doubt}" for doubt in _known_doubts(name, table, system)]
+    if mode == "require" and warnings:
+        raise CertificateError(f"{where}: certificates = 'require' and not all hold.\n" + "\n".join(warnings))
+    return warnings
+
+
+def _known_doubts(name: str, table: ComponentTable, system: Any) -> list[str]:
+    """What `_doubts` says, from the cache where it was asked before."""
+    asked = name, system, table.preset, given_parameters(table, system)
+    key = identity(asked, code=("fmu_observer", "cosim/scenario/conditions.py"))
+    return remembered("condition", key, lambda: _doubts(table, system))  # type: ignore[no-any-return]
+
+
+def _doubts(table: ComponentTable, system: Any) -> list[str]:
+    """What the condition of one observer says against it, or why it cannot be judged."""
+    try:
+        condition = system.condition(given_parameters(table, system), table.preset)
+    except (ValueError, ArithmeticError) as error:
+        return [f"its condition cannot be judged with these parameters: {error}."]
+    refuted = [] if condition.holds else [f"its condition {condition.explain()}"]
+    return [*refuted, *(f"{doubt}." for doubt in condition.doubts)]
