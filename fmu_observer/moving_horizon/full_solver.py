@@ -273,8 +273,7 @@ class _Search:
         given = (A, b, stages.F, stages.G, stages.moved - point.states)
         lower, upper = self.lower - point.states, self.upper - point.states
         if self.active(point.states) == 0 and not self.disturbed:
-            free = np.full(lower.shape, inf)
-            found = self.program.solve(*given, -free, free)
+            found = self.program.solve_free(*given)
             if found.solved and ((found.change >= lower) & (found.change <= upper)).all():
                 return found
         found = self.program.solve(*given, lower, upper, self.noise_limits)

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.optimize
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from fmu_observer.moving_horizon import gauss_newton
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
 from fmu_observer.moving_horizon.full_solver import Effort, FullSolver, WindowError
 from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.moving_horizon.window import RowLayout
+from fmu_observer.moving_horizon.window_program import SweptProgram, WindowProgram
 from plant_models.hybrid import vector
 
 LAYOUT = RowLayout(inputs=1, measurements=2)
@@ -227,3 +230,24 @@ def test_a_factor_graph_of_others_comes_to_the_same():
 def _shaken(x, row, shared):
     moved = _moved(x, row, shared)
     return moved._replace(noise=moved.noise + 0.01 * row.period * np.eye(2))  # they know no noise of rank one
+
+
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 6), order=st.integers(1, 4))
+@settings(max_examples=30)
+def test_a_sweep_over_free_rows_is_the_programme_without_bounds(seed: int, count: int, order: int) -> None:
+    """Rows without a measurement and states without noise among them; to the tolerance that PIQP is asked for, 1e-9 of
+    numbers of size one, with a margin for the prices of states that nothing moves.
+    """
+    rng, shape = np.random.default_rng(seed), (count, order, order)
+    roots, G = rng.normal(size=shape), np.tril(rng.normal(size=shape))
+    roots[rng.random(count) < 0.3], G[rng.random((count, order)) < 0.2] = 0.0, 0.0
+    A = np.einsum("kij,klj->kil", roots, roots)
+    b = np.einsum("kij,kj->ki", roots, rng.normal(size=(count, order)))
+    F = np.eye(order) + 0.3 * rng.normal(size=shape)
+    F[0] = 0.0
+    programme = A, b, F, G, 0.1 * rng.normal(size=(count, order))
+    swept, solved = (program(count, order).solve_free(*programme) for program in (SweptProgram, WindowProgram))
+    assert swept.solved
+    assert solved.solved
+    for ours, theirs in zip(swept[:3], solved[:3], strict=True):
+        np.testing.assert_allclose(np.abs(ours), np.abs(theirs), atol=1e-6 * (1.0 + np.abs(theirs).max()))
