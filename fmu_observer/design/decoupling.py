@@ -15,7 +15,7 @@ from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.suitability import require_unknown_inputs
 from fmu_observer.observability import MeasuredSystem, require_detectable, unobservable_modes
-from fmu_observer.observability.modes import unobservable_basis
+from fmu_observer.observability.modes import unobservable_subspace
 
 STATEMENT = "rank(C H) = rank(H), and the invariant zeros of (A, H, C) lie in the left half plane"
 SOURCE = "Aguiar Cota 2019, (2.12); Darouach 1994"
@@ -130,7 +130,7 @@ def decoupled_gain(model: ObserverModel, poles: Sequence[float] | np.ndarray) ->
     """
     require_decoupling(model, "Decoupling")
     free, C = decoupling(model.A, np.asarray(model.H), model.C).free, model.C
-    hidden = unobservable_basis(free, C)
+    hidden = unobservable_subspace(free, C).basis
     seen = np.linalg.svd(hidden)[0][:, hidden.shape[1] :] if hidden.shape[1] else np.eye(len(free))
     if len(poles) < seen.shape[1]:
         raise ValueError(f"Decoupling: got {len(poles)} poles, expected {seen.shape[1]}, one for each mode to place.")

@@ -14,19 +14,18 @@ import numpy as np
 from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import (
+    ROUNDING,
     Mode,
     UnobservableError,
+    UnobservableSubspace,
     undetectable_modes,
-    unobservable_basis,
     unobservable_modes,
+    unobservable_subspace,
 )
 from fmu_observer.observability.pattern import SamplePattern
 
 PATTERN_TOLERANCE = 1e-9
 """Singular values of the measured rows below this share of the largest count as zero."""
-
-ROUNDING = 1e-13
-"""A measured row below this share of what its factors could give is rounding: it tells nothing."""
 
 BASE_NORM = 0.5  # of A h, for the step that the doubling starts from
 
@@ -175,11 +174,19 @@ def _transition(A: np.ndarray, gap: float) -> np.ndarray:
 
 
 def _unseen(scaled: MeasuredSystem, pattern: SamplePattern, tolerance: float) -> np.ndarray:
-    """Basis of what neither the continuous measurement, over any interval, nor a sample shows, shape (n, k)."""
+    """Basis of what neither the continuous measurement, over any interval, nor a sample shows, shape (n, k).
+
+    A measured row that is smaller than what rounding could have made of zero tells nothing.
+    """
     assert isinstance(scaled.C_continuous, np.ndarray)
     assert isinstance(scaled.C_sampled, np.ndarray)
     lasting = pattern.duration > 0.0 and len(scaled.C_continuous)
-    basis = unobservable_basis(scaled.A, scaled.C_continuous) if lasting else np.eye(scaled.order)
+    hidden = (
+        unobservable_subspace(scaled.A, scaled.C_continuous)
+        if lasting
+        else UnobservableSubspace(np.eye(scaled.order), ROUNDING)
+    )
+    basis = hidden.basis
     if not basis.shape[1]:
         return basis
     inner, rows, moved = basis.T @ scaled.A @ basis, [], np.eye(basis.shape[1])
@@ -187,7 +194,7 @@ def _unseen(scaled: MeasuredSystem, pattern: SamplePattern, tolerance: float) ->
         moved = _transition(inner, float(gap)) @ moved
         row = scaled.C_sampled @ basis @ moved
         possible = np.linalg.norm(scaled.C_sampled, axis=1, keepdims=True) * np.linalg.norm(moved, 2)
-        rows.append(np.where(np.linalg.norm(row, axis=1, keepdims=True) > ROUNDING * possible, row, 0.0))
+        rows.append(np.where(np.linalg.norm(row, axis=1, keepdims=True) > hidden.error * possible, row, 0.0))
     if not rows or not rows[0].size:
         return basis
     stacked = np.vstack(rows)

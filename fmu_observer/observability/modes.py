@@ -18,6 +18,12 @@ from fmu_observer.observability.measured_system import MeasuredSystem
 RANK_TOLERANCE = 1e-11
 """Singular values below this share of the norm of A, or of C, count as zero."""
 
+ROUNDING = 1e-13
+"""What rounding may leave of a zero, relative to the size of what could stand there: about 450 units in the last place.
+
+A subspace that follows from a smallest singular value s of a matrix of norm m is turned by rounding by about m / s
+times as much (Wedin's theorem on the angles of singular subspaces, 1972)."""
+
 PART = 1e-6
 """A state takes part in a mode when its entry is at least this share of the largest."""
 
@@ -87,7 +93,7 @@ def unobservable_modes(system: MeasuredSystem, tolerance: float = RANK_TOLERANCE
         The modes, the least stable first; one of each conjugate pair.
     """
     scaled = system.scaled()
-    basis = unobservable_basis(scaled.A, scaled.C, tolerance)
+    basis = unobservable_subspace(scaled.A, scaled.C, tolerance).basis
     if not basis.shape[1]:
         return []
     inner = basis.T @ scaled.A @ basis
@@ -131,23 +137,39 @@ def require_detectable(system: MeasuredSystem) -> None:
     _refuse(system, undetectable_modes(system), "no measurement shows, and no decay removes")
 
 
-def unobservable_basis(A: np.ndarray, C: np.ndarray, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
-    """Orthonormal basis of the unobservable subspace, the largest A-invariant one in the kernel of C, shape (n, k).
+@dataclass(frozen=True, eq=False)
+class UnobservableSubspace:
+    """The largest A-invariant subspace in the kernel of C, as computed.
+
+    Attributes:
+        basis: orthonormal, shape (n, k).
+        error: how far rounding may have turned it, as the sine of an angle; grows with the conditioning of what was
+            measured.
+    """
+
+    basis: np.ndarray
+    error: float
+
+
+def unobservable_subspace(A: np.ndarray, C: np.ndarray, tolerance: float = RANK_TOLERANCE) -> UnobservableSubspace:
+    """The unobservable subspace by a staircase of orthogonal steps, with what rounding makes of it.
 
     Args:
+        A: shape (n, n). C: shape (q, n).
         tolerance: below which a singular value counts as zero, relative to the largest.
     """
     basis, inner, seen = np.eye(len(A)), A, C
-    size = _norm(C)
+    size, error = _norm(C), ROUNDING
     while basis.shape[1]:
         _, values, directions = np.linalg.svd(seen) if len(seen) else (None, np.zeros(0), np.eye(len(inner)))
-        rank = int(np.sum(values > tolerance * size))
+        rank = int(np.sum(values > max(tolerance, error) * size))
         if not rank:
             break
         visible, hidden = directions[:rank].T, directions[rank:].T
         seen, inner, basis = visible.T @ inner @ hidden, hidden.T @ inner @ hidden, basis @ hidden
+        error *= size / float(values[rank - 1])
         size = _norm(A)
-    return basis
+    return UnobservableSubspace(basis, error)
 
 
 def _refuse(system: MeasuredSystem, modes: Sequence[Mode], what: str) -> None:

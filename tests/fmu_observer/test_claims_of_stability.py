@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
@@ -208,9 +208,14 @@ def test_learning_spacings_of_any_size_is_certified_for_no_gap() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 12))
+@example(seed=1221, count=5)
+@example(seed=1647, count=5)
+@example(seed=2253, count=5)
+@example(seed=6800, count=5)
 def test_rounding_is_no_measurement(seed: int, count: int) -> None:
     """A sensor at all times and one at samples see the same half of the state; turned axes leave 1e-17 in the place of
-    zeros.
+    zeros. Where the sensor sees one direction 1e3 times worse than another, those zeros are 1e-13 (seeds 1221, 1647,
+    2253, 6800): what counts as one follows from the conditioning.
     """
     rng = np.random.default_rng(seed)
     A, seen = np.zeros((4, 4)), np.zeros((2, 4))

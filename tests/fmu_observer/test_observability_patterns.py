@@ -18,7 +18,7 @@ from fmu_observer.observability import (
     observability,
     observability_gramian,
 )
-from fmu_observer.observability.modes import unobservable_basis
+from fmu_observer.observability.modes import unobservable_subspace
 
 INTEGRATOR = np.array([[0.0, 1.0], [0.0, 0.0]])  # position, speed
 OSCILLATOR = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -87,7 +87,7 @@ def test_enough_samples_at_irregular_instants_show_what_the_rank_condition_says(
     system = MeasuredSystem(A, C if continuous else None, None if continuous else C)
     gaps = draw.uniform(0.05, 0.2, 4 * n)
     found = observability(system, SamplePattern(np.cumsum(gaps)))
-    assert found.rank == n - unobservable_basis(A, C).shape[1] == n - hidden
+    assert found.rank == n - unobservable_subspace(A, C).basis.shape[1] == n - hidden
     assert found.observable == (not found.unobservable)
 
 
