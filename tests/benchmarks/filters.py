@@ -185,7 +185,7 @@ def train() -> Callable[[np.ndarray], None]:
         BaliseOdometerEkf().unpack_parameters(BaliseOdometerEkf().start_parameters()),
     )
     theirs.H, theirs.R = ODOMETER_ROW, np.array([[p.odometer_deviation**2]])
-    theirs.F, theirs.Q = transition(0.1, 20.0, p)
+    theirs.F, theirs.Q = transition(0.1, 20.0, 2e4, p)
 
     def step(reading: np.ndarray) -> None:
         theirs.predict()

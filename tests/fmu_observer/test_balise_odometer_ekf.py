@@ -8,6 +8,7 @@ import scipy
 from observer_bench import Bench
 
 from fmu_observer import OBSERVERS
+from fmu_observer.observers.train.balise_odometer_ekf import transition
 
 MASS, DRAG, EFFORT, PERIOD = 50e3, 800.0, 20e3, 0.1
 VALUES = {"mass": MASS, "davis_a": 0.0, "davis_b": DRAG, "davis_c": 0.0, "creep_share": 0.02, "creep_time": 15.0}
@@ -27,6 +28,13 @@ def exact(elapsed: float, drag: float, densities: tuple[float, float]) -> tuple[
     both = scipy.linalg.expm(np.block([[-A, np.diag([0.0, *densities, 0.0])], [np.zeros((4, 4)), A.T]]) * elapsed)
     F = both[4:, 4:].T
     return F, F @ both[:4, 4:]
+
+
+def drift(speed: float, acceleration: float) -> float:
+    """How fast an unknown acceleration diffuses that is one of 1 per cent for 500 m and a fifth of the effort for 10 s:
+    a process of correlation time T and variance s does so with 2 s / T.
+    """
+    return 2.0 * (9.81 * 0.01) ** 2 / (500.0 / speed) + 2.0 * (0.2 * acceleration) ** 2 / 10.0
 
 
 # The filter adds noise as if there were no drag, wrong by a share of slope times period, 1.6e-3, of what is added; its
@@ -50,9 +58,10 @@ def test_it_is_the_kalman_filter_of_the_linear_train(drag: float, tolerance: flo
         elif t > 0.0:
             bench.set("u", {"odometer": measured})
             bench.runtime.advance(t)
-        F, QN = exact(t - last, drag, densities)
+        F, _ = exact(t - last, drag, densities)
         once, twice = F[0, 1], F[0, 2]
         x = F @ x + steady * np.array([twice, once, 0.0, 0.0])
+        F, QN = exact(t - last, drag, (densities[0], densities[1] + drift(x[1], EFFORT / MASS)))
         QN[3, 3] = (VALUES["creep_share"] * x[1]) ** 2 * (1.0 - F[3, 3] ** 2)
         P, last = F @ P @ F.T + QN, t
         row = np.array([[1.0, 0, 0, 0]] if kind == "balise" else [[0, 1.0, 0, 1.0]])
@@ -124,7 +133,7 @@ def test_the_certificate_is_that_of_the_riccati_equation() -> None:
     system = OBSERVERS["balise_odometer_ekf"]()
     values = {"acceleration_density": 1e-3, "disturbance_density": 1e-4, "davis_b": 0.0, "davis_c": 0.0}
     found = system.certify(PERIOD, values)
-    F, QN = exact(PERIOD, 0.0, (1e-3, 1e-4))
+    F, QN = exact(PERIOD, 0.0, (1e-3, 1e-4 + drift(20.0, 0.3)))  # judged where the wheels creep as they may
     fade = np.exp(-PERIOD / 20.0)
     F[3, 3], QN[3, 3] = fade, (0.01 * 20.0) ** 2 * (1.0 - fade**2)
     C, RN = np.array([[0, 1.0, 0, 1.0], [1.0, 0, 0, 0]]), np.diag([0.1**2, 0.5**2])
@@ -142,3 +151,49 @@ def test_the_certificate_is_that_of_the_riccati_equation() -> None:
 def test_a_covariance_of_zero_is_refused_in_words() -> None:
     with pytest.raises(ValueError, match="balise_deviation"):
         running(balise_deviation=0.0).runtime.start(0.0)
+
+
+def test_a_wheel_that_transmits_less_creeps_less() -> None:
+    """Half of the effort, a fourth of the variance; none, none."""
+    found = {}
+    for share in (0.0, 0.5, 1.0, 2.0):
+        p = OBSERVERS["balise_odometer_ekf"]()
+        values = p.unpack_parameters(p.start_parameters())
+        effort = -share * float(values.creep_effort) * float(values.mass)
+        found[share] = float(transition(0.1, 20.0, effort, values).QN[3, 3])
+    assert found[0.0] == 0.0
+    assert found[0.5] == pytest.approx(0.25 * found[1.0], rel=1e-12)
+    assert found[2.0] == found[1.0] > 0.0
+
+
+def test_readings_at_rest_say_nothing_of_position_and_disturbance() -> None:
+    """Ten minutes at a platform with a reading that trembles: neither place nor disturbance moves."""
+    bench = running(davis_a=2000.0)
+    bench.set("x", {"estimated_speed": 0.0, "estimated_position": 50.0, "estimated_disturbance": 0.02})
+    bench.set("u", {"odometer": 0.0, "effort": -30e3})
+    bench.runtime.start(0.0)
+    readings = np.maximum(0.05 * np.random.default_rng(1).standard_normal(6000), 0.0)
+    for k, reading in enumerate(readings):
+        bench.set("u", {"odometer": float(reading)})
+        bench.runtime.advance((k + 1) * PERIOD)
+    counted = float(readings.sum() * PERIOD)
+    assert bench.state("estimated_disturbance") == pytest.approx(0.02, abs=1e-3)
+    assert bench.state("estimated_position") == pytest.approx(50.0, abs=0.2 * counted)  # a fifth of what is read
+
+
+def test_readings_that_are_refused_for_long_are_believed_again() -> None:
+    """The estimate stands, the train does not: no gate without a way back, and the way is honest about the position."""
+    bench = running(odometer_recover=15.0)
+    bench.set("x", {"estimated_speed": 0.0})
+    bench.set("u", {"odometer": 18.0, "effort": -30e3})
+    bench.runtime.start(0.0)
+    told = {}
+    for k in range(1, 400):
+        bench.runtime.advance(k * PERIOD)
+        values = bench.outputs()
+        told[round(k * PERIOD, 1)] = (values["speed"], values["odometer_fault"])
+    assert [fault for t, (_, fault) in told.items() if t < 14.85] == [1.0] * 148
+    assert told[14.9][1] == told[20.0][1] == 0.0
+    assert told[14.9][0] == pytest.approx(18.0, abs=1e-9)
+    # 18 m/s for 15 s are 270 m that it may be off, and the first one of 100 m
+    assert bench.outputs()["position_std"] > 270.0

@@ -45,8 +45,8 @@ from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
-LAYOUT = RowLayout(inputs=ORDER + 2, measurements=1)
-OFFSETS, SPEED, IS_BALISE = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
+LAYOUT = RowLayout(inputs=ORDER + 3, measurements=1)
+OFFSETS, SPEED, EFFORT, IS_BALISE = slice(0, ORDER), ORDER, ORDER + 1, ORDER + 2  # inputs of a row
 WINDOW_PARAMETERS = (
     parameter("speed_limit", "m/s", 100.0, "Highest speed; the lowest is zero", min=0.1),
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
@@ -62,9 +62,15 @@ class Shared(NamedTuple):
     davis_c: Array
     creep_time: Array
     creep_share: Array
+    creep_effort: Array
     acceleration_density: Array
     disturbance_density: Array
+    gradient_deviation: Array
+    gradient_length: Array
+    effort_share: Array
+    effort_time: Array
     odometer_deviation: Array
+    odometer_period: Array
     balise_deviation: Array
     speed_limit: Array
     disturbance_limit: Array
@@ -180,9 +186,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     def _row(self, event: str, t: Array, x: Array, u: Any, p: Any, before: Array) -> WindowRow:
         """The row that an event brings: what the flow added to the linear transition, and the measurement."""
         period, is_balise = t - x[LAST_TIME], float(event == BALISE.name)
-        offset = x[:ORDER] - transition(period, x[V], p).F @ before
+        offset = x[:ORDER] - transition(period, x[V], u.effort, p).F @ before
         measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
-        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], is_balise + 0.0 * x[V])
+        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], u.effort + 0.0 * x[V], is_balise + 0.0 * x[V])
         return WindowRow(1.0 + 0.0 * x[V], period, t + 0.0 * x[V], inputs, vector(measured), vector(1.0 + 0.0 * x[V]))
 
 
@@ -191,7 +197,7 @@ def _shared(flat: Array) -> Shared:
 
 
 def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
-    F, noise = transition(row.period, row.inputs[SPEED], _shared(shared))
+    F, noise = transition(row.period, row.inputs[SPEED], row.inputs[EFFORT], _shared(shared))
     return Moved(F @ x + row.inputs[OFFSETS], F, noise)
 
 

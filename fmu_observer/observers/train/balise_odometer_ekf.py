@@ -24,14 +24,16 @@ from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
+from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4
 P, V, D, CREEP = range(ORDER)  # places of the estimates
 PAIRS = [(i, j) for i in range(ORDER) for j in range(i, ORDER)]  # the covariance as remembered, row by row
 COVARIANCE = ORDER
 VARIANCES = [f"estimate_covariance[{PAIRS.index((i, i)) + 1}]" for i in range(ORDER)]
-LAST_TIME, INNOVATION, NIS, LIKELIHOOD, FAULT = (ORDER + len(PAIRS) + i for i in range(5))
+LAST_TIME, INNOVATION, NIS, LIKELIHOOD, REFUSED_TIME = (ORDER + len(PAIRS) + i for i in range(5))
 FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s], [m/s2], [m/s] [ours]
+ROUNDING = 1e-9  # of times that are sums of periods
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 SETTLING = 400  # readings after which a certificate takes the covariance for settled, and four gaps at least
 HORIZON = 60.0  # longest gap that a certificate looks at unasked [s]
@@ -43,11 +45,17 @@ BALISE_ROW = np.array([[1.0, 0.0, 0.0, 0.0]])
 TUNABLE = (
     parameter("acceleration_density", "m2/s3", 1e-4, "Spectral density of the noise of the acceleration", min=0.0),
     parameter("disturbance_density", "m2/s5", 1e-6, "Spectral density of the drift of the disturbance", min=1e-15),
+    parameter("gradient_deviation", "1", 0.01, "Standard deviation of the gradient that is not told", min=0.0),
+    parameter("gradient_length", "m", 500.0, "Way over which the gradient becomes another one", min=1.0),
+    parameter("effort_share", "1", 0.2, "Standard deviation of effort over mass, a share of it", min=0.0),
+    parameter("effort_time", "s", 10.0, "Time for which the effort stays about the same", min=1e-3),
     parameter("creep_share", "1", 0.01, "Standard deviation of the wheels' creep, a share of the speed", min=0.0),
+    parameter("creep_effort", "m/s2", 0.3, "Effort over mass at which the wheels creep so; less with less", min=1e-6),
     parameter("creep_time", "s", 20.0, "Correlation time of the creep", min=1e-3),
     parameter("odometer_deviation", "m/s", 0.1, "Standard deviation of the noise of a reading", min=1e-6),
     parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=1e-6),
     parameter("odometer_gate", "1", 4.0, "Standard deviations beyond which a reading is not used", min=0.1),
+    parameter("odometer_recover", "s", 15.0, "Time of refused readings after which they are believed", min=0.0),
 )
 OWN_PARAMETERS = (
     parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
@@ -82,12 +90,23 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     series to the third order of its product with that time; noise as if there were no drag), and is corrected in Joseph
     form.
 
+    What it believes of its model follows from what can be known of a train: d drifts as gradients do that are not told
+    (`gradient_deviation` over `gradient_length`) and as an effort that acts on another mass than is told does
+    (`effort_share` of it, for `effort_time`); a wheel creeps as much as it transmits, `creep_share` of the speed from
+    `creep_effort` on and nothing while it rolls freely. So where the odometer is right it is followed, and a model that
+    is wrong is no reason to doubt it. A train that stands is held by dry friction, and its readings say nothing of
+    position, disturbance and creep.
+
     A reading whose innovation is beyond `odometer_gate` of its own standard deviations is not used: a wheel that locks
-    or spins. Then the covariance grows and with it what is believed, so no lie lasts for ever and no truth is refused
-    for ever. A balise passes the common gate, which is granted three standard deviations of the position.
+    or spins. After `odometer_recover` without a reading that was used the next one is believed: the speed is set to
+    it, and the position may be off by what that makes. A balise passes the common gate, which is granted three standard
+    deviations of the position.
 
     It knows wheels that creep for about `creep_time`. A creep that lasts the whole gap between two balises, or a jam
     that holds a wheel for long, it follows more than the observers with rules for jams.
+
+    Presets: `tuned` [ours], for the line Amsterdam - Utrecht, where wheels creep by up to a tenth of the speed on wet
+    rail: what a wrong mass does it takes for such a creep.
     """
 
     name = "balise_odometer_ekf"
@@ -121,12 +140,11 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     presets: Mapping[str, Mapping[str, Any]] = {
         # ours: for the position error on the line Amsterdam - Utrecht with drawn faults, see docs/tuning_the_train.md
         "tuned": {
-            "acceleration_density": 2.99e-4,
-            "disturbance_density": 5.19e-4,
-            "creep_share": 0.0925,
-            "creep_time": 16.9,
-            "odometer_deviation": 0.0276,
-            "odometer_gate": 5.79,
+            "acceleration_density": 6.15e-6,
+            "disturbance_density": 9.83e-8,
+            "creep_share": 0.0902,
+            "creep_time": 12.4,
+            "odometer_deviation": 0.387,
         },
     }
 
@@ -147,7 +165,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
             memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
-            memory("reading_refused", "1", 0.0, "1 where the last reading was not used"),
+            memory("refused_time", "s", 0.0, "Time for which readings have not been used"),
         )
 
     def requirements(self, p: Any) -> dict[str, Array]:
@@ -160,7 +178,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Position, speed, disturbance and creep, shape (4,)."""
-        return vector(x[V], _free_acceleration(x, u, p), 0.0 * x[D], -x[CREEP] / p.creep_time)
+        return vector(x[V], _free_acceleration(x, u, p), 0.0 * x[D], -x[CREEP] * _fading(x[V], p))
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
@@ -168,7 +186,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Covariance over the time since the last event, then correction by the reading or the balise."""
-        moved = transition(t - x[LAST_TIME], x[V], p)
+        moved = transition(t - x[LAST_TIME], x[V], u.effort, p)
         before = predicted_covariance(covariance_of(x), moved.F, moved.QN)
         estimate = x[:ORDER]
         if event == BALISE.name:
@@ -183,14 +201,17 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         kept = [np.where(refused > 0.0, estimate[i], after.estimate[i]) for i in range(ORDER)]
         kept[V] = np.maximum(kept[V], 0.0)  # the odometer has no sign, and a train that stands is not pushed back
         covariance = [np.where(refused > 0.0, before[i, j], after.covariance[i, j]) for i, j in PAIRS]
+        refused_time = x[REFUSED_TIME] if event == BALISE.name else refused * (x[REFUSED_TIME] + p.odometer_period)
+        anew = refused * np.where(refused_time + ROUNDING >= p.odometer_recover, 1.0, 0.0)
+        new = _anew(estimate, before, error, refused_time)
         return vector(
-            *kept,
-            *covariance,
+            *(np.where(anew > 0.0, new[0][i], kept[i]) for i in range(ORDER)),
+            *(np.where(anew > 0.0, new[1][k], covariance[k]) for k in range(len(PAIRS))),
             t + 0.0 * nis,
             -error if event == BALISE.name else x[INNOVATION],
             np.where(refused > 0.0, x[NIS], nis),
             x[LIKELIHOOD] + np.where(refused > 0.0, 0.0, told),
-            x[FAULT] if event == BALISE.name else refused,
+            refused_time * (1.0 - anew),
         )
 
     def reading(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -204,7 +225,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, their deviations now, and how the last measurement fits."""
-        moved = transition(t - x[LAST_TIME], x[V], p)
+        moved = transition(t - x[LAST_TIME], x[V], u.effort, p)
         now = predicted_covariance(covariance_of(x), moved.F, moved.QN)
         return {
             "position": x[P],
@@ -216,7 +237,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "speed_std": np.sqrt(np.maximum(now[V, V], 0.0)),
             "nis": x[NIS],
             "innovation_likelihood": x[LIKELIHOOD],
-            "odometer_fault": x[FAULT],
+            "odometer_fault": np.where(x[REFUSED_TIME] > 0.0, 1.0, 0.0),
         }
 
     def odometer_of(self, u: Any) -> Array:
@@ -244,8 +265,9 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             spectral_radius=asked.spectral_radius,
             quadratic_margin=asked.margin,
             holds=stable and asked.spectral_radius < 1.0 and asked.margin > 0.0,
-            error_model="error of position, speed, disturbance and creep of the linear train at 20 m/s, readings at "
-            "their period and a balise at the end of each gap; readings that are refused, and standstill, are left out",
+            error_model="error of position, speed, disturbance and creep of the linear train at 20 m/s, the wheels "
+            "creeping as much as they may, readings at their period and a balise at the end of each gap; readings that "
+            "are refused, and standstill, are left out",
             notes=("the filter's own function e' inv(P) e grows over no sequence of gaps, whatever they are",),
             lyapunov_matrix=tuple(tuple(map(float, row)) for row in np.linalg.inv(asked.covariance)),
         )
@@ -255,18 +277,22 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         return tuple(s for s in self.parameters if s in TUNABLE or s.name == "odometer_period")
 
 
-def transition(elapsed: Array, speed: Array, p: Any) -> Transition:
+def transition(elapsed: Array, speed: Array, effort: Array, p: Any) -> Transition:
     """Transition of the error over a time, and the covariance that it gets on the way.
 
+    Dry friction holds a train that stands, whatever pulls at it: then its speed is known as well as a reading tells it,
+    and no reading says anything of position, disturbance and creep.
+
     Args:
-        elapsed: time since the last event [s]. speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
+        elapsed: time since the last event [s]. speed: [m/s]. effort: [N]. p: parameters of `BaliseOdometerEkf`.
     """
     T = elapsed
     slope = -(p.davis_b + 2.0 * p.davis_c * np.abs(speed)) / p.mass
     z = slope * T
-    fade = np.exp(-T / p.creep_time)
-    stays = 1.0 + z * (1.0 + z * (0.5 + z / 6.0))
-    once, twice = T * (1.0 + z * (0.5 + z / 6.0)), 0.5 * T * T * (1.0 + z / 3.0)
+    moves = _moves(speed, p)
+    fade = np.exp(-T * _fading(speed, p))
+    stays = moves * (1.0 + z * (1.0 + z * (0.5 + z / 6.0)))
+    once, twice = moves * T * (1.0 + z * (0.5 + z / 6.0)), moves * 0.5 * T * T * (1.0 + z / 3.0)
     zero = 0.0 * T
     one = 1.0 + zero
     F = np.vstack(
@@ -277,20 +303,68 @@ def transition(elapsed: Array, speed: Array, p: Any) -> Transition:
             np.hstack([zero, zero, zero, fade]),
         ]
     )
-    by_acceleration = integrated_noise(2, T, p.acceleration_density)
-    by_disturbance = integrated_noise(3, T, p.disturbance_density)
-    creep = np.square(p.creep_share * speed) * (1.0 - fade * fade)
+    by_acceleration = integrated_noise(2, T, moves * p.acceleration_density)
+    by_disturbance = integrated_noise(3, T, moves * (p.disturbance_density + _drift(speed, effort, p)))
+    driven = np.minimum(np.abs(effort) / (p.mass * p.creep_effort), 1.0)
+    creep = np.square(p.creep_share * driven * speed) * (1.0 - fade * fade)
+    unseen = (1.0 - moves) * np.square(p.odometer_deviation)
     rows = []
     for i in range(3):
         shared = [by_acceleration[i, j] if max(i, j) < 2 else zero for j in range(3)]
+        shared[i] = shared[i] + (unseen if i == V else zero)
         rows.append(np.hstack([*(by_disturbance[i, j] + shared[j] for j in range(3)), zero]))
     QN = np.vstack([*rows, np.hstack([zero, zero, zero, creep])])
     return Transition(F, QN)
 
 
+def _moves(speed: Array, p: Any) -> Array:
+    """1 where the train is faster than a reading can tell from standing, else 0.
+
+    Args:
+        speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
+    """
+    return np.where(speed > p.odometer_deviation, 1.0, 0.0)
+
+
+def _fading(speed: Array, p: Any) -> Array:
+    """Rate at which a creep fades [1/s]; a wheel that stands does not creep.
+
+    Args:
+        speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
+    """
+    return 1.0 / np.where(_moves(speed, p) > 0.0, p.creep_time, p.odometer_period)
+
+
+def _drift(speed: Array, effort: Array, p: Any) -> Array:
+    """Spectral density with which the disturbance drifts since gradient and effort change [m2/s5]: twice the variance
+    over the time in which each becomes another one.
+
+    Args:
+        speed: [m/s]. effort: [N]. p: parameters of `BaliseOdometerEkf`.
+    """
+    by_gradient = np.square(GRAVITY * p.gradient_deviation) * np.abs(speed) / p.gradient_length
+    return 2.0 * (by_gradient + np.square(p.effort_share * effort / p.mass) / p.effort_time)
+
+
 def _free_acceleration(x: Array, u: Any, p: Any) -> Array:
     """Acceleration without dry friction [m/s2]."""
     return (np.maximum(u.effort, 0.0) - rolling_drag(x[V], p)) / p.mass + x[D]
+
+
+def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple[list[Array], list[Array]]:
+    """Estimate and upper triangle of the covariance where readings are believed again that were refused for long.
+
+    The speed is the reading's, what explained another speed is forgotten, and the position may be wrong by what the
+    speed was wrong for that time.
+
+    Args:
+        estimate: shape (4,). P: covariance, shape (4, 4). error: reading minus what was expected [m/s]. refused_time:
+            [s].
+    """
+    variances = [P[0, 0] + np.square(error * refused_time), *(d**2 + 0.0 * error for d in FIRST_DEVIATIONS[1:])]
+    reading = estimate[V] + estimate[CREEP] + error
+    found = [estimate[0], np.maximum(reading, 0.0), 0.0 * error, 0.0 * error]
+    return found, [variances[i] if i == j else 0.0 * error for i, j in PAIRS]
 
 
 def covariance_of(x: Array) -> Array:
@@ -319,7 +393,7 @@ class Settled(NamedTuple):
 def _settled(gap: float, p: Any) -> Settled:
     """The settled filter at a constant gap [s], readings at their period."""
     readings = max(round(gap / float(p.odometer_period)), 1)
-    moved = transition(gap / readings, CERTIFIED_AT, p)
+    moved = transition(gap / readings, CERTIFIED_AT, p.creep_effort * p.mass, p)
     F, QN = np.asarray(moved.F, dtype=float), np.asarray(moved.QN, dtype=float)
     reading, balise = float(p.odometer_deviation) ** 2, float(p.balise_deviation) ** 2
     first, after = np.eye(ORDER), np.diag(np.square(FIRST_DEVIATIONS))
