@@ -239,6 +239,15 @@ def test_a_worker_tells_who_took_it_along(fmu: Path, deed: str, words: str) -> N
     assert answer.reason.startswith(f"component 'bad' in doStep at t = 0.24 s{words}")
 
 
+def test_a_process_that_attaches_a_page_writes_to_that_one(tmp_path: Path) -> None:
+    watched, own = make_page(tmp_path / "page"), LastCall(mmap.mmap(-1, PAGE))
+    own.attach(tmp_path / "page")
+    own.begin("train", "doStep", 3.2)
+    assert watched.words() == own.words() == "component 'train' in doStep at t = 3.2 s"
+    own.end(0)
+    assert watched.exit_code == 0
+
+
 def test_words_run_out_without_harm(tmp_path: Path) -> None:
     page = make_page(tmp_path / "page")
     for number in range(3000):

@@ -202,3 +202,18 @@ def test_bad_input_is_told_in_words() -> None:
     wide = replace(model, unknowns=four, regressor=lambda _t, _u: np.zeros((2, 4)), example=())
     with pytest.raises(ValueError, match="has 4 unknown constants; 1 to 3 can be learnt"):
         AdaptiveHold(wide)
+
+
+@pytest.mark.parametrize("observer", [AdaptiveHold(), AdaptivePredictor()], ids=lambda observer: observer.name)
+def test_a_trial_begins_with_the_true_state_and_follows_the_model(observer: AdaptiveHold | AdaptivePredictor) -> None:
+    """Against the motion that SciPy's LSODA finds from the same start."""
+    model, trial = observer.model, observer.limits()[0].trial
+    assert trial is not None
+    n, instants = model.order, np.linspace(0.0, 10.0, 11)
+    start = np.array(model.example)
+    found = np.array([trial.truth(instants)[s.name] for s in model.states])
+    u = np.zeros(len(model.inputs))
+    expected = solve_ivp(
+        lambda t, x: model.flow(t, x, start[n:], u), (0.0, 10.0), start[:n], "LSODA", instants, rtol=1e-10, atol=1e-10
+    ).y
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6)  # both solvers at 1e-9, over 10 s

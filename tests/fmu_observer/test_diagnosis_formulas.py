@@ -63,6 +63,9 @@ def test_sensors_that_disagree_are_told_apart_by_the_model() -> None:
     assert larger(1.0, 9.0, 2.0) == (1.0, 0.0, 0.0, 0.0)
     assert larger(1.0, 0.5, 0.7) == (0.0, 0.0, 1.0, 0.0)
     assert larger(0.0, 9.0, 2.0) == (0.0, 0.0, 0.0, 1.0)
+    assert larger(0.0, 1.2, 1.1) == (0.0, 0.0, 0.0, 1.0)  # a threshold is exceeded above 1, whatever by
+    assert larger(0.0, 1.2, 0.9) == (0.0, 0.0, 0.0, 0.0)
+    assert larger(1.0, 1.1, 1.2) == (0.0, 1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("true", [0.35, 0.5, 0.62, 0.8])

@@ -212,6 +212,16 @@ def test_in_a_loop_a_text_is_held_over_the_step_like_a_number() -> None:
     assert slaves[0].v["heard"] == "secondxx"
 
 
+def test_a_text_that_several_hear_means_one_instant() -> None:
+    """One is stepped before the source, one after it: both hear what was said at the start of the step."""
+    slaves = {name: Parrot() for name in ("before", "source", "after")}
+    parts = [component(slave, name) for name, slave in slaves.items()]
+    pairs = [("source.said", "before.heard"), ("source.said", "after.heard"), ("before.said", "source.heard")]
+    master = prepare(parts, pairs, 1.0, 3, order=("before", "source", "after"))
+    master.run()
+    assert slaves["before"].v["heard"] == slaves["after"].v["heard"] != slaves["source"].v["said"]
+
+
 def test_before_anything_was_read_inputs_keep_their_start_values() -> None:
     """The first exchange of a loop has nothing to pass on yet; None must not reach a slave."""
 

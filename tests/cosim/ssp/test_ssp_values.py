@@ -16,8 +16,10 @@ from test_fmus.typed import typed_fmu
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.errors import CosimError
+from cosim.errors import CosimError, ScenarioError
+from cosim.ssp.common import ValueMap
 from cosim.ssp.document import SCHEMAS
+from cosim.ssp.pipe import Pipe
 
 PARAMETERS: dict[str, Any] = {
     "n": 2,
@@ -147,3 +149,16 @@ def test_a_unit_that_measures_nothing_is_refused(
     assert main(["show", str(path)]) == 2
     error = capsys.readouterr().err
     assert re.search(r"x.ssp: SystemStructure.ssd, line \d+: units .* measures nothing", error), error
+
+
+def test_names_of_items_pass_tables_of_names_and_no_others() -> None:
+    node = etree.Element("Binding")
+    items, numbers = ValueMap("Enumeration", {"low": "high"}), ValueMap("Integer", {"1": "2"})
+    assert Pipe(maps=(items,)).item("low", node) == "high"
+    assert Pipe(maps=(items,)).item("off", node) == "off"
+    assert Pipe(maps=(numbers,)).number(1.0, node) == 2.0
+    for pipe in (Pipe(maps=(numbers,)), Pipe(factor=2.0)):
+        with pytest.raises(ScenarioError, match="'low' is a name; a transformation of numbers cannot"):
+            pipe.item("low", node)
+    with pytest.raises(ScenarioError, match="a table of item names can only connect enumerations"):
+        Pipe(maps=(items,)).number(1.0, node)

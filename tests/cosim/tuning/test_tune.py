@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from small_scenarios import small
+from test_fmus.build import linear_fmu
 
 from cosim import Scenario
 from cosim.errors import ScenarioError
@@ -82,6 +83,17 @@ def test_costs_are_those_of_runs_of_the_scenario(found: Tuning) -> None:
     again = found.scenario.copy().set("motor.seed", 5).run()
     assert found.judged_after[0] == pytest.approx(mean_square(again), rel=1e-12)
     assert sum(found.after) < sum(found.before)
+
+
+def test_present_values_are_found_under_names_with_dots(tmp_path: Path) -> None:
+    """A component of the scenario, its table of parameters, and an FMU whose variables have dots in their names."""
+    linear_fmu(tmp_path, "plant", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], inputs=["body.force"], outputs=["body.speed"])
+    scenario = Scenario(stop=0.1, step=0.1, folder=tmp_path).add(
+        "plant", fmu="plant.fmu", parameters={"body.force": 2.0}
+    )
+    names = ("plant.body.force", "plant.parameters.body.force")
+    for name in names:
+        assert tunable(scenario, None, {name: (1.0, 3.0)}).start == {name: 2.0}
 
 
 def test_a_candidate_costs_the_mean_over_its_seeds_and_the_best_search_counts(found: Tuning) -> None:
