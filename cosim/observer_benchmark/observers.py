@@ -22,7 +22,8 @@ from cosim.observer_benchmark.playback import Sides, find_sides, playback_scenar
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
-from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.certificates import check_certificates
+from cosim.scenario.gaps import expected_gap
 from cosim.scenario.layouts import make_layout
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.schema import step_count
@@ -278,7 +279,7 @@ class _Judge:
             return None
         try:
             found, _ = check_certificates(
-                {candidate.name: candidate.table}, self._expected, "warn", self.scenario.where
+                {candidate.name: candidate.table}, {candidate.name: self._expected}, "warn", self.scenario.where
             )
         except (CosimError, ValueError, ArithmeticError):
             return None  # parameters that cannot be: the run of this observer says so

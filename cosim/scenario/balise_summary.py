@@ -34,7 +34,8 @@ def balise_summary(
 
     Args:
         choice: of the method; None without balises. service: of the run; None without balises.
-        certificates: by receiver; each is told the largest gap seen. start: of the run [s]. events: its telegrams.
+        certificates: by component; each that is told of balises is told the largest gap seen. start: of the run [s].
+        events: its telegrams.
 
     Returns:
         What the summary of the run says of it, and warnings of gaps beyond what is certified.
@@ -44,8 +45,10 @@ def balise_summary(
         return {**nothing, "undelivered": 0}, []
     stamps = sorted(event.stamp for event in events if event.kind == "true")
     gap = max((b - a for a, b in pairwise([start, *stamps])), default=None)
-    beyond = []
+    beyond, told = [], {r.planned.component.name for r in service.receivers}
     for name, certificate in certificates.items():
+        if name not in told:
+            continue
         limit = certificate["aperiodic_limit"]
         certificate["largest_gap_seen"] = gap
         if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:

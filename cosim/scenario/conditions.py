@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cosim.errors import CertificateError
-from cosim.scenario.certificates import given_parameters
-from cosim.scenario.models import make_system
+from cosim.scenario.models import given_parameters, make_system
 from cosim.scenario.tables import ComponentTable
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity

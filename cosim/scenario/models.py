@@ -23,6 +23,7 @@ from cosim.scenario.backends import FAULTS, Request, Tell, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.tables import Backend, ComponentTable
 from fmu_observer.event_protocol import EventProtocol
+from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import HybridSystem
 from plant_models.registry import descends_from
 from plant_models.user_file import UserFileError, make
@@ -298,3 +299,22 @@ def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], whe
 
 def _legal(choices: Sequence[Any]) -> str:
     return f"{choices[0]} to {choices[-1]}" if isinstance(choices, range) else f"from {', '.join(map(repr, choices))}"
+
+
+def given_parameters(table: ComponentTable, system: HybridSystem) -> dict[str, Any]:
+    """What the table of a component says of the parameters of its system, by name.
+
+    Args:
+        table: of the component. system: the hybrid system that it names.
+    """
+    known = {n for s in system.parameter_signals for n in (s.name, *s.scalar_names)}
+    return {name: value for name, value in table.parameters.items() if name in known}
+
+
+def values_in_use(table: ComponentTable, system: Any) -> Any:
+    """Values of all parameters of a system, as its flow takes them.
+
+    Args:
+        table: of the component. system: the hybrid system that it names.
+    """
+    return system.unpack_parameters(parameter_values(system, given_parameters(table, system), table.preset))

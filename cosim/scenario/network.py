@@ -109,7 +109,7 @@ def connect_over(
         component, name = split_name(target, components, "Connection target")
         event = _event_of(components[component], name)
         travels = source in owned and (told is None or component in told)
-        if event is not None and not _is_wired(pairs, component, event):
+        if event is not None and not is_wired(pairs, component, event):
             if not travels:
                 raise ScenarioError(
                     f"{where}: {target} is told by the event '{event}', and no node of the network owns {source}; "
@@ -227,6 +227,10 @@ def _event_of(component: Component, name: str) -> str | None:
     return next((event for event, port in component.events.items() if reference in port.payload.values()), None)
 
 
-def _is_wired(pairs: Sequence[Link], component: str, event: str) -> bool:
-    """Whether somebody else tells of the event: its count or clock has a source."""
+def is_wired(pairs: Sequence[Link], component: str, event: str) -> bool:
+    """Whether somebody else tells of an event: its count or clock has a source.
+
+    Args:
+        pairs: connections of the scenario. component: whose event. event: its name.
+    """
     return any(pair[1] in (f"{component}.{event}", f"{component}.{event}_count") for pair in pairs)

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from cosim.coupling.connection import Connection
-from cosim.scenario.certificates import given_parameters
-from cosim.scenario.models import make_system
+from cosim.scenario.models import make_system, values_in_use
 from cosim.scenario.tables import ComponentTable
-from fmu_observer.observers.parameter_values import parameter_values
 
 COUNT, TIME = "premise_violations", "premise_outside_time"
 ADVICE = (
@@ -72,7 +70,7 @@ def _seen(
     system: Any = make_system(component, name) if component.observer is not None else None
     if not hasattr(system, "premise_range"):
         return None
-    values = system.unpack_parameters(parameter_values(system, given_parameters(component, system), component.preset))
+    values = values_in_use(component, system)
     signal, low, high = system.premise_range(values)
     column = _column(table, name, signal, connections)
     if column is None or len(column) < 2:

@@ -40,10 +40,11 @@ from cosim.results.stream import Stream
 from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.balise_summary import all_telegrams, balise_summary
-from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.certificates import check_certificates
 from cosim.scenario.conditions import check_conditions
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.coupling_warnings import coupling_warnings, interpolation_note, late_telegram_warnings
+from cosim.scenario.gaps import Sources
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
 from cosim.scenario.master import idle_settings, make_master, make_recorder, stepping_groups
@@ -154,7 +155,7 @@ class _Setup:
         layout = None
         if table.balises is not None:
             layout = make_layout(table.balises, table.start, table.stop, self.folder, self.where)
-        pairs = parse_connections(table.connections, self.where)
+        links = pairs = parse_connections(table.connections, self.where)
         self._load_components()
         clocks, pairs = connect_clocks(pairs, self.components)
         connections, routed = self._connect(pairs)
@@ -172,7 +173,7 @@ class _Setup:
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
         order = [name for group in groups for name in group.names]
         starts = {n: self._start_values(n, c) for n, c in self.components.items()}
-        self._check_certificates(layout, receivers)
+        self._check_certificates(layout, receivers, links)
         self._instantiate(starts, connections)
         self.plan = self._make_plan(routed, order, clocks)
         doubts, notes = coupling_warnings(table, self.components, connections)
@@ -344,11 +345,13 @@ class _Setup:
         plant = watched_plant(balises, self.components, self.where)
         return find_receivers(balises, self.components, plant, self.where), plant
 
-    def _check_certificates(self, layout: Layout | None, receivers: list[str]) -> None:
+    def _check_certificates(self, layout: Layout | None, receivers: list[str], links: Sequence[Link]) -> None:
         table, of_gaps = self.table, list[str]()
-        if layout is not None and table.balises is not None:
-            gap, tables = expected_gap(layout, table.balises, table.start), {n: table.components[n] for n in receivers}
-            self.certificates, of_gaps = check_certificates(tables, gap, table.certificates, self.where)
+        if table.certificates != "ignore":
+            sources = Sources(table, self.components, links, layout, receivers, self.network, self.where)
+            self.certificates, of_gaps = check_certificates(
+                table.components, sources.gaps(), table.certificates, self.where
+            )
         for warning in (*of_gaps, *check_conditions(table.components, table.certificates, self.where)):
             self._warn(warning)
 

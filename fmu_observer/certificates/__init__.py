@@ -12,6 +12,7 @@ from fmu_observer.certificates.quadratic import QuadraticForm, common_quadratic_
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.certificates.sampled_error import SampledError
+from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
 
 __all__ = [
     "Certificate",
@@ -29,6 +30,8 @@ __all__ = [
     "decaying_error",
     "decrease",
     "first_unstable_gap",
+    "independent_gap_limit",
     "polytope_stability",
+    "with_independent_samples",
     "with_switching_noted",
 ]

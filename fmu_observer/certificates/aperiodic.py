@@ -79,8 +79,16 @@ def certify_sampled_error(
         quadratic_margin=found.margin,
         holds=holds,
         error_model=error_model,
+        notes=_left_out(vertices[0], max_gap),
         lyapunov_matrix=() if found.P is None else tuple(tuple(map(float, row)) for row in found.P),
     )
+
+
+def _left_out(vertex: GapError, max_gap: float) -> tuple[str, ...]:
+    """A note where the error does not fall in a gap of zero, and no derivative there covers short ones."""
+    if vertex.continuous_limit is not None or vertex.spectral_radius(0.0) < 1.0 - MARGIN:
+        return ()
+    return (f"gaps below {max_gap / (FINE + 1):.2g} s are left out",)
 
 
 def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...], what: str) -> Certificate:
@@ -91,7 +99,9 @@ def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...
         certificate: of `vertices`. what: changes, in the plural, for the words.
     """
     covered = "covered too"
-    if common_decrease(vertices, certificate.max_gap, True).margin <= MARGIN:
+    if _left_out(vertices[0], certificate.max_gap):
+        covered = "not judged"
+    elif common_decrease(vertices, certificate.max_gap, True).margin <= MARGIN:
         limit = aperiodic_limit(vertices, certificate.horizon, switching=True)
         covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap"
     return replace(certificate, notes=(*certificate.notes, f"{what} that change within a gap are {covered}"))

@@ -8,9 +8,12 @@ Wirtinger's inequality), whatever the instants of the others do.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
+
+from fmu_observer.certificates.certificate import Certificate
 
 FREQUENCIES = 2000
 SPAN = 1e3  # the grid reaches from the slowest rate over this to the fastest times this
@@ -45,6 +48,21 @@ def independent_gap_limit(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.nda
         return inf
     bound = _confirmed(A, B * scale[None, :], C / scale[:, None], D * scale[None, :] / scale[:, None], SAFETY * peak)
     return pi / (2.0 * bound)
+
+
+def with_independent_samples(certificate: Certificate, limit: float) -> Certificate:
+    """A certificate of samples that come together, for samples that come each at their own instants.
+
+    Args:
+        certificate: of samples that come together. limit: as `independent_gap_limit` gives it [s].
+    """
+    note = f"samples each at their own instants are covered up to gaps of {limit:.4g} s, by a small-gain condition"
+    return replace(
+        certificate,
+        holds=certificate.holds and certificate.max_gap < limit,
+        aperiodic_limit=min(certificate.aperiodic_limit, limit),
+        notes=(*certificate.notes, note),
+    )
 
 
 def _confirmed(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, bound: float) -> float:

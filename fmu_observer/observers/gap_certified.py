@@ -25,6 +25,14 @@ ASKED_GAP = 1.0  # [s] of the certificate behind `limits`, which looks much furt
 class GapCertified(HybridSystem):
     """A hybrid system with a certificate for sampling gaps; a subclass writes `error_certificate`."""
 
+    def sampled_events(self, p: Any) -> tuple[str, ...]:
+        """Events between which the gaps lie that the certificate is about: all that are told from outside.
+
+        Args:
+            p: parameters, as in `HybridSystem.flow`.
+        """
+        return tuple(event.name for event in self.triggered_events)
+
     @abstractmethod
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the estimation error for gaps up to `max_gap` [s], gains from the named tuple `p`."""

@@ -15,6 +15,7 @@ from cosim.table import Name
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
 
+SEEN = "largest_gap_seen"
 NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to judge; remove that line'
 
 
@@ -42,7 +43,8 @@ class CertificateExpectation(Expectation):
     def judge(self, run: Run) -> list[Judged]:
         """Certified for the longest gap that was expected, where that was known, and for the longest that occurred."""
         certificates = mapping_entry(run.result, "certificates")
-        names = list(certificates) if self.of is None else [self.of] if isinstance(self.of, str) else list(self.of)
+        told = [name for name, entry in certificates.items() if isinstance(entry, Mapping) and SEEN in entry]
+        names = told if self.of is None else [self.of] if isinstance(self.of, str) else list(self.of)
         if not names:
             raise NotRecordedError("nothing to judge: no observer of this run has a certificate")
         return [_certificate(name, certificates.get(name), run) for name in names]
@@ -52,7 +54,7 @@ def _certificate(observer: str, entry: Any, run: Run) -> Judged:
     name = f"certificate of {observer}"
     if not isinstance(entry, Mapping):
         return Judged(name, "certificate", passed=False, unit="s", text="nothing to judge: it has no certificate")
-    limit, seen = number_entry(entry, "aperiodic_limit"), number_entry(entry, "largest_gap_seen")
+    limit, seen = number_entry(entry, "aperiodic_limit"), number_entry(entry, SEEN)
     expected, bound = number_entry(entry, "max_gap"), "any gap" if limit is None else f"gaps up to {limit:.4g} s"
     wanted = "longer gaps" if expected is None else f"gaps of {expected:.4g} s"
     values: dict[str, Any] = {"limit": float("inf") if limit is None else limit, "unit": "s"}

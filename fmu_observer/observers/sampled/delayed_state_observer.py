@@ -275,17 +275,32 @@ class DelayedStateObserver(HighGainSampled):
     # -- certificate ------------------------------------------------------------------------------------------------
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
-        """Error of the delayed state, and of the outputs between packets that have all measurements.
+        """Error of the delayed state, and of the outputs since each was received, from packet to packet.
 
-        A held output falls behind by what the plant does: a disturbance of the error, and no part of its equations.
+        Where nodes send in turn there is one copy of both for each turn of a round, and a packet moves the error from
+        one copy to the next. A held output falls behind by what the plant does: a disturbance of the error, and no part
+        of its equations.
         """
         n, q = self.model.order, self.outputs_count
-        reset = np.diag([1.0] * n + [0.0] * q)
-        return ImpulsiveError.of(self.error_generator(drift, p), reset, (*self.levels(), *(0,) * q))
+        size, rounds = n + q, len(self.certified_turns)
+        reset = np.zeros((rounds, size, rounds, size))
+        for turn, received in enumerate(self.certified_turns):
+            kept = [1.0] * n + [0.0 if i in received else 1.0 for i in range(q)]
+            reset[(turn + 1) % rounds, :, turn, :] = np.diag(kept)
+        generator = np.kron(np.eye(rounds), self.error_generator(drift, p))
+        levels = (*self.levels(), *(0,) * q) * rounds
+        return ImpulsiveError.of(generator, reset.reshape(rounds * size, rounds * size), levels)
+
+    @property
+    def certified_turns(self) -> tuple[tuple[int, ...], ...]:
+        """Measurements in each packet of a round, as the certificate takes them: `turns`."""
+        return self.turns
 
     def remark(self) -> str:
         """What the certificate is about."""
-        return f"of the delayed state, all measurements in each packet; {super().remark()}"
+        rounds = len(self.certified_turns)
+        packets = "all measurements in each packet" if rounds == 1 else f"{rounds} nodes that send in turn"
+        return f"of the delayed state, {packets}; {super().remark()}"
 
     def condition_of(self, p: Any) -> Condition:
         """(1.51) and (1.52) for the delayed state, and the delay within the declared memory."""

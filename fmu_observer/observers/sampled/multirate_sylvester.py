@@ -8,8 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
-from fmu_observer.certificates.small_gain import independent_gap_limit
+from fmu_observer.certificates import (
+    Certificate,
+    ImpulsiveError,
+    certify_sampled_error,
+    independent_gap_limit,
+    with_independent_samples,
+)
 from fmu_observer.condition import Condition
 from fmu_observer.design.sylvester import sylvester_design, sylvester_residual
 from fmu_observer.models import ObserverModel
@@ -144,15 +149,9 @@ class MultirateSylvester(GapCertified):
             f"left out"
         )
         found = certify_sampled_error((ImpulsiveError.of(generator, reset),), max_gap, model)
-        notes = [f"the Sylvester equation holds with the residual {residual:.1e}"]
-        holds = found.holds and residual < RESIDUAL
-        if count > 1:
-            limit = independent_gap_limit(A, B_d, read, own)
-            notes.append(
-                f"samples each at their own instants are covered up to gaps of {limit:.4g} s, by a small-gain condition"
-            )
-            holds = holds and max_gap < limit
-        return replace(found, holds=holds, notes=tuple(notes))
+        note = f"the Sylvester equation holds with the residual {residual:.1e}"
+        found = replace(found, holds=found.holds and residual < RESIDUAL, notes=(note,))
+        return found if count == 1 else with_independent_samples(found, independent_gap_limit(A, B_d, read, own))
 
     def error_matrices(self, p: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Matrices of ``de_z = A e_z + B_d e_w``, ``de_w = C e_z + D e_w``; a sample sets its component of e_w to zero.

@@ -213,6 +213,10 @@ class AugmentedTrainObserver(TrainObserver):
             certificate, holds=certificate.holds and alone.holds and mixed.holds, notes=(*certificate.notes, *notes)
         )
 
+    def sampled_events(self, p: Any) -> tuple[str, ...]:
+        """Balises, or fixes where balises have no gains; what comes beside them is judged as a mixture."""
+        return ("balise",) if float(self.gains_of("balise", p)[0][0]) > 0.0 else ("gps",)
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _in_force(self, x: Array, p: Any) -> tuple[tuple[Array, ...], Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from fmu_observer.certificates import Certificate, independent_gap_limit, with_independent_samples
 from fmu_observer.models.networked_train import networked_train
 from fmu_observer.observers.sampled.delayed_state_observer import (
     BETWEEN,
@@ -53,6 +54,18 @@ class DelayedTrainObserver(DelayedStateObserver):
         outputs = self.sampled_part(x)
         after = [u.balise_position, outputs[1]] if event == "balise" else [outputs[0], u.packet_speed]
         return self.with_outputs(x, after)
+
+    @property
+    def certified_turns(self) -> tuple[tuple[int, ...], ...]:
+        """Both measurements together; that they come each at its own instants is checked beside it."""
+        return (tuple(range(self.outputs_count)),)
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate where balises and packets come together, and a small-gain condition where they do not."""
+        found, n = super().error_certificate(max_gap, p), self.model.order
+        errors = [self.error_generator(drift, p) for drift in self.model.drifts]
+        limits = [independent_gap_limit(e[:n, :n], e[:n, n:], e[n:, :n], e[n:, n:]) for e in errors]
+        return with_independent_samples(found, min(limits))
 
     @property
     def node_events(self) -> tuple[str, ...]:

@@ -10,7 +10,8 @@ from small_scenarios import small
 
 from cosim import CosimError, Scenario
 from cosim.balises.layout import InstantLayout, by_positions
-from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.certificates import check_certificates
+from cosim.scenario.gaps import expected_gap
 from cosim.scenario.tables import BalisesTable, ComponentTable
 from fmu_observer import OBSERVERS
 
@@ -23,7 +24,9 @@ def warnings_of(observer: str, speed: float | None, **table: Any) -> list[str]:
         position="p.position", speed="p.speed", layout="positions", positions=POSITIONS, expected_speed=speed
     )
     gap = expected_gap(by_positions(POSITIONS), balises, 0.0)
-    return check_certificates({"observer": ComponentTable(observer=observer, **table)}, gap, "warn", "here")[1]
+    return check_certificates(
+        {"observer": ComponentTable(observer=observer, **table)}, {"observer": gap}, "warn", "here"
+    )[1]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ import pytest
 
 from cosim.components.loading import load_block
 from cosim.scenario import balise_service, certificates
-from cosim.scenario.certificates import ExpectedGap, check_certificates
+from cosim.scenario.certificates import check_certificates
+from cosim.scenario.gaps import ExpectedGap
 from cosim.scenario.tables import ComponentTable
 from fmu_observer import OBSERVERS
 from fmus.check.probe import ProbeReport
@@ -36,9 +37,9 @@ def table(name: str, **keys: Any) -> ComponentTable:
 @pytest.mark.parametrize("name", ["takagi_sugeno_cdo", "differentiator_cdo"])
 def test_a_certificate_from_the_cache_is_the_computed_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     data, warnings = certificates._judge("it", table(name), OBSERVERS[name](), GAP)
-    computed = check_certificates({"it": table(name)}, GAP, "warn", "here")
+    computed = check_certificates({"it": table(name)}, {"it": GAP}, "warn", "here")
     monkeypatch.setattr(certificates, "_judge", never)
-    kept = check_certificates({"it": table(name)}, GAP, "warn", "here")
+    kept = check_certificates({"it": table(name)}, {"it": GAP}, "warn", "here")
     assert kept == computed
     assert kept[0] == {"it": json.loads(json.dumps(data))}
     assert kept[1][: len(warnings)] == warnings
@@ -63,7 +64,7 @@ def test_a_certificate_is_asked_for_by_all_it_depends_on(monkeypatch: pytest.Mon
     ]
     for _ in range(2):
         for component, keys, gap in questions:
-            check_certificates({component: keys}, gap, "warn", "here")
+            check_certificates({component: keys}, {component: gap}, "warn", "here")
     assert len(asked) == len(questions)
 
 
@@ -99,4 +100,4 @@ def test_a_probe_that_saw_nothing_is_made_again(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_detector_is_not_asked_for_a_certificate() -> None:
-    assert check_certificates({"it": table("train_diagnosis")}, GAP, "require", "here") == ({}, [])
+    assert check_certificates({"it": table("train_diagnosis")}, {"it": GAP}, "require", "here") == ({}, [])
