@@ -344,7 +344,7 @@ def test_a_matrix_that_proves_nothing_is_refused() -> None:
         said = unfulfilled(observer, changed)
         assert said is not None
         assert "must decay with bound_decay under gain" in said
-        assert f"(bound_decay = {float(changed[names.index('bound_decay')])!r}" in said
+        assert f"bound_decay = {float(changed[names.index('bound_decay')])!r}" in said
     with pytest.raises(ValueError, match=r"must decay with bound_decay.*bound_matrix \(bound_decay = 2 1/s"):
         observer.error_bounds({"bound_decay": 2.0})
 

@@ -31,7 +31,7 @@ from fmu_observer.observers.train.held_odometer_error import (
     proven,
     unknown_level,
 )
-from fmu_observer.observers.train.held_odometer_presets import HELD_ODOMETER_PRESETS
+from fmu_observer.observers.train.held_odometer_presets import DRAG_SLOPES, HELD_ODOMETER_PRESETS
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
@@ -46,7 +46,8 @@ HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, PREDICTING, LAST_INNOVATION, LAST_D,
 
 REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
 PROOF = (
-    "the error must decay with bound_decay under gain, as lyapunov_matrix proves; see "
+    "the error must decay with bound_decay under gain, as lyapunov_matrix proves for the drag slopes of the train "
+    f"(mass, davis_b, davis_c, speed_max; those of the presets for {DRAG_SLOPES[0]:g} to {DRAG_SLOPES[1]:g} 1/s); see "
     "fmu_observer.design.proposition_4_1.bound_matrix"
 )
 
