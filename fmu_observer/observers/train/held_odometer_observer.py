@@ -63,9 +63,10 @@ class HeldOdometerObserver(TrainObserver):
     observed train and never pushes it back. For a speed above zero that is the equation above.
 
     The error obeys ``de = (A - K C) e + K (v(t) - y_k) + w``: the motion since the sample drives it, so it does not
-    vanish while the train accelerates, and three bounds of it run as outputs.
+    vanish while the train accelerates, and bounds of it run as outputs.
 
-    1. `published_bound`: i-DMO or i-CDO, from each sample on, with the error there stated by `published_sample_error`.
+    1. `error_as_printed`: i-DMO or i-CDO, from each sample on, with the error there stated by `published_sample_error`.
+       No bound: what the samples before leave at a sample is larger than stated for some of the printed gains.
     2. `carried_bound` [ours]: the level ``W = sqrt(e' P e)``, carried over samples, no sample needs a statement of its
        own. It covers accelerations up to `acceleration_max`, readings wrong by `odometer_error`, unknown parts of the
        acceleration up to `unknown_acceleration`, of its rate and of the rate of that. What the observer itself does
@@ -79,7 +80,7 @@ class HeldOdometerObserver(TrainObserver):
     Args:
         missing: what becomes of the estimate after a sample that is not used, until the next one that is: ``predicted``
             by the model and the disturbance alone [ours], ``held`` to the last reading that was used, as in the thesis.
-            Held, the estimate is drawn to an old speed; predicted, it goes on, and `published_bound` does not apply.
+            Held, the estimate is drawn to an old speed; predicted, it goes on, and `error_as_printed` does not apply.
             To predict, d and d' are set back to the sample before, for the last reading that was used may have lied
             already, and limited to `disturbance_max` and `disturbance_rate_max`; from there on d' decays,
             ``d d' = -d' / rate_decay_time``, so that d goes on by ``d' rate_decay_time`` at most, however long.
@@ -106,7 +107,7 @@ class HeldOdometerObserver(TrainObserver):
         output_signal("residual", "m/s", "Odometer reading of the last sample minus estimated speed"),
         output_signal("error_bound", "m/s", "Bound of the speed error now: the lesser of carried bound and reading"),
         output_signal("carried_bound", "m/s", "Bound of the speed error carried over samples"),
-        output_signal("published_bound", "m/s", "Published bound, from the last sample on with its stated error"),
+        output_signal("error_as_printed", "m/s", "Printed formula of the error, with a stated one at the last sample"),
         output_signal("position_bound", "m", "Bound of the position error, from the last balise on"),
         output_signal("sample_age", "s", "Time since the last odometer sample that was used"),
     )
@@ -149,8 +150,8 @@ class HeldOdometerObserver(TrainObserver):
         parameter("bound_decay", "1/s", REPAIRED["bound_decay"], "Decay rate of the error that P proves", min=1e-6),
         parameter("speed_max", "m/s", 50.0, "Speed up to which the carried bound holds", min=1e-3),
         parameter("bound_min_speed", "m/s", 0.5, "Speed below which the train may stand still", min=0.0),
-        parameter("published_beta", "1", REPAIRED["published_beta"], "Overshoot beta of the published bound", min=1.0),
-        parameter("published_decay", "1/s", REPAIRED["published_decay"], "Decay m of the published bound", min=1e-6),
+        parameter("published_beta", "1", REPAIRED["published_beta"], "Overshoot beta of the printed formula", min=1.0),
+        parameter("published_decay", "1/s", REPAIRED["published_decay"], "Decay m of the printed formula", min=1e-6),
         parameter("published_sample_error", "m/s", 0.1, "Error norm stated for each sample", min=0.0),
     )
     estimator_events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
@@ -226,7 +227,7 @@ class HeldOdometerObserver(TrainObserver):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimate with its slip, disturbance, residual and bounds."""
         age, norm = self._age(t, x), self.largest_gain_norm(x, p)
-        published = improved_dmo_bound(
+        printed = improved_dmo_bound(
             age, p.published_sample_error, p.published_beta, p.published_decay, norm, p.acceleration_max
         )
         return super().output(t, x, u, p) | {
@@ -234,7 +235,7 @@ class HeldOdometerObserver(TrainObserver):
             "residual": x[HELD_SPEED] - x[1],
             "error_bound": self.error_bound(t, x, p),
             "carried_bound": self.carried_bound(x, p),
-            "published_bound": published,
+            "error_as_printed": printed,
             "position_bound": x[POSITION_BOUND],
             "sample_age": age,
         }
