@@ -1,4 +1,4 @@
-"""Variables that say more than FMI has attributes for: an output that warns, an input that is optional.
+"""Variables that say more than FMI has attributes for: an output that warns, marks such as an optional input.
 
 fmpy's `ModelVariable` knows no annotations. What describes a system makes these variables, what reads a description
 from a file makes them again.
@@ -6,14 +6,20 @@ from a file makes them again.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from plant_models.hybrid.output_warning import OutputWarning
 
-OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT = "fmu-observer.optional-input", "OptionalInput"
-"""Names under which the description of an exported model carries that an input is optional."""
+OPTIONAL, CAN_BE_MISSING = "optional", "can_be_missing"
+MARKS = {
+    OPTIONAL: ("fmu-observer.optional-input", "OptionalInput"),
+    CAN_BE_MISSING: ("fmu-observer.can-be-missing", "CanBeMissing"),
+}
+"""Marks, which are attributes of a `Signal`: annotation and element by which the description of an exported model
+carries each."""
 
 
 class AnnotatedVariable(ModelVariable):
@@ -21,34 +27,34 @@ class AnnotatedVariable(ModelVariable):
 
     Args:
         warning: what is told after a run in which an output was not zero; None for nothing.
-        optional: whether an input keeps its start value on purpose where nothing is connected to it.
+        marks: some of `MARKS`.
         attributes: those of `ModelVariable`, by name.
     """
 
-    def __init__(self, warning: OutputWarning | None = None, optional: bool = False, **attributes: Any) -> None:
+    def __init__(self, warning: OutputWarning | None = None, marks: Collection[str] = (), **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.warning, self.optional = warning, optional
+        self.warning, self.marks = warning, frozenset(marks)
 
     @classmethod
     def of(
-        cls, variable: ModelVariable, warning: OutputWarning | None = None, optional: bool = False
+        cls, variable: ModelVariable, warning: OutputWarning | None = None, marks: Collection[str] = ()
     ) -> AnnotatedVariable:
         """A variable with the attributes of another one.
 
         Args:
-            variable: the other one. warning, optional: see the class.
+            variable: the other one. warning, marks: see the class.
         """
-        made = cls(warning, optional)
+        made = cls(warning, marks)
         for attribute in ModelVariable.__attrs_attrs__:
             setattr(made, attribute.name, getattr(variable, attribute.name))
         return made
 
-    def __getstate__(self) -> tuple[Any, OutputWarning | None, bool]:
-        return super().__getstate__(), self.warning, self.optional  # that of attrs keeps its own fields only
+    def __getstate__(self) -> tuple[Any, OutputWarning | None, frozenset[str]]:
+        return super().__getstate__(), self.warning, self.marks  # that of attrs keeps its own fields only
 
-    def __setstate__(self, state: tuple[Any, OutputWarning | None, bool]) -> None:
+    def __setstate__(self, state: tuple[Any, OutputWarning | None, frozenset[str]]) -> None:
         super().__setstate__(state[0])
-        self.warning, self.optional = state[1:]
+        self.warning, self.marks = state[1:]
 
 
 def declared_warnings(description: ModelDescription) -> dict[str, OutputWarning]:
@@ -67,4 +73,13 @@ def is_optional(variable: ModelVariable) -> bool:
     Args:
         variable: of a block, or of an FMU as `fmus.fmi.description` reads it; that of another tool never says so.
     """
-    return isinstance(variable, AnnotatedVariable) and variable.optional
+    return isinstance(variable, AnnotatedVariable) and OPTIONAL in variable.marks
+
+
+def can_be_missing(variable: ModelVariable) -> bool:
+    """Whether NaN stands for a missing value of an output, or is left out by an input.
+
+    Args:
+        variable: of a block, or of an FMU as `fmus.fmi.description` reads it; that of another tool never says so.
+    """
+    return isinstance(variable, AnnotatedVariable) and CAN_BE_MISSING in variable.marks

@@ -28,6 +28,7 @@ from fmus.fmi.capabilities import tool_warning
 from fmus.fmi.instance import shown
 from fmus.fmi.slave import Slave
 from fmus.fmi.values import element_reader, write_start
+from plant_models.hybrid.missing import MISSED_SAMPLES
 
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 
@@ -190,8 +191,8 @@ class Component(Described, Slave):
         return release
 
     def outcomes(self) -> Mapping[str, int] | None:
-        """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
-        `OUTCOME_VARIABLES`.
+        """Counts of what became of the events told and of the samples that were missing, where the slave keeps them:
+        blocks, and FMUs with `OUTCOME_VARIABLES`.
 
         Of an FMU that cannot say any more those that were read last.
         """
@@ -202,12 +203,12 @@ class Component(Described, Slave):
 
     def _outcome_reader(self) -> Callable[[], Mapping[str, int] | None]:
         """`outcomes` of the slave as it is instantiated, prepared."""
-        if getattr(self.slave, "counters", None) is not None:
-            return lambda: dict(vars(self.slave.counters))
-        counted = [name for name in OUTCOME_VARIABLES if name in self.variables]  # an older export knows fewer
+        counters = getattr(self.slave, "counters", None)
+        told = {**(OUTCOME_VARIABLES if counters is None else {}), MISSED_SAMPLES: MISSED_SAMPLES}
+        counted = [name for name in told if name in self.variables]  # an older export knows fewer
         if not counted:
-            return lambda: None
-        names, values = [OUTCOME_VARIABLES[name] for name in counted], np.zeros(len(counted))
+            return lambda: None if counters is None else dict(vars(self.slave.counters))
+        names, values = [told[name] for name in counted], np.zeros(len(counted))
         read = element_reader(self, counted, values) if self._alive else None
 
         def outcomes() -> Mapping[str, int]:
@@ -216,7 +217,8 @@ class Component(Described, Slave):
                     read()
             except Exception as error:
                 self.explained("counts of events", error)  # after a fatal error nothing is asked any more
-            return dict(zip(names, map(int, values), strict=True))
+            own = {} if counters is None else vars(self.slave.counters)
+            return own | dict(zip(names, map(int, values), strict=True))
 
         return outcomes
 

@@ -4,14 +4,17 @@ slave.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 from fmpy.model_description import ModelVariable
 
 from cosim.errors import CouplingError, nearest
+from fmu_observer.annotated_variable import can_be_missing
 from fmus.fmi import described as fmi
 from fmus.fmi.elements import Element, described
 from fmus.fmi.standard import OWN_TOOL
+from fmus.fmi.types import FLOATING_TYPES
 from fmus.fmi.units import Units
 from plant_models.hybrid.units import Unit, UnitError
 
@@ -24,6 +27,37 @@ class Described(fmi.Described):
 
     kind: str
     """``FMU``, ``block`` or another kind of slave."""
+
+    declared_missing: frozenset[str] = frozenset()
+    """Signals of which the scenario says that they can be missing."""
+
+    def declare_missing(self, names: Sequence[str], where: str) -> None:
+        """Say of outputs that NaN stands for a missing value, of inputs that the component leaves NaN out.
+
+        Args:
+            names: of variables, in the words of a scenario. where: place for messages.
+
+        Raises:
+            CouplingError: there is no such input, output or local variable, or its type has no NaN.
+        """
+        for name in names:
+            variable = self.variable(name, "output", "input", "local")
+            if variable.type not in FLOATING_TYPES:
+                raise CouplingError(
+                    f"{where}: can_be_missing: {self.name}.{name} is a {variable.type}, which has no NaN; only a "
+                    "floating-point number can be missing."
+                )
+        self.declared_missing |= frozenset(names)
+
+    def can_be_missing(self, name: str) -> bool:
+        """Whether NaN stands for a missing value of a signal, or is left out by an input.
+
+        Args:
+            name: variable, or element of an array.
+        """
+        return not self.declared_missing.isdisjoint((name, name.partition("[")[0])) or can_be_missing(
+            self.variables[name]
+        )
 
     def choose_tolerance(self, tolerance: float | str | None) -> None:
         """Another relative tolerance than the declared one. FMI 1.0 knows of none.

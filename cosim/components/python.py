@@ -16,6 +16,7 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.python_model import UNKNOWN_UNIT, Inputs, PythonModel, slices
 from cosim.components.start_values import StartValue
+from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from plant_models.hybrid.signal import Signal
 
 EVENT = "balise"
@@ -252,7 +253,7 @@ class PythonComponent(FMI3Component):
     """
 
     def __init__(self, name: str, model: PythonModel, source: str) -> None:
-        slave = PythonSlave(model)
+        slave, self._model = PythonSlave(model), model
         super().__init__(name, slave, slave.model_description, source=source, kind="block")
 
     def configure(self, starts: Mapping[str, StartValue]) -> None:
@@ -262,12 +263,22 @@ class PythonComponent(FMI3Component):
             starts: values by name.
         """
 
+    def declare_missing(self, names: Sequence[str], where: str) -> None:
+        """As for `Described`; the object may give NaN for these outputs.
+
+        Args:
+            names: of variables. where: place for messages.
+        """
+        super().declare_missing(names, where)
+        self._model.declare_missing(names)
+
 
 def _variable(signal: Signal, name: str, reference: int, model: PythonModel, clock: ModelVariable) -> ModelVariable:
     truth = model.kinds.get(signal.name) is bool
     start = signal.start_values[signal.scalar_names.index(name)]
     told = signal.variability == "discrete" and signal.causality == "input"
-    return ModelVariable(
+    return AnnotatedVariable(
+        marks=[mark for mark in MARKS if getattr(signal, mark)],
         name=name,
         valueReference=reference,
         type="Boolean" if truth else "Float64",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from hashlib import sha256
 from inspect import Parameter, Signature, getattr_static, getsourcefile, signature
 from pathlib import Path
@@ -99,6 +100,15 @@ class PythonModel:
                 f"{attribute} = {declared!r} cannot be ({error}); write {attribute} = {{'name': 'unit'}}, or "
                 "{'name': ('unit', size)} for a vector"
             ) from error
+
+    def declare_missing(self, names: Sequence[str]) -> None:
+        """Say of outputs that NaN stands for a missing value.
+
+        Args:
+            names: of them, or of elements; others are left alone.
+        """
+        whole = {name.partition("[")[0] for name in names}
+        self.outputs = tuple(replace(s, can_be_missing=s.can_be_missing or s.name in whole) for s in self.outputs)
 
     def _parameters(self) -> tuple[Signal, ...]:
         """The arguments of the constructor whose defaults are numbers; of an instance its attributes of these names."""
@@ -266,7 +276,7 @@ class PythonModel:
         if value.shape != expected:
             wanted = "one number, shape ()" if expected == () else f"shape {expected}"
             raise PythonModelError(f"output {signal.name!r} has shape {value.shape}{after}, expected {wanted}")
-        if not np.isfinite(value).all():
+        if not (np.isfinite(value) | (signal.can_be_missing & np.isnan(value))).all():
             raise PythonModelError(f"output {signal.name!r} is {value}{after}, expected finite numbers")
         return value
 

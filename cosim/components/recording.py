@@ -18,6 +18,7 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.recording_data import Interpolation, Recording, make_recording, whole_number_columns
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.load import load_result
+from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
 
 KIND = "recording"
 
@@ -170,7 +171,8 @@ def describe(recording: Recording) -> ModelDescription:
     """The model description of a recording: one output for each column, nothing else."""
     whole = whole_number_columns(recording)
     outputs = [
-        ModelVariable(
+        AnnotatedVariable(
+            marks=[CAN_BE_MISSING] if signal.can_be_missing else [],
             name=signal.name,
             valueReference=i,
             type="Int32" if is_whole else "Float64",
@@ -207,18 +209,20 @@ def load_recording(
     interpolation: Interpolation,
     span: tuple[float, float] | None,
     where: str,
+    can_be_missing: Sequence[str] = (),
 ) -> Recording:
     """The recording of a results folder or table.
 
     Args:
         path: of it. name: of the component that plays it back. component: whose columns to take, see `make_recording`.
         interpolation: between the rows. span: start and stop of the run [s], or None. where: place for messages.
+        can_be_missing: columns in which NaN stands for a missing value.
 
     Raises:
         ScenarioError: it cannot be read, or cannot be played back.
     """
     try:
-        return make_recording(load_result(path), str(path), component, name, interpolation, span)
+        return make_recording(load_result(path), str(path), component, name, interpolation, span, can_be_missing)
     except ScenarioError as error:
         raise ScenarioError(f"{where}: {error}") from error
     except CosimError as error:

@@ -5,7 +5,7 @@ results only.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -28,7 +28,7 @@ class Recording:
         time: of the rows [s], not decreasing, shape (rows,). Of rows with the same time the first one is before an
             event, the last one after it.
         signals: what each column is; names without a component.
-        values: shape (rows, n), finite.
+        values: shape (rows, n), finite; NaN in signals that can be missing.
         held: mask of the columns that keep their value until the next row, shape (n,); the others run on lines.
         events: times at which something may have jumped [s], increasing.
         left_out: columns that cannot be played back, by name, and why.
@@ -80,6 +80,7 @@ def make_recording(
     name: str,
     interpolation: Interpolation,
     span: tuple[float, float] | None,
+    can_be_missing: Collection[str] = (),
 ) -> Recording:
     """The recording of one component of a result, or of a whole table.
 
@@ -90,6 +91,8 @@ def make_recording(
         name: of the component that plays it back.
         interpolation: between the rows; what was recorded as discrete is always held.
         span: start and stop of the run [s], which the recording must cover; None where nobody steps it.
+        can_be_missing: columns in which NaN stands for a missing value, beside those recorded as such. Between two rows
+            of which one is missing a line is missing too.
 
     Raises:
         ScenarioError: nothing was recorded, the component is not in it, times do not increase, or it does not cover the
@@ -101,11 +104,16 @@ def make_recording(
     rows = _rows(time, span)
     signals, columns, left_out = [], [], {}
     for column, signal in chosen.items():
-        values, fault = _without_gaps(np.array(result.table[column][rows], dtype=float), time[rows], interpolation)
+        values = np.array(result.table[column][rows], dtype=float)
+        fault, known = "", signal
+        if signal.name in can_be_missing or signal.can_be_missing:
+            known, values = replace(signal, can_be_missing=True), np.where(np.isfinite(values), values, np.nan)
+        else:
+            values, fault = _without_gaps(values, time[rows], interpolation)
         if fault:
             left_out[signal.name] = fault
         else:
-            signals.append(signal)
+            signals.append(known)
             columns.append(values)
     if not signals:
         raise ScenarioError(
@@ -192,7 +200,8 @@ def _events(time: np.ndarray, values: np.ndarray, telegrams: np.ndarray) -> np.n
     last = np.append(first[1:], len(time)) - 1
     several = first < last
     first, last = first[several], last[several]
-    differ = np.any(values[first] != values[last], axis=1)
+    same = (values[first] == values[last]) | (np.isnan(values[first]) & np.isnan(values[last]))
+    differ = ~np.all(same, axis=1)
     known = np.append(np.sort(telegrams[np.isfinite(telegrams)]), np.inf)  # NaN are those that were missed
     told = known[np.searchsorted(known, time[first] - TIME_TOLERANCE)] <= time[first] + TIME_TOLERANCE
     return np.asarray(time[first][differ | ~told])
@@ -208,8 +217,9 @@ def _without_gaps(values: np.ndarray, time: np.ndarray, interpolation: Interpola
         return values[np.maximum.accumulate(np.where(good, np.arange(len(values)), 0))], ""
     fault = f"its value at {time[bad]:g} s is {values[bad]} ({int((~good).sum())} such of {len(values)})"
     hint = {
-        "hold": "there is nothing before it to hold",
-        "linear": "interpolation = 'hold' keeps the last value over gaps",
+        "hold": "there is nothing before it to hold; can_be_missing says that filters leave it out",
+        "linear": "can_be_missing says that filters leave it out; interpolation = 'hold' keeps the last value over "
+        "gaps, and whoever samples takes it for a new one",
     }
     return values, f"{fault}; {hint[interpolation]}"
 

@@ -106,6 +106,7 @@ def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[
         source = split_name(source_name, components, "Connection source")
         target = split_name(target_name, components, "Connection target")
         exact = _exact(components, source, target, transformation)
+        _require_leaving_out(components, source, target)
         factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
         for output, name in _elements(components, source, target):
             made = Connection(
@@ -143,8 +144,27 @@ def event_connection(pair: Link, components: Mapping[str, Component]) -> Connect
     target = split_name(target_name, components, "Connection target")
     components[source[0]].variable(source[1], *SOURCES)
     components[target[0]].variable(target[1], "input")
+    _require_leaving_out(components, source, target)
     factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
     return Connection(source, target, *transformation.after(factor, offset))
+
+
+def _require_leaving_out(components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str]) -> None:
+    """What can be missing goes only to those that leave it out.
+
+    Raises:
+        CouplingError: the target would compute with NaN.
+    """
+    if not components[source[0]].can_be_missing(source[1]) or components[target[0]].can_be_missing(target[1]):
+        return
+    able = [n for n in components[target[0]].names("input") if components[target[0]].can_be_missing(n)]
+    inputs = f"; of {target[0]} these do: {', '.join(able)}" if able else ""
+    raise CouplingError(
+        f"Connection {'.'.join(source)} -> {'.'.join(target)}: {'.'.join(source)} can be missing (NaN), and "
+        f"{'.'.join(target)} does not leave out what is missing{inputs}. Connect it to a filter or observer that does, "
+        f"or, where the component takes NaN for a missing value itself, declare can_be_missing = ['{target[1]}'] in "
+        f"[components.{target[0]}]."
+    )
 
 
 def _elements(

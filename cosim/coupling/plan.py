@@ -52,6 +52,7 @@ class Plan:
         start: the same at the start of the step, shape (n,).
         signals: what each value is, in the same order.
         continuous: mask of the values that may be interpolated between communication points, shape (n,).
+        can_be_missing: mask of the values of which NaN says that there is none, shape (n,); none of them is continuous.
         non_numeric: connected outputs that are no numbers, or integers beyond doubles; shape (m,), of objects. Whoever
             keeps and restores a copy of `values` does so with them.
         non_numeric_start: the same at the start of the step, shape (m,).
@@ -70,6 +71,7 @@ class Plan:
     start: np.ndarray
     signals: list[SignalInfo]
     continuous: np.ndarray
+    can_be_missing: np.ndarray
     non_numeric: np.ndarray
     non_numeric_start: np.ndarray
     connections: Sequence[Connection] = ()
@@ -160,7 +162,8 @@ def make_plan(
         signals += [_info(still, signal) for signal in outputs]
     twice = np.zeros(2 * len(signals))
     values, start = twice[: len(signals)], twice[len(signals) :]
-    continuous = np.array([s.variability == "continuous" for s in signals], dtype=bool)
+    missing = np.array([s.can_be_missing for s in signals], dtype=bool)
+    continuous = np.array([s.variability == "continuous" for s in signals], dtype=bool) & ~missing
     steps = []
     for name in order:
         component, span = components[name], spans[name]
@@ -169,7 +172,7 @@ def make_plan(
         inputs = connected_inputs(component, connections, columns, twice, non_numeric)
         steps.append(PlannedComponent(component, values[span], read, inputs, span, continuous[span]))
     now, before = cells[: len(places)], cells[len(places) :]
-    return Plan(steps, values, start, signals, continuous, now, before, connections, clocks)
+    return Plan(steps, values, start, signals, continuous, missing, now, before, connections, clocks)
 
 
 def _in_order(
@@ -208,6 +211,5 @@ def _info(component: Component, name: str) -> SignalInfo:
     display = variable.displayUnit or (declared.displayUnit if declared is not None else None)
     flows = variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
     unit = component.unit_name(name) or "1"
-    return SignalInfo(
-        f"{component.name}.{name}", unit, display, "continuous" if flows else "discrete", variable.description or ""
-    )
+    kind, text = "continuous" if flows else "discrete", variable.description or ""
+    return SignalInfo(f"{component.name}.{name}", unit, display, kind, text, component.can_be_missing(name))

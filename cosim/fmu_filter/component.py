@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from cosim.fmu_model.opening import open_model, start_value
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states, usual_step
 from fmus.check.probe import probe
+from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
 from plant_models.hybrid.units import UnitError, parse_unit
 
@@ -36,8 +38,9 @@ class FmuFilterModel:
     """A filter over an FMU: ``step`` predicts and takes samples, ``balise`` takes telegrams, late ones too.
 
     Inputs are those of the FMU, and ``measured_NAME`` for each output that is measured. Outputs are the estimated
-    states, the FMU's outputs at the estimate, ``NAME_std`` for each state, ``nis`` and ``nis_degrees``. In names such
-    as ``body.v[2]`` all but letters, digits and ``_`` becomes ``_``.
+    states, the FMU's outputs at the estimate, ``NAME_std`` for each state, ``nis``, ``nis_degrees`` and
+    ``missed_samples``: measurements that are NaN are left out, and counted. In names such as ``body.v[2]`` all but
+    letters, digits and ``_`` becomes ``_``.
 
     Args:
         path: the ``.fmu`` file. table: which filter. parameters: start values of the FMU by name.
@@ -75,7 +78,10 @@ class FmuFilterModel:
             self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
         self._words = legal_names([*model.inputs, *model.states, *model.outputs])
         self.inputs = [_signal(model, name, "input", self._words[name]) for name in model.inputs]
-        self.inputs += [_signal(model, name, "input", MEASURED + self._words[name]) for name in table.measurements]
+        self.inputs += [
+            replace(_signal(model, name, "input", MEASURED + self._words[name]), can_be_missing=True)
+            for name in table.measurements
+        ]
         self.outputs = self._output_signals()
         self._driven = [self._words[name] for name in model.inputs]
         self._told = [self._words[name] for name in model.outputs]
@@ -84,7 +90,7 @@ class FmuFilterModel:
         self._deviations = [f"{name}_std" for name in self._means]
         self._unchecked = not checked and table.kind != "particle"
         self._journal: Journal | None = None
-        self._next = 0
+        self._next = self._missed = 0
         self._u = model.start_inputs.copy()
         if table.balise is None:
             self.balise = None  # type: ignore[method-assign,assignment]
@@ -111,9 +117,8 @@ class FmuFilterModel:
         if self._seen and (period is None or now >= self._origin + self._next * period - SAME):
             y = np.array([inputs[name] for name in self._measured_inputs], dtype=float)
             finite = np.isfinite(y)  # NaN is a missing measurement
-            if finite.all():
-                journal.correct(now, self._u, self._seen, y, self._R)
-            elif finite.any():
+            self._missed += int(np.count_nonzero(~finite))
+            if finite.any():
                 known = np.flatnonzero(finite)
                 seen = [self._seen[i] for i in known]
                 journal.correct(now, self._u, seen, y[known], self._R[np.ix_(known, known)])
@@ -139,7 +144,7 @@ class FmuFilterModel:
     def get_state(self) -> Any:
         """What to keep in order to return here."""
         journal = None if self._journal is None else self._journal.state()
-        return journal, self._next, self._u.copy(), getattr(self, "_origin", 0.0)
+        return journal, self._next, self._u.copy(), getattr(self, "_origin", 0.0), self._missed
 
     def set_state(self, state: Any) -> None:
         """Return.
@@ -147,7 +152,7 @@ class FmuFilterModel:
         Args:
             state: from `get_state`.
         """
-        journal, self._next, self._u, self._origin = state
+        journal, self._next, self._u, self._origin, self._missed = state
         if journal is None:
             self._journal = None
         else:
@@ -181,7 +186,7 @@ class FmuFilterModel:
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         found.update(zip(self._deviations, deviations.tolist(), strict=True))
         found["nis"], found["nis_degrees"] = belief.nis, float(belief.degrees)
-        return found
+        return found | {MISSED_SAMPLES: float(self._missed)}
 
     def _output_signals(self) -> list[Signal]:
         model = self._model
@@ -192,6 +197,7 @@ class FmuFilterModel:
             *found,
             output_signal("nis", "1", "NIS of the last sample"),
             output_signal("nis_degrees", "1", "Values in it"),
+            output_signal(MISSED_SAMPLES, "1", "Measurements that were missing at a sample", variability="discrete"),
         ]
 
     def __getattr__(self, name: str) -> float:
@@ -206,7 +212,7 @@ class FmuFilterModel:
         if name in self._told:
             _, y = self._model.values_at(0.0, self._start, self._model.start_inputs)
             return float(y[self._told.index(name)])
-        if name in ("nis", "nis_degrees"):
+        if name in ("nis", "nis_degrees", MISSED_SAMPLES):
             return 0.0
         raise AttributeError(name)
 

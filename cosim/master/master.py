@@ -89,7 +89,7 @@ class Master:
         self.exchange_rounds = 0
         self.ended_early: str | None = None
         self._progress = progress
-        self._all_finite = make_finite_check(plan.values)
+        self._all_finite = make_finite_check(plan.values, plan.can_be_missing)
         self._stepper: StepperChoice | None = None
         self._choose_stepper = stepper
         self.between_steps: Callable[[], None] | None = None
@@ -219,11 +219,14 @@ class Master:
     def _check_finite(self, t: float) -> None:
         if self._all_finite():
             return
-        bad = int(np.argmin(np.isfinite(self.plan.values)))
-        name, value = self.plan.signals[bad].name, self.plan.values[bad]
-        component = name.partition(".")[0]
+        values = self.plan.values
+        bad = int(np.argmin(np.isfinite(values) | (self.plan.can_be_missing & np.isnan(values))))
+        name, value = self.plan.signals[bad].name, values[bad]
+        component, _, signal = name.partition(".")
+        declare = f"can_be_missing = ['{signal}'] in [components.{component}], and filters leave it out"
+        hint = f" If NaN says that a measurement is missing, declare it: {declare}." if np.isnan(value) else ""
         raise RunError(
-            f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t
+            f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.{hint}", component, t
         )
 
 

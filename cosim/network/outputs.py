@@ -13,6 +13,7 @@ from cosim.components.start_values import StartValue
 from cosim.coupling.connection import split_name
 from cosim.errors import ScenarioError
 from cosim.network.settings import NetworkSettings
+from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
 from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES
 
 NAME = "network"
@@ -83,7 +84,7 @@ def _description(
 
     def add(name: str, description: str, **more: Any) -> None:
         variables.append(
-            ModelVariable(
+            AnnotatedVariable(
                 name=name,
                 valueReference=len(variables) + 1,
                 type="Float64",
@@ -98,7 +99,8 @@ def _description(
         for name, (component, signal) in zip(settings.signals, sources, strict=True):
             units = _units(components[component], signal)
             if kind == "received":
-                add(name, f"Last received value of {name}", **units)
+                marks = [CAN_BE_MISSING] if components[component].can_be_missing(signal) else []
+                add(name, f"Last received value of {name}", marks=marks, **units)
             else:
                 add(error_name(name), f"Last sent minus true value of {name} before the last transmission", **units)
     add(SENDER, "Number of the node that sent last, from 1; 0 before")

@@ -186,21 +186,22 @@ class NetworkService:
 
     def _begin(self) -> None:
         self._begun = True
-        self._sent[:] = self._plan.values[self._held]
+        self._sent[:] = np.nan_to_num(self._plan.values[self._held])
 
     def _transmit(self, t: float) -> None:
         """Transmission `number`, now: one node sends what it measures."""
         k, values = self.number, self._plan.values
         stamp = self._next
         measured = values[self.sources]
-        error = self._sent - measured
+        there = ~np.isnan(measured)  # what is missing was sent before as well as it can be
+        error = np.where(there, self._sent - measured, 0.0)
         values[self._errors] = error
         if self._weights is None:
             node = periodic_sender(self._order, k)
         else:  # of nodes with equal errors the first by name, however they are listed
             node = self._by_name[quadratic_sender(self._weights, error)]
         own = self._own[node]
-        self._sent[own] = measured[own]
+        self._sent[own] = np.where(there[own], measured[own], self._sent[own])
         values[self._sender] = node + 1.0
         self.number, self._next = k + 1, self.chance.instant(k + 1)
         told = tuple(measured[own].tolist())

@@ -22,6 +22,7 @@ class SignalInfo:
         display_unit: unit to show to people, or None for `unit`.
         variability: ``continuous`` or ``discrete`` (held between its changes).
         description: one line.
+        can_be_missing: whether NaN says that there is no value.
     """
 
     name: str
@@ -29,6 +30,7 @@ class SignalInfo:
     display_unit: str | None = None
     variability: Literal["continuous", "discrete"] = "continuous"
     description: str = ""
+    can_be_missing: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -144,7 +144,16 @@ def component_factories(
         else:
             told = tolerance if table.tolerance is None else table.tolerance
             factories[name] = partial(load_fmu, (folder / str(table.fmu)).resolve(), name, told)
+        if table.can_be_missing:
+            factories[name] = partial(_declared, factories[name], table.can_be_missing, places[name])
     return factories, made.notes
+
+
+def _declared(factory: Callable[[], Component], missing: Sequence[str], where: str) -> Component:
+    """A component some signals of which can be missing."""
+    component = factory()
+    component.declare_missing(missing, where)
+    return component
 
 
 def python_component(name: str, table: ComponentTable, where: str) -> PythonComponent:
@@ -192,7 +201,7 @@ def open_recording(
         ScenarioError: the recording cannot be read or played back.
     """
     path = (folder / str(table.recording)).resolve()
-    return load_recording(path, name, table.component, table.interpolation, span, where)
+    return load_recording(path, name, table.component, table.interpolation, span, where, table.can_be_missing)
 
 
 def left_out_note(name: str, recording: Recording) -> list[str]:

@@ -114,6 +114,7 @@ def describe_component(
         component = describe_system(system, name, version, table.preset)
         component.kind = "block" if backend.startswith("block") else "FMU"
     component.configure(table.parameters)
+    component.declare_missing(table.can_be_missing, where)
     return component
 
 

@@ -83,6 +83,7 @@ class ComponentTable(Table):
     late_policy: LatePolicy = "replay"
     replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
     record: list[str] = []
+    can_be_missing: list[str] = []
     log: Literal["all", "errors", "none"] | list[str] | None = None
     label: str | None = None
     every: Annotated[int, Field(ge=1)] = 1

@@ -72,7 +72,9 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
     if found is None:
         return str(error)
     cause = f"{found.text} {_fed(plan, table, found)}"
-    if np.isfinite(plan.values).all():  # a component failed by itself: it may have other reasons
+    if (
+        np.isfinite(plan.values) | plan.can_be_missing
+    ).all():  # a component failed by itself: it may have other reasons
         return f"{error} Before that: {cause}"
     return f"{cause} In the end: {error}"
 
@@ -97,9 +99,9 @@ def _signals(step: PlannedComponent, plan: Plan) -> list[str]:
 def _departure(step: PlannedComponent, signal: str, table: Any) -> Departure | None:
     name = step.component.name
     values = np.asarray(table[f"{name}.{signal}"], dtype=float)
-    finite = np.isfinite(values)
+    finite = np.isfinite(values) | (step.component.can_be_missing(signal) & np.isnan(values))
     rows = [] if finite.all() else [(int(np.argmin(finite)), "became no finite number")]
-    for bounds in _ranges(step, signal, values[finite]):
+    for bounds in _ranges(step, signal, values[np.isfinite(values)]):
         excess = np.where(finite, np.maximum(values - bounds.high, bounds.low - values), inf)
         row = _for_good(excess > 0.0)
         if row is not None and excess.max() > bounds.grave:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from fmpy.model_description import Item, ModelVariable, SimpleType
 
-from fmu_observer.annotated_variable import AnnotatedVariable
+from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from fmu_observer.description.variable_table import VariableTable, exposed_inputs, referenced
 from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, OUTCOME_TEXTS, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Signal, TriggeredEvent
@@ -65,8 +65,9 @@ def _signal_variable(signal: Signal, name: str, reference: int, real: str, start
     variable.displayUnit = signal.display_unit or DISPLAY_UNITS.get(signal.unit)
     variable.min = None if signal.min is None else repr(float(signal.min))
     variable.max = None if signal.max is None else repr(float(signal.max))
-    annotated = signal.warning is not None or signal.optional
-    return AnnotatedVariable.of(variable, signal.warning, signal.optional) if annotated else variable
+    marks = [mark for mark in MARKS if getattr(signal, mark)]
+    annotated = signal.warning is not None or marks
+    return AnnotatedVariable.of(variable, signal.warning, marks) if annotated else variable
 
 
 def _event_variables(

@@ -153,10 +153,23 @@ def normalised_square(error: Array, covariance: Array) -> Array:
     return error @ solved(covariance, error)
 
 
-def log_likelihood(innovation: Array, S: Array) -> Array:
+def decoupled(noise: Array, there: Array) -> Array:
+    """Covariance of measurements some of which are missing: those stand alone, with variance 1.
+
+    With no slope and no innovation of their own they then change nothing.
+
+    Args:
+        noise: of all measurements, shape (q, q). there: 1 for a measurement, 0 for one that is missing, shape (q,).
+    """
+    return noise * np.outer(there, there) + np.diag(1.0 - there)
+
+
+def log_likelihood(innovation: Array, S: Array, count: Array | None = None) -> Array:
     """Logarithm of the Gaussian density of an innovation, ``-(q log 2 pi + log det S + e' inv(S) e) / 2``.
 
     Args:
         innovation: shape (q,). S: its covariance, shape (q, q).
+        count: how many measurements there were, where some were `decoupled`; None for all.
     """
-    return -0.5 * (innovation.shape[0] * log(2.0 * pi) + np.log(np.linalg.det(S)) + normalised_square(innovation, S))
+    numbers = innovation.shape[0] if count is None else count
+    return -0.5 * (numbers * log(2.0 * pi) + np.log(np.linalg.det(S)) + normalised_square(innovation, S))

@@ -17,6 +17,7 @@ from fmu_observer.observers.innovation_gate import (
     judge,
 )
 from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal, vector, width
+from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -86,15 +87,16 @@ class GatedObserver(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """`update`, where the gate lets the telegram pass; shape (n,)."""
-        own, gate = [x[i] for i in range(self.own_count)], [x[i] for i in range(self.own_count, self.state_count)]
+        own, gate = [x[i] for i in range(self.own_count)], [x[i] for i in range(self.own_count, x.shape[0])]
         if not self.gated or event != GATED_EVENT:
             after = self.update(event, t, vector(*own), u, p)
             return vector(*(after[i] for i in range(self.own_count)), *gate)
         estimate = own[self.position_state]
-        told = Told(
-            u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), self.odometer_of(u), t
-        )
-        judged = judge(GateMemory(*gate), told, p)
+        before, odometer = GateMemory(*gate), self.odometer_of(u)
+        if odometer is not None:  # where it is missing, the one at the doubted telegram is the last that is known
+            odometer = or_else(odometer, before.doubted_odometer)
+        told = Told(u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), odometer, t)
+        judged = judge(before, told, p)
         listens = self.listens(p)
         used = np.where(listens > 0.0, judged.used, 1.0)
         kept = list(own)

@@ -26,6 +26,7 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
+from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array
 
@@ -42,11 +43,13 @@ class ModelObserver(HybridSystem):
     2. The state begins with the estimates ``estimated_<x>``, n of them, which flow; behind them stand `extra_states`,
        continuous too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind
        `extra_states`. A subclass sets both before ``super().__init__``.
-    3. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in
+    3. A measurement of an event may be missing (NaN): the event does not occur then, unless `leaves_out` is set and the
+       jump leaves it out itself, by `innovation` for instance.
+    4. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in
        use.
-    4. Gains are parameters (`gain_parameter`), so they can be changed in an FMU; their starts come from a design rule
+    5. Gains are parameters (`gain_parameter`), so they can be changed in an FMU; their starts come from a design rule
        that the subclass names. Matrices are flat, row by row; `as_matrix` restores them.
-    5. Outputs are the estimates under the names of the model's states.
+    6. Outputs are the estimates under the names of the model's states.
 
     Args:
         model: a model or the name of one in `MODELS`.
@@ -58,6 +61,7 @@ class ModelObserver(HybridSystem):
 
     timing: ClassVar[Timing] = "continuous"
     discrete: ClassVar[bool] = False
+    leaves_out: ClassVar[bool] = False
     extra_states: tuple[Signal, ...] = ()
     extra_memory: tuple[Signal, ...] = ()
     gain_parameters: tuple[Signal, ...] = ()
@@ -120,8 +124,9 @@ class ModelObserver(HybridSystem):
         return parameter(name, unit, tuple(map(float, values.ravel())), description, size=values.size)
 
     def innovation(self, x: Array, u: Any) -> Array:
-        """``C xh - y``, shape (q,)."""
-        return self.model.measured(self.estimates(x)) - self.measured(u)
+        """``C xh - y``, shape (q,); zero where a measurement is missing."""
+        expected = self.model.measured(self.estimates(x))
+        return expected - or_else(self.measured(u), expected)
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
@@ -147,11 +152,14 @@ class ModelObserver(HybridSystem):
         )
 
     def _events(self) -> tuple[Any, ...]:
+        leaves_out = self.leaves_out
         if self.timing == "periodic":
-            return (PeriodicEvent("sampling", "sample_period", description="The measurements are read"),)
+            read, text = tuple(f"measured_{s.name}" for s in self.model.measurements), "The measurements are read"
+            return (PeriodicEvent("sampling", "sample_period", description=text, samples=read, leaves_out=leaves_out),)
         if self.timing == "event":
             payload = tuple(_renamed(s, f"{self.model.event}_", "discrete") for s in self.model.measurements)
-            return (TriggeredEvent(self.model.event, payload, "A measurement arrives, at its own time stamp"),)
+            read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
+            return (TriggeredEvent(self.model.event, payload, text, samples=read, leaves_out=leaves_out),)
         return ()
 
 

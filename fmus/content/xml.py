@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
 
-from fmu_observer.annotated_variable import OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT, AnnotatedVariable
+from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from fmus.content.characters import check_text, number_text
 from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT
 
@@ -197,14 +197,12 @@ def _variable_3(parent: Element, variable: ModelVariable, exchanged: bool) -> No
 
 
 def _annotations(element: Element, variable: ModelVariable, tag: str, key: str) -> None:
-    """What an output warns of, and that an input is optional; `tag` and `key`: how the version of FMI names who says
-    it.
-    """
+    """What an output warns of, and the marks; `tag` and `key`: how the version of FMI names who says it."""
     if not isinstance(variable, AnnotatedVariable):
         return
     annotations = SubElement(element, "Annotations")
-    if variable.optional:
-        SubElement(SubElement(annotations, tag, {key: OPTIONAL_ANNOTATION}), OPTIONAL_ELEMENT)
+    for name, mark in (MARKS[mark] for mark in MARKS if mark in variable.marks):
+        SubElement(SubElement(annotations, tag, {key: name}), mark)
     warning = variable.warning
     if warning is not None:
         check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable, Unknown, ValidationError
 
-from fmu_observer.annotated_variable import OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT, AnnotatedVariable
+from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from fmus.fmi.standard import OWN_TOOL
 from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT, OutputWarning
 
@@ -103,13 +103,13 @@ def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
 
 
 def _complete_annotations(description: ModelDescription, root: ElementTree.Element) -> None:
-    """What outputs warn of and which inputs are optional, which the FMUs of this package say in annotations."""
+    """What outputs warn of and how variables are marked, which the FMUs of this package say in annotations."""
     made = {}
     entries = {entry.get("name"): entry for entry in root.iterfind("ModelVariables/*")}
     for variable in description.modelVariables:
         entry = entries[variable.name]
         told = _annotation(entry, ANNOTATION, ELEMENT)
-        optional = _annotation(entry, OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT) is not None
+        marks = [mark for mark, names in MARKS.items() if _annotation(entry, *names) is not None]
         warning = None
         if told is not None and told.text:
             reaches = told.get("reaches")
@@ -119,8 +119,8 @@ def _complete_annotations(description: ModelDescription, root: ElementTree.Eleme
                 told.get("atEnd") in TRUE,
                 None if reaches is None else float(reaches),
             )
-        if warning is not None or optional:
-            made[variable.name] = AnnotatedVariable.of(variable, warning, optional)
+        if warning is not None or marks:
+            made[variable.name] = AnnotatedVariable.of(variable, warning, marks)
     description.modelVariables = [made.get(v.name, v) for v in description.modelVariables]
     for unknown in (*description.outputs, *description.derivatives, *description.initialUnknowns):
         unknown.variable = made.get(unknown.variable.name, unknown.variable)

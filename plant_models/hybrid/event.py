@@ -29,6 +29,9 @@ class TriggeredEvent:
         description: one line for the user.
         verdict: name of the memory that holds, after the jump, what the system made of the event (`USED`, `DOUBTED`,
             `IGNORED`); empty where it uses every one.
+        samples: names of payloads that are measurements read at this event, each of which can be missing (NaN). Where
+            one is, the event does not occur, unless `leaves_out` says otherwise; the system counts what was missing.
+        leaves_out: whether `jump` is called with NaN and leaves out each of the samples itself (`hybrid.missing`).
 
     Raises:
         ValueError: a payload has another prefix, is not a discrete input, or takes the name of the count or the stamp.
@@ -38,6 +41,8 @@ class TriggeredEvent:
     payload: tuple[Signal, ...] = ()
     description: str = ""
     verdict: str = ""
+    samples: tuple[str, ...] = ()
+    leaves_out: bool = False
 
     def __post_init__(self) -> None:
         for signal in self.payload:
@@ -66,6 +71,9 @@ class PeriodicEvent:
         offset: name of the parameter that holds the offset [s], or None for zero.
         noises: standard normal numbers drawn afresh at every instant and handed to `jump` as inputs.
         description: one line for the user.
+        samples: names of inputs that are measurements read at this event, each of which can be missing (NaN). Where
+            one is, the event does not occur, unless `leaves_out` says otherwise; the system counts what was missing.
+        leaves_out: whether `jump` is called with NaN and leaves out each of the samples itself (`hybrid.missing`).
     """
 
     name: str
@@ -73,6 +81,8 @@ class PeriodicEvent:
     offset: str | None = None
     noises: tuple[Signal, ...] = ()
     description: str = ""
+    samples: tuple[str, ...] = ()
+    leaves_out: bool = False
 
 
 @dataclass(frozen=True, slots=True)

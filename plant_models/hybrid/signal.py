@@ -36,10 +36,13 @@ class Signal:
         integer: a whole number to the outside; only a discrete output can be one.
         warning: what is told after a run in which the value was not zero; of scalar outputs only.
         optional: an input that keeps its start value on purpose where nothing is connected to it: nobody is warned.
+        can_be_missing: NaN stands for a value that is missing: an output that may have none, an input that leaves out
+            what is missing.
 
     Raises:
         ValueError: the name is not an identifier or is a keyword, the start does not fit the size, an integer is no
-            discrete output, something else than a scalar output warns, or something else than an input is optional.
+            discrete output, something else than a scalar output warns, something else than an input is optional, or
+            what is no number from outside or to it, or an integer, can be missing.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Signal:
     integer: bool = False
     warning: OutputWarning | None = None
     optional: bool = False
+    can_be_missing: bool = False
 
     def __post_init__(self) -> None:
         if self.integer and (self.causality, self.variability) != ("output", "discrete"):
@@ -63,6 +67,10 @@ class Signal:
             raise ValueError(f"Signal {self.name!r} has a warning; only a scalar output can have one.")
         if self.optional and self.causality != "input":
             raise ValueError(f"Signal {self.name!r} is optional; only an input can be.")
+        if self.can_be_missing and (self.causality not in ("input", "output") or self.integer):
+            raise ValueError(
+                f"Signal {self.name!r} can be missing; only an input, or an output that is no integer, is."
+            )
         if not self.name.isidentifier():
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
@@ -131,6 +139,7 @@ def input_signal(
     variability: Variability = "continuous",
     display_unit: str | None = None,
     optional: bool = False,
+    can_be_missing: bool = False,
 ) -> Signal:
     """An input; `start` is used while nothing is connected to it.
 
@@ -140,9 +149,10 @@ def input_signal(
         variability: FMI's word, ``continuous`` or ``discrete``. display_unit: for the user's edge, such as ``km/h``.
         optional: not connected means `start` on purpose, and nobody is warned. For what is absent in most systems (a
             disturbance, a fault, the verdict of another component), not for what the equations live on.
+        can_be_missing: NaN is a missing value, which the equations leave out (`hybrid.missing`).
     """
     kept = (None, None, description, size, display_unit)
-    return Signal(name, unit, "input", variability, start, *kept, optional=optional)
+    return Signal(name, unit, "input", variability, start, *kept, optional=optional, can_be_missing=can_be_missing)
 
 
 def output_signal(
@@ -155,6 +165,7 @@ def output_signal(
     size: int | None = None,
     integer: bool = False,
     warning: OutputWarning | None = None,
+    can_be_missing: bool = False,
 ) -> Signal:
     """An output, computed from time, state, input and parameters.
 
@@ -163,8 +174,10 @@ def output_signal(
         variability: FMI's word. display_unit: for the user's edge. size: number of elements, None for a scalar.
         integer: whether the FMU shows it as an integer variable.
         warning: what is told after a run in which the value was not zero; None for nothing.
+        can_be_missing: NaN is a missing value, where there is none.
     """
-    return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit, integer, warning)
+    kept = (None, None, description, size, display_unit, integer, warning)
+    return Signal(name, unit, "output", variability, 0.0, *kept, can_be_missing=can_be_missing)
 
 
 def parameter(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
@@ -16,11 +17,13 @@ import numpy as np
 
 from plant_models.hybrid.declarations import check_declarations
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.missing import MISSED_SAMPLES, is_there, or_else
 from plant_models.hybrid.resource import Resource
-from plant_models.hybrid.signal import Signal, parameter, width
+from plant_models.hybrid.signal import Signal, memory, parameter, width
 
 Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
 Method = Literal["rk4", "rosenbrock", "euler"]
+MISSED = memory(MISSED_SAMPLES, "1", 0.0, "Measurements that were missing at samples")
 NUMBERS = frozenset((float, np.float64))
 
 
@@ -70,7 +73,9 @@ class HybridSystem:
         Nor does it begin with states that break one of the `start_requirements`; later nobody asks for these.
     11. `late_policy` is what an event stamped in the past means unless it is told otherwise: to be replayed at its
         stamp, to be rejected, or, for equations that count with the delay, to act when it arrives (``late``).
-    12. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    12. Measurements that an event reads are its `samples`. They become signals that can be missing, and the memory
+        `MISSED` is put behind all states, which counts them; `jump` neither gets nor returns it.
+    13. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -95,7 +100,23 @@ class HybridSystem:
 
     def __init__(self, **options: Any) -> None:
         self.options: dict[str, Any] = options
+        self._sampling = {e.name: e for e in self.events if not isinstance(e, CommunicationEvent) and e.samples}
+        if self._sampling:
+            self._declare_missing()
         check_declarations(self)
+
+    def _declare_missing(self) -> None:
+        """Samples of events become signals that can be missing, and are counted behind all other states."""
+        names = {name for event in self._sampling.values() for name in event.samples}
+
+        def marked(signals: Sequence[Signal]) -> tuple[Signal, ...]:
+            return tuple(replace(s, can_be_missing=True) if s.name in names else s for s in signals)
+
+        self.inputs, self.states = marked(self.inputs), (*self.states, MISSED)
+        self.events = tuple(
+            replace(e, payload=marked(e.payload)) if isinstance(e, TriggeredEvent) else e for e in self.events
+        )
+        self._widths = {s.name: s.size for s in self.input_signals if s.name in names}
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -271,8 +292,21 @@ class HybridSystem:
 
     def jump_vector(self, event: str, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`jump` on flat arrays: the state after the event, shape (n,)."""
-        after = self.jump(event, t, x, self.unpack_inputs(u), self.unpack_parameters(p))
-        return self._checked(f"jump({event!r})", after, self.state_count)
+        given, unpacked = self.unpack_inputs(u), self.unpack_parameters(p)
+        if not self._sampling:
+            return self._checked(f"jump({event!r})", self.jump(event, t, x, given, unpacked), self.state_count)
+        count, sampled = self.state_count - 1, self._sampling.get(event)
+        names = () if sampled is None else sampled.samples
+        values = [value for name in names for value in _parts(getattr(given, name), self._widths[name])]
+        lacking = sum(1.0 - is_there(value) for value in values)
+        whole = sampled is not None and not sampled.leaves_out
+        if whole:
+            given = given._replace(**{name: or_else(getattr(given, name), 0.0) for name in names})
+        after = self._checked(f"jump({event!r})", self.jump(event, t, x[:count], given, unpacked), count)
+        if whole:
+            after = np.where(lacking > 0.0, x[:count], after)
+        missed = np.reshape(x[count] + lacking, (1, *x.shape[1:]))
+        return np.vstack([after, missed]) if missed.ndim > 1 else np.hstack([after, missed])
 
     def friction_vector(self, t: Array, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> Array:
         """`friction` on flat arrays, shape (len(frictions),).
@@ -352,6 +386,11 @@ class HybridSystem:
         if values.shape[0] != count:  # a vector of one element would be broadcast in silence
             raise ValueError(f"{self.name}: {function} returns {values.shape[0]} values, expected {count}.")
         return values
+
+
+def _parts(value: Array, size: int | None) -> list[Array]:
+    """The elements of a signal's value; of a scalar the value alone."""
+    return [value] if size is None else [value[i] for i in range(size)]
 
 
 def _starts(signals: Sequence[Signal]) -> np.ndarray:

@@ -44,7 +44,7 @@ def joint_errors(ends: tuple[float, ...], position_gap: float, angle_gap: float,
     instants = sorted(
         {round(k * gap, 9) for gap in (position_gap, angle_gap) for k in range(1, int(ends[-1] / gap) + 1)} | set(ends)
     )
-    both, t, found = np.r_[START, observer.start_state()], 0.0, []
+    both, t, found = np.r_[START, observer.start_state()[: observer.continuous_count]], 0.0, []
     for end in instants:
         both = solve_ivp(flow, (t, end), both, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
         t = end

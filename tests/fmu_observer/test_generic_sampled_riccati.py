@@ -47,7 +47,7 @@ def test_it_is_an_extended_kalman_filter_in_information_form() -> None:
     bench = SampledBench(RiccatiHighGain(), true_motion(pendulum(), START, (TORQUE,), end), (TORQUE,))
     bench.follow(T * np.arange(1, round(end / T) + 1))
     estimate, P = covariance_filter(end)
-    s11, s12, s22 = bench.runtime.x[2:]
+    s11, s12, s22 = bench.runtime.x[2:5]
     np.testing.assert_allclose(bench.runtime.x[:2], estimate, atol=1e-6)  # RK4 at 5 ms against the rate of S
     np.testing.assert_allclose(np.linalg.inv([[s11, s12], [s12, s22]]), P, rtol=1e-6, atol=1e-6)
 
@@ -56,7 +56,7 @@ def test_the_information_stays_positive_definite() -> None:
     bench = SampledBench(RiccatiHighGain(), true_motion(pendulum(), START, (TORQUE,), 10.0), (TORQUE,))
     for k in range(1, 101):
         bench.sample(k * T)
-        s11, s12, s22 = bench.runtime.x[2:]
+        s11, s12, s22 = bench.runtime.x[2:5]
         assert np.linalg.eigvalsh([[s11, s12], [s12, s22]])[0] > 0.0
 
 

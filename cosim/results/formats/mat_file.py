@@ -77,9 +77,19 @@ def write_mat(path: str | Path, result: ResultData) -> None:
 
 def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], list[SignalInfo]]:
     variables = _texts(struct["variable"], 0)
-    columns = {f.name: _texts(struct[f.name], len(variables)) for f in fields(SignalInfo)}
+    known = [f.name for f in fields(SignalInfo) if f.name in struct]  # an older file has fewer
+    columns = {name: _texts(struct[name], len(variables)) for name in known}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    signals = [SignalInfo(**{**row, "display_unit": row["display_unit"] or None}) for row in rows]
+    signals = [
+        SignalInfo(
+            **{
+                **row,
+                "display_unit": row["display_unit"] or None,
+                "can_be_missing": row.get("can_be_missing") == str(True),
+            }
+        )
+        for row in rows
+    ]
     return variables, signals
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from fmu_observer.models.filter_model import FilterModel
 from fmu_observer.models.model import stacked
+from fmu_observer.observers.gated_observer import GATED_EVENT
 from plant_models.hybrid import Event, PeriodicEvent, Signal, TriggeredEvent, input_signal
 from plant_models.hybrid.system import Array
 
@@ -23,7 +24,7 @@ class Arrivals:
 
     Attributes:
         names: of the events, one a measurement. timed: whether one arrives by an event from outside.
-        apart: whether they arrive at more than one event.
+        several: whether an innovation may have more or fewer numbers: there are several measurements.
 
     Raises:
         ValueError: a list has another length, a name is no identifier, or the model moves at its own period only.
@@ -45,7 +46,7 @@ class Arrivals:
             )
         self.names = tuple(names)
         self.signals = model.measurements
-        self.apart = len(set(names)) > 1
+        self.several = len(names) > 1
         self.timed = any(name != PERIODIC for name in names)
         if self.timed and not model.any_period:
             raise ValueError(
@@ -66,14 +67,17 @@ class Arrivals:
     def events(self) -> tuple[Event, ...]:
         """The periodic event, then those from outside with their payloads."""
         text = "The measurements are read" if not self.timed else "The estimate is predicted"
-        found: list[Event] = [PeriodicEvent(SAMPLING, "sample_period", description=text)]
+        own = tuple(s.name for s in self.inputs)
+        found: list[Event] = [PeriodicEvent(SAMPLING, "sample_period", description=text, samples=own, leaves_out=True)]
         for name in dict.fromkeys(self.names):
             if name != PERIODIC:
                 payload = tuple(
                     input_signal(f"{name}_{s.name}", s.unit, s.start, s.description, variability="discrete")
                     for s in (self.signals[i] for i in self.rows(name))
                 )
-                found.append(TriggeredEvent(name, payload, "A measurement arrives, at its own time stamp"))
+                samples = () if name == GATED_EVENT else tuple(s.name for s in payload)  # a telegram is whole or none
+                what = "A measurement arrives, at its own time stamp"
+                found.append(TriggeredEvent(name, payload, what, samples=samples, leaves_out=True))
         return tuple(found)
 
     def rows(self, event: str) -> tuple[int, ...]:

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.filtering.ensemble import correct_members, inflated, mean_of, variances_of
-from fmu_observer.models.filter_model import Known
-from fmu_observer.observers.discrete.member_filter import MemberFilter
-from fmu_observer.observers.model_observer import as_matrix
+from fmu_observer.observers.discrete.member_filter import MemberFilter, Sample
 from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 
@@ -32,11 +30,13 @@ class EnsembleKalmanFilter(MemberFilter):
     perturbs = True
     own_parameters = (parameter("inflation", "1", 1.0, "Factor of the members' distances from their mean", min=1.0),)
 
-    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
+    def spread(self, members: Array, p: Any) -> Array:
+        """Members moved apart, see `MemberFilter.spread`."""
+        return inflated(members, p.inflation)
+
+    def corrected(self, members: Array, more: Array, sample: Sample, u: Any, p: Any) -> Sequence[Array]:
         """Estimate, NIS, variances and members after the gain of the ensemble, see `MemberFilter.corrected`."""
-        q = len(self.model.measurements)
-        spread = inflated(members, p.inflation)
-        RN = as_matrix(p.measurement_covariance, q, q)
-        draws = np.reshape(u.measurement_normal, (q, self.members))
-        after = correct_members(spread, self.seen(spread, known), y, RN, draws)
-        return mean_of(after.members), after.nis, variances_of(after.members), after.members
+        draws = np.reshape(u.measurement_normal, (len(self.model.measurements), self.members))
+        found = correct_members(self.spread(members, p), sample.seen, sample.y, sample.noise, draws)
+        after = np.where(sample.count > 0.5, found.members, members)
+        return mean_of(after), found.nis, variances_of(after), after

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from fmu_observer.filtering import kalman, square_root
 from fmu_observer.filtering.kalman import Corrected
 from fmu_observer.models import ObserverModel, find_model
@@ -14,6 +16,7 @@ from fmu_observer.models.system_model import Source
 from fmu_observer.observability import require_detectable_model
 from fmu_observer.observers.discrete.belief import Belief
 from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
+from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.system import Array
 
 
@@ -61,11 +64,16 @@ class ExtendedKalmanFilter(GaussianFilter):
         """The belief after some measurements, see `GaussianFilter.corrected`."""
         chosen = list(rows)
         H, V = self.model.measurement_jacobians(belief.estimate, known)
-        expected = self.model.measured(belief.estimate, self.model.no_reading_noise(), known)
-        innovation, H = y - expected[chosen], H[chosen]
-        noise, V = (noise[chosen][:, chosen], None) if V is None else (noise, V[chosen])
+        expected = self.model.measured(belief.estimate, self.model.no_reading_noise(), known)[chosen]
+        there = is_there(y)
+        rows_there = there.reshape(there.shape[0], 1)
+        innovation, H = or_else(y, expected) - expected, H[chosen] * rows_there
         if self.form == "square_root":
-            root = square_root.factor(noise)
-            entry = root if V is None else V @ root
+            if V is None:
+                entry = square_root.factor(kalman.decoupled(noise[chosen][:, chosen], there))
+            else:
+                entry = np.hstack([V[chosen] @ square_root.factor(noise) * rows_there, np.diag(1.0 - there)])
             return square_root.correct_factor(belief.estimate, belief.spread, innovation, H, entry), innovation
-        return kalman.correct(belief.estimate, belief.spread, innovation, H, noise, V, self.form), innovation
+        own = noise[chosen][:, chosen] if V is None else kalman.through(noise, V[chosen])
+        own = kalman.decoupled(own, there)
+        return kalman.correct(belief.estimate, belief.spread, innovation, H, own, None, self.form), innovation

@@ -17,6 +17,7 @@ from fmu_observer.observability import MeasuredSystem, UnobservableError, requir
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from plant_models.hybrid import Signal, memory, vector
+from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.system import Array
 
 SPEED = 2.0  # [1/s] of the default poles: exp(-SPEED T) [ours]
@@ -27,7 +28,8 @@ class ExtendedLuenberger(ModelObserver):
 
     The right-hand side without the correction is the model over one sampling period, inputs held
     (`models.discretisation.transition`), so it follows `sample_period`; the gain does not, it belongs to the period it
-    was designed for. The correction is that of the last sample, as printed: after the sample at t_k the outputs are the
+    was designed for; where the last measurement is missing, nothing else follows. The correction is that of the last
+    sample, as printed: after the sample at t_k the outputs are the
     estimate of x(t_k) from the measurements up to t_{k-1}.
 
     The thesis prints no condition (its LMI is in a reference). Ours is the small-gain theorem: what phi adds to the
@@ -40,7 +42,7 @@ class ExtendedLuenberger(ModelObserver):
     description = "Discrete Luenberger observer of a nonlinear model, periodic measurements"
     source = "Bouchama 2024, (1.34)-(1.35), condition ours"
     timing = "periodic"
-    discrete = True
+    discrete = leaves_out = True
     internal_step = 0.1  # nothing flows between samples
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("pendulum", "linear_pendulum", "freight_train")}
 
@@ -60,7 +62,8 @@ class ExtendedLuenberger(ModelObserver):
             return vector(*(moved[i] for i in range(n)), *(values[n + i] for i in range(q)))
 
         def correct(values: Array) -> Array:
-            error = self.measured(u) - self.model.measured(values[:n])
+            expected = self.model.measured(values[:n])
+            error = or_else(self.measured(u), expected) - expected
             return vector(*(values[i] for i in range(n)), *(error[i] for i in range(q)))
 
         return at_sample(x, advance, correct)

@@ -56,7 +56,7 @@ class SignalsOf:
         ]
         if not self.rooted:
             found.append(memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive semidefinite"))
-        if self.arrivals.apart:
+        if self.arrivals.several:
             found.append(memory_signal("last_count", "1", 0.0, "How many measurements arrived last together"))
         if self.arrivals.timed:
             found.append(memory_signal("last_time", "s", 0.0, "Time of the estimate"))
@@ -78,7 +78,7 @@ class SignalsOf:
         told("innovation_covariance", "1", "Covariance of the last innovation, row by row, SI units", q * q)
         told("nis", "1", "Normalised innovation squared of the last measurements")
         told("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far")
-        if self.arrivals.apart:
+        if self.arrivals.several:
             told("nis_degrees", "1", "Degrees of freedom of the last normalised innovation squared")
         if not self.rooted:
             found.append(NOT_POSITIVE)

@@ -28,6 +28,7 @@ from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Signal, parameter, vector, width
+from plant_models.hybrid.missing import is_there
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -47,12 +48,12 @@ class GaussianFilter(GatedObserver):
        the form ``square_root`` the spread is a lower factor, otherwise the covariance.
     2. With `arrival` ``periodic`` all measurements are inputs ``measured_<y>``, read at the periodic event `sampling`.
        Any other name is a triggered event that brings the measurement as its payload ``<event>_<y>``; a list gives a
-       name for each measurement, equal names arrive together. A measurement that is missing is an event that does not
-       occur; one that is late is replayed at its stamp by the late policy.
+       name for each measurement, equal names arrive together. A measurement that is missing is NaN, or an event that
+       does not occur; one that is late is replayed at its stamp by the late policy.
     3. At an event the belief is first predicted over the time since the last one, with the inputs of now, then
-       corrected by what has arrived. If all is periodic the first sample corrects the start; noise is given as
-       `process_covariance` of one period. With events it is given as `process_density`, `sampling` predicts too,
-       and its first instant begins the time.
+       corrected by what has arrived, without measurements that are NaN. If all is periodic the first sample corrects
+       the start; noise is given as `process_covariance` of one period. With events it is given as `process_density`,
+       `sampling` predicts too, and its first instant begins the time.
     4. The state is the estimates, the spread row by row, the last innovation and what is known of it. A measurement
        ``position`` that arrives at the event ``balise`` passes the gate of balise telegrams, see `GatedObserver`.
 
@@ -141,7 +142,7 @@ class GaussianFilter(GatedObserver):
     def corrected(
         self, belief: Belief, known: Known, y: Array, rows: Sequence[int], noise: Array, p: Any
     ) -> tuple[Corrected, Array]:
-        """The belief after some measurements, and their innovation.
+        """The belief after some measurements, and their innovation; those that are NaN have none and change nothing.
 
         Args:
             belief: before. known: time, inputs and parameters of the model. y: the measurements, shape (len(rows),).
@@ -227,12 +228,17 @@ class GaussianFilter(GatedObserver):
             after, error = self.corrected(
                 belief, self.known(t, u, p), y, rows, as_matrix(p.measurement_covariance, s, s), p
             )
-            belief = Belief(after.estimate, after.covariance)
-            kept["last_nis"] = normalised_square(error, after.innovation_covariance)
-            kept["log_likelihood"] = kept["log_likelihood"] + log_likelihood(error, after.innovation_covariance)
-            e, S = _replaced(e, S, rows, error, after.innovation_covariance)
+            there, found = is_there(y), after.innovation_covariance
+            count = there @ np.ones(len(rows))
+            some = count > 0.5  # of nothing at all the prediction stays, to the last bit
+            belief = chosen(some, Belief(after.estimate, after.covariance), belief._replace(drawn=None))
+            kept["last_nis"] = np.where(some, normalised_square(error, found), kept["last_nis"])
+            kept["log_likelihood"] = kept["log_likelihood"] + np.where(some, log_likelihood(error, found, count), 0.0)
+            if self.arrivals.several:
+                kept["last_count"] = np.where(some, count, kept["last_count"])
+            e, S = _replaced(e, S, rows, error, found, there)
         timed = (t + 0.0 * kept["primed"],) if self.arrivals.timed else ()
-        counted = ((float(len(rows)) if rows else kept["last_count"]),) if self.arrivals.apart else ()
+        counted = (kept["last_count"],) if self.arrivals.several else ()
         return vector(
             *(belief.estimate[i] for i in range(self.model.order)),
             *flattened(belief.spread),
@@ -264,7 +270,7 @@ class GaussianFilter(GatedObserver):
             values[f"innovation_{s.name}"] = x[first + i]
         values["innovation_covariance"] = x[second : second + q * q]
         values |= {"nis": x[places["last_nis"]], "innovation_likelihood": x[places["log_likelihood"]]}
-        if self.arrivals.apart:
+        if self.arrivals.several:
             values["nis_degrees"] = x[places["last_count"]]
         if not self.rooted:
             (values[NOT_POSITIVE.name],) = self._lapsed(x)
@@ -381,15 +387,20 @@ def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
     return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)
 
 
-def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Array) -> tuple[Array, Array]:
-    """The last innovations and their covariance, with those of `rows` replaced."""
+def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Array, there: Array) -> tuple[Array, Array]:
+    """The last innovations and their covariance, with those of `rows` replaced that are there."""
     q = e.shape[0]
-    if list(rows) == list(range(q)):
-        return error, found
     place = {row: i for i, row in enumerate(rows)}
-    innovations = vector(*(error[place[i]] if i in place else e[i] for i in range(q)))
-    entries = [found[place[i], place[j]] if i in place and j in place else S[i, j] for i in range(q) for j in range(q)]
-    return innovations, as_matrix(vector(*entries), q, q)
+    new = [there[place[i]] > 0.5 if i in place else None for i in range(q)]
+    innovations = [e[i] if new[i] is None else np.where(new[i], error[place[i]], e[i]) for i in range(q)]
+    entries = [
+        S[i, j]
+        if new[i] is None or new[j] is None
+        else np.where(there[place[i]] * there[place[j]] > 0.5, found[place[i], place[j]], S[i, j])
+        for i in range(q)
+        for j in range(q)
+    ]
+    return vector(*innovations), as_matrix(vector(*entries), q, q)
 
 
 class _Starts:

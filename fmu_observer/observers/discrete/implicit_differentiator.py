@@ -9,6 +9,7 @@ from fmu_observer.observers.discrete.implicit_recursion import implicit_step
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.signal_differentiator import LARGEST, SignalDifferentiator
 from plant_models.hybrid import PeriodicEvent, memory, parameter, vector
+from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 
@@ -23,7 +24,7 @@ class ImplicitDifferentiator(SignalDifferentiator):
     steps that are safe and enough for rounding accuracy.
 
     At a sample the step from the last one is taken with the signal read there; the estimates published then belong to
-    this sample.
+    this sample. A sample that is missing (NaN) drives nothing.
 
     Args:
         order: n. filtering_order: nf, at least 1; n + nf at most 5. unit: unit of the signal.
@@ -42,7 +43,10 @@ class ImplicitDifferentiator(SignalDifferentiator):
         require_whole(self.name, 0, filtering_order=filtering_order)
         if filtering_order < 1:
             raise ValueError(f"{self.name}: filtering order {filtering_order}, expected at least 1.")
-        self.events = (PeriodicEvent("sampling", "sample_period", description="The signal is read"),)
+        text = "The signal is read"
+        self.events = (
+            PeriodicEvent("sampling", "sample_period", description=text, samples=("signal",), leaves_out=True),
+        )
         super().__init__(
             order,
             filtering_order,
@@ -60,7 +64,10 @@ class ImplicitDifferentiator(SignalDifferentiator):
             w_next, z_next = implicit_step(w, z, values[count], p.bound, p.sample_period)
             return vector(*w_next, *z_next, values[count])
 
-        return at_sample(x, advance, lambda values: vector(*(values[i] for i in range(count)), u.signal))
+        def read(values: Array) -> Array:  # where the signal is missing it is taken to be what is estimated
+            return vector(*(values[i] for i in range(count)), or_else(u.signal, values[nf]))
+
+        return at_sample(x, advance, read)
 
     def interval(self, p: Any) -> float:
         """The sampling period [s]."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from fmu_observer.condition import Condition
 from fmu_observer.filtering.ensemble import drawn
+from fmu_observer.filtering.kalman import decoupled
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
 from fmu_observer.models.process_noise import noise_over
@@ -28,13 +29,29 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     vector,
+    width,
 )
+from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
 DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
 VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
 MOST, DEFAULT = 50, 20  # members: each stands in the generated C once
+
+
+class Sample(NamedTuple):
+    """What a filter with members is told at a sample.
+
+    Attributes:
+        y: measurements, shape (q,). seen: what each member measures, shape (q, M). noise: RN, shape (q, q).
+        count: how many of them there are.
+    """
+
+    y: Array
+    seen: Array
+    noise: Array
+    count: Array
 
 
 class MemberFilter(HybridSystem):
@@ -48,7 +65,7 @@ class MemberFilter(HybridSystem):
        each runs through the model over the period and feels process noise of its own. Noises are of (seed, signal,
        index), so that block, FMU and a run that is done again draw the same.
     3. The state is the estimates, NIS, standard deviations, the members one after the other, what the subclass adds,
-       and whether a sample has come.
+       how many measurements there were last, and whether a sample has come. What is missing (NaN) is left out.
 
     Args:
         model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
@@ -101,12 +118,12 @@ class MemberFilter(HybridSystem):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
-        """What a sample makes of the members.
+    def corrected(self, members: Array, more: Array, sample: Sample, u: Any, p: Any) -> Sequence[Array]:
+        """What a sample makes of the members; where all of it is missing they stay as they are.
 
         Args:
-            members: predictions, shape (n, M). more: values of `own_memory`, flat. y: measurements, shape (q,).
-            known: time, inputs and parameters of the model. u: inputs. p: parameters.
+            members: predictions, shape (n, M). more: values of `own_memory`, flat. sample: what was measured, and what
+                each member measures. u: inputs. p: parameters.
 
         Returns:
             Estimate of shape (n,), NIS, variances of shape (n,), members of shape (n, M), and the values of
@@ -127,14 +144,25 @@ class MemberFilter(HybridSystem):
             values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
         return Known(t, stacked(tuple(getattr(u, s.name) for s in self.model.inputs)), stacked(tuple(values)))
 
-    def seen(self, members: Array, known: Known) -> Array:
-        """What each member measures, shape (q, M).
+    def spread(self, members: Array, p: Any) -> Array:
+        """The members before a correction, shape (n, M).
 
         Args:
-            members: shape (n, M). known: time, inputs and parameters of the model.
+            members: predictions, shape (n, M). p: parameters.
         """
-        none = self.model.no_reading_noise()
-        return np.stack([self.model.measured(members[:, i], none, known) for i in range(self.members)], axis=1)
+        return members
+
+    def sample(self, members: Array, y: Array, known: Known, p: Any) -> Sample:
+        """What was measured. What is missing is zero to all members, and of a variance of its own.
+
+        Args:
+            members: shape (n, M). y: measurements, shape (q,). known: time, inputs and parameters of the model.
+            p: parameters.
+        """
+        none, q, there = self.model.no_reading_noise(), y.shape[0], is_there(y)
+        seen = np.stack([self.model.measured(members[:, i], none, known) for i in range(self.members)], axis=1)
+        noise = decoupled(as_matrix(p.measurement_covariance, q, q), there)
+        return Sample(or_else(y, 0.0), seen * there.reshape(q, 1), noise, there @ np.ones(q))
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Members drawn at the first sample, or moved over the period, then corrected; shape of the state."""
@@ -146,20 +174,22 @@ class MemberFilter(HybridSystem):
         )
         members = np.where(x[x.shape[0] - 1] > 0.5, self._moved(before, t, u, p), start)
         y = stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.model.measurements))
-        more = x[first + n * count : x.shape[0] - 1]
-        estimate, nis, variances, after, *others = self.corrected(members, more, y, self.known(t, u, p), u, p)
+        more, last = x[first + n * count : x.shape[0] - 2], x[x.shape[0] - 2]
+        sample = self.sample(self.spread(members, p), y, self.known(t, u, p), p)
+        estimate, nis, variances, after, *others = self.corrected(members, more, sample, u, p)
+        nis, degrees = np.where(sample.count > 0.5, nis, x[n]), np.where(sample.count > 0.5, sample.count, last)
         deviations = np.sqrt(np.maximum(variances, 0.0))
         columns = [after[i, j] for j in range(count) for i in range(n)]
         told = [*(estimate[i] for i in range(n)), nis, *(deviations[i] for i in range(n))]
         added = [other[i] for other in others for i in range(other.shape[0])]
-        return vector(*told, *columns, *added, 1.0 + 0.0 * nis)
+        return vector(*told, *columns, *added, degrees, 1.0 + 0.0 * nis)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations and NIS."""
         n, names = self.model.order, [s.name for s in self.model.states]
         values = {name: x[i] for i, name in enumerate(names)}
         values |= {f"{name}_std": x[n + 1 + i] for i, name in enumerate(names)}
-        return values | {"nis": x[n], "nis_degrees": float(len(self.model.measurements)) + 0.0 * x[n]}
+        return values | {"nis": x[n], "nis_degrees": x[width(self.states) - 3]}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Covariances are symmetric and positive; other parameters within their bounds."""
@@ -213,6 +243,7 @@ class MemberFilter(HybridSystem):
             memory("deviations", "1", (1.0,) * n, "Standard deviations of the estimates, SI units", size=n),
             memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", size=n * count),
             *self.own_memory,
+            memory("last_count", "1", float(q), "How many measurements there were last"),
             PRIMED,
         )
         self.inputs = (
@@ -223,8 +254,12 @@ class MemberFilter(HybridSystem):
         noises = (
             input_signal(name, "1", 0.0, normal, variability="discrete", size=k * count) for name, k in sizes.items()
         )
+        read = tuple(f"measured_{s.name}" for s in model.measurements)
+        text = "The measurements are read"
         self.events = (
-            PeriodicEvent("sampling", "sample_period", noises=tuple(noises), description="The measurements are read"),
+            PeriodicEvent(
+                "sampling", "sample_period", noises=tuple(noises), description=text, samples=read, leaves_out=True
+            ),
         )
         told = [(s.name, s.unit, f"Estimate: {s.description}") for s in model.states]
         told += [

@@ -35,6 +35,7 @@ from fmu_observer.observers.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal, parameter, vector
+from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.signal import width
@@ -207,9 +208,9 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         period = primed * (t - x[places["last_time"]]) if self.arrivals.timed else p.sample_period + 0.0 * primed
         known, q = self.known(t, u, p), len(self.model.measurements)
         y = self.arrivals.measured(event, u) if arrived else np.zeros(0)
-        place = {row: i for i, row in enumerate(arrived)}
+        place, there, y = {row: i for i, row in enumerate(arrived)}, is_there(y), or_else(y, 0.0)
         measured = vector(*(y[place[j]] if j in place else 0.0 * primed for j in range(q)))
-        used = vector(*(float(j in place) + 0.0 * primed for j in range(q)))
+        used = vector(*(there[place[j]] if j in place else 0.0 * primed for j in range(q)))
         return WindowRow(primed, period, t + 0.0 * primed, known.u, measured, used)
 
     def _predicted_point(self, x: Array, row: WindowRow, shared: Array) -> Array:

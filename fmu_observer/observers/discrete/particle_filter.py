@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.filtering.particles import effective_size, innovation_square, moments, resampled, reweighted
-from fmu_observer.models.filter_model import Known
 from fmu_observer.models.system_model import Source
-from fmu_observer.observers.discrete.member_filter import DEFAULT, MemberFilter
-from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import memory, output_signal, parameter
+from fmu_observer.observers.discrete.member_filter import DEFAULT, MemberFilter, Sample
+from plant_models.hybrid import memory, output_signal, parameter, width
 from plant_models.hybrid.system import Array
 
 
@@ -55,14 +53,13 @@ class ParticleFilter(MemberFilter):
         )
         super().__init__(model, members, **options)
 
-    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
+    def corrected(self, members: Array, more: Array, sample: Sample, u: Any, p: Any) -> Sequence[Array]:
         """Estimate, NIS, variances, particles, weights and effective size, see `MemberFilter.corrected`."""
-        q, n, count = len(self.model.measurements), self.model.order, self.members
-        RN, seen = as_matrix(p.measurement_covariance, q, q), self.seen(members, known)
-        before = more[:count]
-        weights = reweighted(before, seen, y, RN)
+        n, count, some = self.model.order, self.members, sample.count > 0.5
+        before, (y, seen, RN) = more[:count], sample[:3]
+        weights = np.where(some, reweighted(before, seen, y, RN), before)
         found, size = moments(members, weights), effective_size(weights)
-        poor = size < p.resampling_threshold * count
+        poor = np.where(some, size, float(count)) < p.resampling_threshold * count
         variances = np.stack([found.covariance[i, i] for i in range(n)])
         return (
             found.mean,
@@ -75,4 +72,4 @@ class ParticleFilter(MemberFilter):
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations, NIS and the effective sample size."""
-        return super().output(t, x, u, p) | {"effective_members": x[x.shape[0] - 2]}
+        return super().output(t, x, u, p) | {"effective_members": x[width(self.states) - 4]}

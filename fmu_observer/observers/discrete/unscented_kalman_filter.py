@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from fmu_observer.filtering import unscented
-from fmu_observer.filtering.kalman import Corrected, symmetric
+from fmu_observer.filtering.kalman import Corrected, decoupled, symmetric
 from fmu_observer.filtering.square_root import factor
 from fmu_observer.filtering.unscented import Scattered, Weights
 from fmu_observer.models.filter_model import Known
@@ -16,6 +16,7 @@ from fmu_observer.models.system_model import Source
 from fmu_observer.observers.discrete.belief import Belief
 from fmu_observer.observers.discrete.gaussian_filter import Form, GaussianFilter
 from plant_models.hybrid import parameter
+from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.system import Array
 
 ALPHA, BETA, KAPPA = 1e-3, 2.0, 0.0  # Allaoui 2024, section II.6
@@ -119,9 +120,13 @@ class UnscentedKalmanFilter(GaussianFilter):
             centre = belief.drawn.points.centre.reshape(n, 1)
             points = np.hstack([centre, centre + belief.drawn.points.deviations])
         seen = unscented.scattered(lambda at: self.model.measured(at[:n], at[n:], known)[chosen], points)
+        there = is_there(y)
+        seen = seen._replace(deviations=seen.deviations * there.reshape(len(chosen), 1))
         states = unscented.scattered(lambda at: at[:n], points)
-        added = np.zeros((len(chosen), len(chosen))) if inputs else noise[chosen][:, chosen]
-        innovation = y - unscented.mean(seen, w)
+        added = decoupled(np.zeros((len(chosen), len(chosen))) if inputs else noise[chosen][:, chosen], there)
+        expected = unscented.mean(seen, w)
+        y = or_else(y, expected)
+        innovation = y - expected
         if self.rooted:
             after = unscented.correct_root(belief.estimate, states, seen, y, factor(added), w, unseen)
         else:

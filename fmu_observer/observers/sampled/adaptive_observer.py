@@ -104,7 +104,8 @@ class AdaptiveObserver(GatedObserver, GapCertified):
             input_signal(f"{chosen.event}_{s.name}", s.unit, s.start, s.description, variability="discrete")
             for s in chosen.measurements
         )
-        self.events = (TriggeredEvent(chosen.event, payload, "A measurement arrives, at its own time stamp"),)
+        read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
+        self.events = (TriggeredEvent(chosen.event, payload, text, samples=read),)
         super().__init__(model=chosen.name, **options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------

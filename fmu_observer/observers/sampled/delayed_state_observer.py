@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, ClassVar, Literal
 
@@ -405,7 +406,7 @@ class DelayedStateObserver(HighGainSampled):
         meaning = "Node that the packet is from, from 1; 0: it has all measurements"
         node = input_signal(f"{event.name}_node", "1", 0.0, meaning, variability="discrete")
         text = "A packet arrives, a delay after its measurement"
-        return TriggeredEvent(event.name, (node, *event.payload), text, event.verdict)
+        return replace(event, payload=(node, *event.payload), description=text)
 
 
 def _flat(rows: Any) -> list[Array]:

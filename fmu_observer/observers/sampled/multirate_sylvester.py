@@ -86,7 +86,10 @@ class MultirateSylvester(GapCertified):
         self.outputs = tuple(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in self.model.states)
         self.events = tuple(
             TriggeredEvent(
-                f"{s.name}_sample", (_payload(s, f"{s.name}_sample_value", "discrete"),), f"Sample: {s.description}"
+                f"{s.name}_sample",
+                (_payload(s, f"{s.name}_sample_value", "discrete"),),
+                f"Sample: {s.description}",
+                samples=(f"{s.name}_sample_value",),
             )
             for s in self.sampled
         )
@@ -116,7 +119,8 @@ class MultirateSylvester(GapCertified):
         """``[xh_R, y_c, w]``, shape (n,)."""
         r, _, _, T = self._matrices(p)
         always = stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.always))
-        measured = np.hstack([always, x[r:]]) if self.always else x[r:]
+        sampled = x[r : r + len(self.sampled)]
+        measured = np.hstack([always, sampled]) if self.always else sampled
         return np.hstack([np.linalg.solve(T[:, :r], x[:r] - T[:, r:] @ measured), measured])
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:

@@ -15,6 +15,7 @@ from fmu_observer.observability import MeasuredSystem, require_observable
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.model_observer import ModelObserver
 from plant_models.hybrid import parameter, state, vector
+from plant_models.hybrid.missing import is_there
 from plant_models.hybrid.system import Array
 
 THETA = 1.5  # [1/s] [ours]
@@ -43,6 +44,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
     source = "Bouchama 2024, (1.37), theorem 6"
     timing = "periodic"
     internal_step = 5e-3
+    leaves_out = True
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
@@ -74,7 +76,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Correction by the sample, and its information, shape (n + n (n + 1) / 2,)."""
         C, weight = self.model.C, p.sample_period / p.output_weight
-        S = self._information(x) + weight * (C.T @ C)
+        S = self._information(x) + weight * (C.T * is_there(self.measured(u)) @ C)
         step = np.linalg.solve(S, C.T @ self.innovation(x, u))
         return np.hstack([self.estimates(x) - weight * step, self._packed(S)])
 

@@ -42,7 +42,8 @@ class TakagiSugenoAperiodic(TakagiSugenoHeld):
 
     def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
         """Triggered."""
-        return TriggeredEvent(self.model.event, payload, "A measurement arrives, at its own time stamp")
+        read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
+        return TriggeredEvent(self.model.event, payload, text, samples=read)
 
     def measurement_name(self, name: str) -> str:
         """A payload of the event."""

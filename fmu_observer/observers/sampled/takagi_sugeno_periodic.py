@@ -28,7 +28,8 @@ class TakagiSugenoPeriodic(TakagiSugenoHeld):
 
     def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
         """Periodic."""
-        return PeriodicEvent("sampling", "sample_period", description="The measurements are read")
+        read = tuple(self.measurement_name(s.name) for s in self.model.measurements)
+        return PeriodicEvent("sampling", "sample_period", description="The measurements are read", samples=read)
 
     def measurement_name(self, name: str) -> str:
         """An input that is there always."""

@@ -28,6 +28,7 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
+from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, MOTOR_PARAMETERS, TRACTION_200_KW
@@ -60,7 +61,6 @@ class MotorFilter(HybridSystem):
     """
 
     internal_step = 1e-2  # nothing flows between samples
-    events = (PeriodicEvent("sampling", "sample_period", description="The currents are read"),)
 
     def __init__(self, frame: str, known_load: bool, start_variance: Sequence[float], **options: Any) -> None:
         self.frame, self.known_load = frame, known_load
@@ -108,6 +108,8 @@ class MotorFilter(HybridSystem):
             ),
         )
         self.parameters = (*_variances(estimated), *MOTOR_PARAMETERS)
+        read, text = tuple(f"measured_current_{axis}" for axis in axes), "The currents are read"
+        self.events = (PeriodicEvent("sampling", "sample_period", description=text, samples=read, leaves_out=True),)
         super().__init__(**options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
@@ -131,7 +133,9 @@ class MotorFilter(HybridSystem):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Prediction over the period since the last sample, then correction, shape (n + n^2 + 5,)."""
+        """Prediction over the period since the last sample, then correction by what is not missing, shape
+        (n + n^2 + 5,).
+        """
         n, RN = self.order, np.diag(p.measurement_variance)
         last = n + n * n
 
@@ -142,11 +146,14 @@ class MotorFilter(HybridSystem):
 
         def by_measurement(values: Array) -> Array:
             innovation, H = self.measure(values[:n], u, p)
+            there = is_there(innovation[0]) * is_there(innovation[1])  # one current alone is as good as none
+            innovation = or_else(innovation, 0.0)
             after = correct(values[:n], np.reshape(values[n:last], (n, n)), innovation, H, RN)
             nis = normalised_square(innovation, after.innovation_covariance)
             told = values[last + 3] + log_likelihood(innovation, after.innovation_covariance)
             estimate = (after.estimate[i] for i in range(n))
-            return vector(*estimate, *flattened(after.covariance), innovation[0], innovation[1], nis, told)
+            corrected = vector(*estimate, *flattened(after.covariance), innovation[0], innovation[1], nis, told)
+            return np.where(there > 0.5, corrected, values)
 
         return at_sample(x, advance, by_measurement)
 

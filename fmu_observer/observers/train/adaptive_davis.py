@@ -124,7 +124,10 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         parameter("minimum_speed", "m/s", 2.0, "Speed below which coefficients are held", min=0.1),
         *ADAPTIVE,
     )
-    events = (BALISE, PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"))
+    events = (
+        BALISE,
+        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read", samples=("odometer",)),
+    )
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """The parameters lie within their bounds."""

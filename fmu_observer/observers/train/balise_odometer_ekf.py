@@ -134,7 +134,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     )
     events = (
         BALISE,
-        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),
+        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read", samples=("odometer",)),
     )
     parameters: tuple[Signal, ...] = OWN_PARAMETERS
     presets: Mapping[str, Mapping[str, Any]] = {

@@ -88,6 +88,11 @@ class DelayedTrainObserver(DelayedStateObserver):
         *_, reading = super()._events()
         return (
             TriggeredEvent("balise", (balise,), "The telegram of a balise arrives, a delay after its passing"),
-            TriggeredEvent("packet", (packet,), "A packet of the odometer arrives, a delay after its measurement"),
+            TriggeredEvent(
+                "packet",
+                (packet,),
+                "A packet of the odometer arrives, a delay after its measurement",
+                samples=(packet.name,),
+            ),
             reading,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar, Literal
 
@@ -106,7 +107,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     source = "Aguiar Cota 2019, (3.36)-(3.45), Algorithm 3-3, section 3.3.2; the repaired rules ours"
     internal_step = 1e-2
     frictions = (SPEED.name,)
-    events = (BALISE, ODOMETER_SAMPLE)
+    events = (BALISE, replace(ODOMETER_SAMPLE, samples=("odometer",)))
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort as commanded: traction positive, brake negative"),
         input_signal("odometer", "m/s", 0.0, "Odometer speed"),

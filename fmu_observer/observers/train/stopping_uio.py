@@ -137,7 +137,12 @@ class StoppingUio(GatedObserver, GapCertified):
         parameter("sample_period", "s", 1e-3, "Time between two innovations", min=1e-5, max=2e-3),
     )
     events = (
-        PeriodicEvent("odometer_sample", "sample_period", description="The odometer is compared with the estimate"),
+        PeriodicEvent(
+            "odometer_sample",
+            "sample_period",
+            description="The odometer is compared with the estimate",
+            samples=("odometer",),
+        ),
         BALISE,
     )
     presets: Mapping[str, Mapping[str, Any]] = {
