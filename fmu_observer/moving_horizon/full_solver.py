@@ -61,7 +61,7 @@ class FullSolution:
         cost: half the sum of the losses. residual: root of the mean square of the weighted residuals, in their
             deviations. step: largest change in the last step, in standard deviations of the last row; infinite where
             there was none.
-        far: share of the measurements that are more than `gauss_newton.FAR` of their deviations off [1].
+        far, broken: as of `gauss_newton.Solution` [1].
         iterations: steps done. seconds: time that they took. active: bounds that are touched in the last row.
         converged: whether the step fell below the tolerance, or met no curvature, so that another would be zero.
         timed_out: whether the deadline came first.
@@ -76,6 +76,7 @@ class FullSolution:
     residual: float
     step: float
     far: float
+    broken: float
     iterations: int
     seconds: float
     active: int
@@ -357,6 +358,12 @@ class _Search:
         w, near = (point.stages.G[-1] @ point.noises[-1])[self.disturbed], NEAR * self.scale[self.disturbed]
         return int(((w <= self.noise_limits[0][-1] + near) | (w >= self.noise_limits[1][-1] - near)).sum())
 
+    def far_pushed(self, point: _Point) -> float:
+        """How many transitions need a disturbance more than `FAR` of its own deviations off; the first is none."""
+        G = point.stages.G
+        w = np.einsum("kir,kr->ki", G, point.noises)
+        return float((w**2 > FAR**2 * np.einsum("kir,kir->ki", G, G))[1:].any(axis=1).sum())
+
     def broken(self, start: np.ndarray) -> str:
         """What the first guess breaks, in words."""
         parts = [
@@ -379,7 +386,8 @@ class _Search:
             cost=self.cost(point),
             residual=float(np.sqrt((residuals**2).sum() / max(self.used.sum(), 1.0))),
             step=size,
-            far=float((point.squares > FAR**2).sum() / max(self.used.sum(), 1.0)),
+            far=((point.squares > FAR**2).sum() + self.far_pushed(point)) / max(self.used.sum(), 1.0),
+            broken=float((np.abs(self.missing(point)) / self.scale).max()),
             iterations=iterations,
             seconds=perf_counter() - began,
             active=self.active(point.states[-1:]) + self.pushed(point),

@@ -7,10 +7,13 @@ solved exactly: forwards by the Kalman filter from the arrival cost on, backward
 sequential estimation, chapter X). No covariance is inverted, so that states without noise and known ones are legal.
 
 Bounds are kept by a primal-dual active set (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865): a bound that is
-active is a measurement without noise, whose multiplier the adjoint knows; from pass to pass it is let go where the
-multiplier has the wrong sign, and taken up where a state has crossed it. What a pass returns is clipped, so that it
-keeps the bounds after any number of passes. A bound of a disturbance is held alike, on the noise of a transition before
-it moves the state; at the end the trajectory is followed once more, each disturbance within its bounds.
+active is a measurement with hardly any noise, whose multiplier the adjoint knows; from pass to pass it is let go where
+the multiplier has the wrong sign, and taken up where a state has crossed it. All wrong ones change at once while they
+become fewer, else only the one that is wrong by the largest force, so that no set comes back for ever (block pivoting
+with a fallback, Judice and Pires, Comput. Oper. Res. 21 (1994) 587; the choice of the one is ours). What a pass returns
+is clipped, so that it keeps the bounds after any number of passes. A bound of a disturbance is held alike, on the noise
+of a transition before it moves the state. At the end the trajectory is followed once more, each disturbance within its
+bounds, and what it then lacks to be a course of the model is told.
 """
 
 from __future__ import annotations
@@ -124,7 +127,10 @@ class Solution(NamedTuple):
         step: largest change of an estimate in the last pass, in its standard deviations [1].
         moved: passes after which an estimate had changed by more than `SETTLED` of its deviation.
         bounds: bounds that are active in the last row.
-        far: share of the measurements that are more than `FAR` of their deviations off, whatever they weigh [1].
+        far: measurements that are more than `FAR` of their deviations off, whatever they weigh, and transitions that
+            need a disturbance so far off, for each measurement [1].
+        broken: largest part of an estimate that the transition into its row and the disturbance found for it do not
+            explain, in its standard deviations [1].
     """
 
     estimates: Array
@@ -134,11 +140,15 @@ class Solution(NamedTuple):
     moved: Array
     bounds: Array
     far: Array
+    broken: Array
 
 
 KEPT = 8  # problems whose sweeps are known as functions, so that they are traced once
 FAR = 5.0  # of a measurement's own deviations: noise is not that far off [ours]
 NEAR = 1e-6  # of its standard deviation: so near a bound a disturbance touches it
+SOFT = 1e-10  # of its variance: what a state may still move where a bound holds it, so that bounds that depend on each
+# other share a force, whose sign tells which of them to let go
+COLLAPSED = 1e-6  # of its variance: a state that has less is held by a bound, or known
 SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 
 
@@ -155,24 +165,26 @@ def solve(
     """
     n, count = problem.order, rows.shape[0]
     active, used = _at_bounds(problem, arrival.point, rows, points, shared), np.zeros(1)
+    fewest = np.full(1, np.inf)
     fresh = np.zeros((count, 1))
     fresh[-1] = 1.0
     for _ in range(passes):
         table = (rows, points, active, fresh)
-        _, swept = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
+        _, swept = scan_table(_forwards(problem), _begun(arrival, n), table, (shared,))
         behind = (np.zeros(n), np.zeros(4))
-        (adjoint, sums), (points, active) = scan_table(
+        (adjoint, sums), (points, pushes, wanted, wrong) = scan_table(
             _backwards(problem), behind, (*table, *swept), (shared,), backwards=True
         )
+        active, fewest = _exchanged(active, wanted, wrong, fewest)
         fresh = np.zeros((count, 1))
         used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
-    if problem.disturbed:
-        before = arrival.mean - np.reshape(arrival.covariance, (n, n)) @ adjoint
-        _, (points,) = scan_table(_followed(problem), (arrival.point, before), (rows, points), (shared,))
+    before = arrival.mean - np.reshape(arrival.covariance, (n, n)) @ adjoint
+    ahead = (arrival.point, before, np.zeros(2))
+    (_, _, lacks), (points,) = scan_table(_followed(problem), ahead, (rows, points, pushes, swept[2]), (shared,))
     held = np.reshape(np.sum(np.abs(active[-1])), (1,))
     residual = np.sqrt(sums[0:1] / np.maximum(sums[2:3], 1.0))
-    far = sums[3:4] / np.maximum(sums[2:3], 1.0)
-    return Solution(points, swept[1][-1], residual, sums[1:2], used, held, far)
+    far = (sums[3:4] + lacks[1:2]) / np.maximum(sums[2:3], 1.0)
+    return Solution(points, swept[1][-1], residual, sums[1:2], used, held, far, lacks[0:1])
 
 
 def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Array, shared: Array) -> ArrivalCost:
@@ -184,8 +196,27 @@ def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Arra
     """
     of_row, at = np.reshape(row, (1, problem.layout.width)), np.reshape(point, (1, problem.order))
     table = (of_row, at, np.zeros((1, max(problem.bounds, 1))), np.zeros((1, 1)))
-    after, _ = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
-    return ArrivalCost(*after)
+    (linearised, mean, covariance, _), _ = scan_table(
+        _forwards(problem), _begun(arrival, problem.order), table, (shared,)
+    )
+    return ArrivalCost(linearised, mean, covariance)
+
+
+def _begun(arrival: ArrivalCost, n: int) -> Arrays:
+    """What a sweep begins with: the arrival cost, and the variances of the states where no bound holds them."""
+    return (*arrival, vector(*(arrival.covariance[i * (n + 1)] for i in range(n))))
+
+
+def _exchanged(active: Array, wanted: Array, wrong: Array, fewest: Array) -> tuple[Array, Array]:
+    """Bounds that the next pass holds, and the fewest wrong ones so far.
+
+    Args:
+        active: held in this pass, shape (N, b). wanted: by the signs that it found. wrong: force by which each is on
+            the wrong side, zero where it is right, shape (N, b). fewest: wrong ones in any pass before, shape (1,).
+    """
+    count = np.reshape(np.sum(np.where(wrong > 0.0, 1.0, 0.0)), (1,))
+    from_on = np.where(count < fewest, 0.0 * count, np.max(wrong))
+    return np.where(wrong >= from_on, wanted, active), np.minimum(fewest, count)
 
 
 @lru_cache(maxsize=KEPT)
@@ -194,16 +225,18 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     n, q, states = problem.order, problem.layout.measurements, len(problem.bounded)
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (before, mean, flat), (row_flat, point, active, fresh), (shared,) = carry, given, known
+        (before, mean, flat, own), (row_flat, point, active, fresh), (shared,) = carry, given, known
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         moved = problem.moved(before, row, shared)
         goes = row.moves > 0.5
         F = np.where(goes, moved.F, np.eye(n))
         bounded = (problem.disturbed, problem.noise_limits(row, shared))
-        push, noise, noise_gains, noise_pulls = _held(np.zeros(n), moved.noise, *bounded, active[states:])
+        push, noise, noise_gains, noise_pulls = _held(np.zeros(n), moved.noise, *bounded, active[states:], np.zeros(n))
         mean = np.where(goes, moved.state + moved.F @ (mean - before) + push, mean)
         P = np.where(goes, predicted_covariance(P, moved.F, noise), P)
+        spread = vector(*(P[i, i] for i in range(n)))
+        own = np.where(spread > COLLAPSED * own, spread, own)
         pushed = (np.where(goes, push, 0.0 * push), np.where(goes, noise, 0.0 * noise))
         seen = problem.seen(point, row, shared)
         scale = vector(*_scales(problem, row, seen, P, fresh[0], shared))
@@ -213,13 +246,13 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         after = correct(mean, P, error, H, noise, None, problem.form)
         forces = np.reshape(np.linalg.solve(after.innovation_covariance, np.reshape(error, (q, 1))), (q,))
         limits = (problem.bounded, problem.limits(shared))
-        mean, P, gains, pulls = _held(after.estimate, after.covariance, *limits, active)
-        handed = (point, mean, np.reshape(P, (n * n,)))
+        mean, P, gains, pulls = _held(after.estimate, after.covariance, *limits, active, SOFT * own)
+        handed = (point, mean, np.reshape(P, (n * n,)), own)
         kept = (*(np.reshape(m, (m.shape[0] * m.shape[1],)) for m in (F, H, after.gain, noise)), forces, gains, pulls)
         off = row.measured - seen.measured
         beyond = [np.where(off[j] * off[j] > FAR * FAR * seen.noise[j, j], row.used[j], 0.0) for j in range(q)]
-        disturbed = (pushed[0], np.reshape(pushed[1], (n * n,)), noise_gains, noise_pulls) if problem.disturbed else ()
-        return handed, (mean, handed[2], *kept, vector(*beyond), *disturbed)
+        disturbed = (pushed[0], np.reshape(pushed[1], (n * n,)), noise_gains, noise_pulls)
+        return handed, (mean, handed[2], own, *kept, vector(*beyond), *disturbed)
 
     return body
 
@@ -231,19 +264,18 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
         (adjoint, sums), (shared,) = carry, known
-        row_flat, point, active, _, mean, flat, F, H, K, noise, forces, gains, pulls, beyond, *disturbed = given
+        row_flat, point, active, _, mean, flat, _, F, H, K, noise, forces, gains, pulls, beyond, *disturbed = given
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         x = mean - P @ adjoint
-        adjoint, taken = _let_go(x, adjoint, gains, pulls, problem.bounded, problem.limits(shared), active)
+        adjoint, *found = _let_go(x, P, adjoint, gains, pulls, problem.bounded, problem.limits(shared), active)
         force = forces + np.reshape(K, (n, q)).T @ adjoint
         adjoint = adjoint - np.reshape(H, (q, n)).T @ force
-        if disturbed:
-            push, added, noise_gains, noise_pulls = disturbed
-            w, limits = push - np.reshape(added, (n, n)) @ adjoint, problem.noise_limits(row, shared)
-            on_noise = active[len(problem.bounded) :]
-            _, more = _let_go(w, adjoint, noise_gains, noise_pulls, problem.disturbed, limits, on_noise)
-            taken = [*taken, *more]
+        push, added, noise_gains, noise_pulls = disturbed
+        Q = np.reshape(added, (n, n))
+        w, limits, on_noise = push - Q @ adjoint, problem.noise_limits(row, shared), active[len(problem.bounded) :]
+        _, *more = _let_go(w, Q, adjoint, noise_gains, noise_pulls, problem.disturbed, limits, on_noise)
+        wanted, wrong = (vector(*(own + others or [0.0 * x[0]])) for own, others in zip(found, more, strict=True))
         adjoint = np.reshape(F, (n, n)).T @ adjoint
         x = problem.clipped(x, shared)
         square = force @ np.reshape(noise, (q, q)) @ force
@@ -252,27 +284,33 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
         exists = np.max(np.hstack([row.used, np.reshape(row.moves, (1,))]))
         most = np.maximum(sums[1], exists * np.max(off))
         sums = vector(sums[0] + square, most, sums[2] + np.sum(row.used), sums[3] + np.sum(beyond))
-        return (adjoint, sums), (x, vector(*(taken or [0.0 * x[0]])))
+        return (adjoint, sums), (x, w, wanted, wrong)
 
     return body
 
 
 @lru_cache(maxsize=KEPT)
 def _followed(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
-    """A row as near to its estimate as the bounds of disturbances and states allow; where both cannot be, a state's."""
+    """A row as near to its estimate as the bounds of disturbances and states allow, where both cannot be, a state's; and what
+    it lacks to be a course of the model."""
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (about, before), (row_flat, point), (shared,) = carry, given, known
-        row = problem.layout.unpacked(row_flat)
+        (about, before, lacks), (row_flat, point, push, own), (shared,) = carry, given, known
+        row, n = problem.layout.unpacked(row_flat), problem.order
         goes, into = row.moves > 0.5, problem.moved(about, row, shared)
         moved = into.state + into.F @ (before - about)
         lower, upper = problem.noise_limits(row, shared)
-        values = [point[i] for i in range(problem.order)]
+        values = [point[i] for i in range(n)]
         for k, i in enumerate(problem.disturbed):
             within = np.minimum(np.maximum(values[i], moved[i] + lower[k]), moved[i] + upper[k])
             values[i] = np.where(goes, within, values[i])
         x = problem.clipped(vector(*values), shared)
-        return (x, x), (x,)
+        off = np.abs(x - np.where(goes, moved + push, before))
+        rounding = SOFT * (1.0 + np.abs(x))  # a state that is known has no deviation, but is off where bounds push it
+        off = np.where(off > rounding, off / np.sqrt(np.maximum(own, rounding * rounding)), 0.0)
+        far = [np.where(push[i] * push[i] > FAR * FAR * into.noise[i, i], 1.0, 0.0) for i in range(n)]
+        disturbed = np.where(goes, np.max(vector(*far)), 0.0)
+        return (x, x, vector(np.maximum(lacks[0], np.max(off)), lacks[1] + disturbed)), (x,)
 
     return body
 
@@ -293,44 +331,55 @@ def _scales(problem: WindowProblem, row: WindowRow, seen: Seen, P: Array, fresh:
 
 
 def _held(
-    mean: Array, P: Array, places: tuple[int, ...], limits: Limits, active: Array
+    mean: Array, P: Array, places: tuple[int, ...], limits: Limits, active: Array, soft: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Mean and covariance with the active bounds as measurements without noise, their gains and forces."""
+    """Mean and covariance with the active bounds as measurements, of variance `soft` [shape (n,)], their gains and
+    forces."""
     n = mean.shape[0]
     if not places:
         return mean, P, np.zeros(1), np.zeros(1)
     gains: list[Array] = []
     pulls: list[Array] = []
     for k, i in enumerate(places):
-        free = np.where(np.abs(active[k]) > 0.5, P[i, i], 0.0)
+        free = np.where(np.abs(active[k]) > 0.5, P[i, i] + soft[i], 0.0)
         holds = free > 0.0
         inverse = np.where(holds, 1.0 / np.where(holds, free, 1.0), 0.0)
         gain = P[:, i] * inverse
         error = np.where(active[k] > 0.0, limits.upper[k], limits.lower[k]) - mean[i]
         mean = mean + gain * error
-        known = np.eye(n)[i]
-        stays = np.where(holds, 1.0 - known, 1.0 + 0.0 * known)  # a known state has no rounding left either
-        P = symmetric(P - np.outer(gain, P[i])) * np.outer(stays, stays)
+        P = symmetric(P - np.outer(gain, P[i]))
         gains.extend(gain[j] for j in range(n))
         pulls.append(error * inverse)
     return mean, P, vector(*gains), vector(*pulls)
 
 
 def _let_go(
-    x: Array, adjoint: Array, gains: Array, pulls: Array, places: tuple[int, ...], limits: Limits, active: Array
-) -> tuple[Array, list[Array]]:
-    """The adjoint before the bounds of `_held`, and which of them are active in the next pass: 1, -1 or 0."""
+    x: Array,
+    P: Array,
+    adjoint: Array,
+    gains: Array,
+    pulls: Array,
+    places: tuple[int, ...],
+    limits: Limits,
+    active: Array,
+) -> tuple[Array, list[Array], list[Array]]:
+    """The adjoint before the bounds of `_held`; which of them are wanted active, 1, -1 or 0; and the force by which
+    each is wrong, zero where it stays."""
     n, (lower, upper) = x.shape[0], limits
-    taken, behind = [0.0 * x[0]] * len(places), [adjoint[i] for i in range(n)]
+    wanted, behind = [0.0 * x[0]] * len(places), [adjoint[i] for i in range(n)]
+    wrong = list(wanted)
     for k, i in reversed(list(enumerate(places))):
-        gain = gains[k * n : (k + 1) * n]
+        gain, held = gains[k * n : (k + 1) * n], np.abs(active[k]) > 0.5
         force = pulls[k] + gain @ vector(*behind)
-        behind[i] = behind[i] - np.where(np.abs(active[k]) > 0.5, force, 0.0)
+        behind[i] = behind[i] - np.where(held, force, 0.0)
         above, below = x[i] > upper[k], x[i] < lower[k]
         crossed = np.where(above, 1.0, np.where(below, -1.0, 0.0))
         holds = force * active[k] < 0.0  # it pushes back, into the bounds
-        taken[k] = np.where(np.abs(active[k]) > 0.5, np.where(holds, active[k], 0.0), crossed)
-    return vector(*behind), taken
+        wanted[k] = np.where(held, np.where(holds, active[k], 0.0), crossed)
+        beyond = np.maximum(np.maximum(x[i] - upper[k], lower[k] - x[i]), 0.0)
+        needed = beyond / np.where(P[i, i] > 0.0, P[i, i], 1.0)  # about the force that would bring it back
+        wrong[k] = np.where(held, np.where(holds, 0.0, np.abs(force)), needed)
+    return vector(*behind), wanted, wrong
 
 
 def _at_bounds(problem: WindowProblem, before: Array, rows: Array, points: Array, shared: Array) -> Array:

@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
-from fmu_observer.moving_horizon.gauss_newton import KEPT, WindowProblem, passed, solve
+from fmu_observer.moving_horizon.gauss_newton import FAR, KEPT, WindowProblem, passed, solve
 from plant_models.hybrid import OutputWarning, Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
 from plant_models.hybrid.system import Array, vector
 
 MOST_ROWS, MOST_PASSES = 1000, 20
+MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within what is told of its error [ours]
 
 TOLD = {
     "residual_norm": "Root of the mean square of the window's residuals, in their deviations",
@@ -26,15 +27,23 @@ TOLD = {
     "passes_used": "Passes that changed an estimate by more than 0.001 of its deviation",
     "rows_in_window": "Rows of the window with a measurement",
     "bounds_active": "Bounds at which the estimate is held",
-    "bounds_contradicted": "1 while a bound is active and most measurements of the window are far off",
+    "bounds_contradicted": "1 while bounds hold the estimate against most of the window, or no course keeps them",
+    "course_error": "Largest part of an estimate that the model and its disturbance do not explain, in its deviations",
+    "unsettled": "1 while the window is not a course of the model, or its last pass changed an estimate much",
 }
 """What is told of a window, outputs by name."""
 WARNINGS = {
     "bounds_contradicted": OutputWarning(
-        "a bound holds its estimate while more than half of the measurements in its window are over 5 deviations off. "
-        "Check the bounds, and the deviations of the measurements",
-        ("bounds_active", "rows_in_window"),
-    )
+        "its bounds contradict its window: they hold the estimate while more than half of the measurements, or of the "
+        "disturbances between them, are over 5 deviations off, or no course of the model keeps them all. Check the "
+        "bounds, and the deviations of measurements and disturbances",
+        ("bounds_active", "course_error"),
+    ),
+    "unsettled": OutputWarning(
+        "its window was not solved: the last pass moved an estimate by more than 3 standard deviations, or what came "
+        "out is no course of the model. Allow more passes (passes), or solve windows to convergence",
+        ("last_step", "course_error"),
+    ),
 }
 """What of it warns."""
 
@@ -144,22 +153,34 @@ def _iteration(problem: WindowProblem, passes: int) -> Callable[..., tuple[Array
         rows = np.reshape(np.hstack([table[width:], new]), (count, width))
         estimates = np.reshape(np.hstack([states[n:], predicted]), (count, n))
         found = solve(problem, before, rows, estimates, known, passes)
-        against = contradicted(found.bounds, found.far)
+        against = contradicted(found.bounds, found.far, found.broken)
+        moving = found.step if passes > 1 else 0.0 * found.step  # the first pass moves by what the row has brought
         last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds, against)
+        last = (*last, found.broken, unsettled(moving, found.broken))
         kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
         return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
 
     return iterated
 
 
-def contradicted(bounds: Array, far: Array) -> Array:
-    """1 where bounds hold an estimate against most of what was measured, shape (1,).
+def contradicted(bounds: Array, far: Array, broken: Array) -> Array:
+    """1 where bounds hold an estimate against most of what the window says, or against the model itself, shape (1,).
 
     Args:
-        bounds: that are active in the last row, shape (1,). far: share of the measurements of the window that are far
-            off, shape (1,) [1].
+        bounds: that are active in the last row, shape (1,). far: measurements and disturbances of the window that are
+            far off, for each measurement, shape (1,) [1]. broken: `Solution.broken`, shape (1,) [1].
     """
-    return np.where(far > 0.5, np.where(bounds > 0.5, 1.0, 0.0), 0.0)
+    against = np.where(bounds > 0.5, np.where(far > 0.5, 1.0, 0.0), 0.0)
+    return np.maximum(against, np.where(broken > FAR, 1.0, 0.0))
+
+
+def unsettled(step: Array, broken: Array) -> Array:
+    """1 where a window is far from its solution, shape (1,).
+
+    Args:
+        step: by which the last pass has moved an estimate, shape (1,) [1]. broken: `Solution.broken`, shape (1,) [1].
+    """
+    return np.where(np.maximum(step, broken) > MUCH, 1.0, 0.0)
 
 
 def joined(*parts: Array) -> Array:

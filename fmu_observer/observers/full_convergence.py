@@ -16,7 +16,7 @@ import numpy as np
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.moving_horizon.full_solver import Effort, FullSolver
 from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed
-from fmu_observer.moving_horizon.real_time_iteration import Iterated, contradicted
+from fmu_observer.moving_horizon.real_time_iteration import Iterated, contradicted, unsettled
 from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
 from plant_models.hybrid import OutputWarning, Signal, memory, output_signal, width
@@ -176,8 +176,13 @@ def iterated_fully(
             guesses[k] = guesses[k - 1] if k else before.mean
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
     step = found.step if found.iterations else 0.0  # no step, no change: the prediction is the answer
-    against = contradicted(np.array([found.active]), np.array([found.far]))
-    last = [found.residual, step, float(found.iterations), *layout.count(rows), float(found.active), *against]
+    bounds, far, broken = (np.array([value]) for value in (found.active, found.far, found.broken))
+    last = [found.residual, step, float(found.iterations), *layout.count(rows), float(found.active)]
+    last += [
+        *contradicted(bounds, far, broken),
+        found.broken,
+        *unsettled(np.zeros(1), broken),
+    ]  # `converged` judges the step
     early = not found.converged and not found.timed_out
     ended = [float(said) for said in (found.converged, found.timed_out, early, found.feasible)]
     remembered = np.hstack([*before, rows.ravel(), found.states.ravel(), last, ended])
