@@ -291,8 +291,8 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
 
 @lru_cache(maxsize=KEPT)
 def _followed(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
-    """A row as near to its estimate as the bounds of disturbances and states allow, where both cannot be, a state's; and what
-    it lacks to be a course of the model."""
+    """A row as near to its estimate as the bounds of disturbances and states allow (where both cannot be, a state's),
+    and what it lacks to be a course of the model."""
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
         (about, before, lacks), (row_flat, point, push, own), (shared,) = carry, given, known
