@@ -36,7 +36,7 @@ WARNINGS = {
     "bounds_contradicted": OutputWarning(
         "its bounds contradict its window: they hold the estimate while more than half of the measurements, or of the "
         "disturbances between them, are over 5 deviations off, or no course of the model keeps them all. Check the "
-        "bounds, and the deviations of measurements and disturbances",
+        "bounds, the deviations, and whether a measurement is false",
         ("bounds_active", "course_error"),
     ),
     "unsettled": OutputWarning(

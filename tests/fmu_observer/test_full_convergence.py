@@ -95,7 +95,14 @@ def test_a_deadline_before_the_first_row_gives_the_prediction():
     assert np.isfinite(full.update_outputs()).all()
     assert _told(full, "last_step", "passes_used", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0, 0.0]
     warned = {s.name for s in system.outputs if s.warning}
-    assert warned == {"bounds_contradicted", "rows_in_window", "deadline_missed", "stopped_early", "unsettled"}
+    assert warned == {
+        "bounds_contradicted",
+        "rows_in_window",
+        "deadline_missed",
+        "stopped_early",
+        "unsettled",
+        "restarts",
+    }
 
 
 def test_a_search_that_ends_before_its_tolerance_is_told():

@@ -300,9 +300,17 @@ def test_an_exact_model_without_noise_is_followed() -> None:
         assert np.abs(runtime.update_outputs()[: model.order] - x).max() <= 1e-8
 
 
-def run_train(observer: Any, wrong: float, seconds: float = 24.0) -> np.ndarray:
-    """Position errors of a train with true effort, a balise every 8 s, the second of which is told wrong [m]."""
-    runtime, rng = Runtime(observer), np.random.default_rng(1)
+def run_train(
+    observer: Any,
+    wrong: float,
+    seconds: float = 24.0,
+    at: float = 16.0,
+    seed: int = 1,
+    twice: bool = False,
+    restarts: list[float] | None = None,
+) -> np.ndarray:
+    """Position errors of a train with true effort, a balise every 8 s, the one at a time told wrong [m]."""
+    runtime, rng = Runtime(observer), np.random.default_rng(seed)
     names, parameters = [s.name for s in observer.input_signals], [s.name for s in observer.parameter_signals]
     runtime.p[parameters.index("gate")] = 0.0
     runtime.p[parameters.index("odometer_gate")] = 1e6
@@ -317,9 +325,14 @@ def run_train(observer: Any, wrong: float, seconds: float = 24.0) -> np.ndarray:
         runtime.u[names.index("odometer")] = v + 0.1 * rng.normal()
         runtime.advance(0.1 * k)
         if k % 80 == 0:
-            runtime.u[names.index("balise_position")] = position + 0.5 * rng.normal() + (wrong if k == 160 else 0.0)
-            runtime.trigger("balise")
+            runtime.u[names.index("balise_position")] = (
+                position + 0.5 * rng.normal() + (wrong if k == round(10 * at) else 0.0)
+            )
+            for _ in range(1 + twice):
+                runtime.trigger("balise")
         errors.append(runtime.update_outputs()[0] - position)
+    if restarts is not None:
+        restarts.append(runtime.update_outputs()[[s.name for s in observer.outputs].index("restarts")])
     return np.array(errors)
 
 
@@ -328,6 +341,24 @@ def test_a_false_balise_pulls_least_squares_by_metres_and_the_robust_loss_not() 
     robust = np.abs(run_train(BaliseMovingHorizon(10), 20.0)[160:230]).max()
     assert pulled > 8.0  # the loss of squares believes it by three quarters and more
     assert robust < 1.5  # what it is without the false balise
+
+
+@pytest.mark.parametrize("twice", [False, True])
+@pytest.mark.parametrize("wrong", [40.0, -40.0])
+def test_a_false_balise_that_comes_first_is_given_up_once_two_contradict_it(wrong: float, twice: bool) -> None:
+    """From 24 s on, the third balise; one that is told twice is one, and does not vouch for itself."""
+    restarts: list[float] = []
+    errors = run_train(BaliseMovingHorizon(3), wrong, 26.0, at=8.0, twice=twice, restarts=restarts)
+    assert np.abs(errors[90:230]).max() > 20.0
+    assert np.abs(errors[241:]).max() < 3.0
+    assert restarts[-1] == 1.0
+
+
+@pytest.mark.parametrize("at", [16.0, 24.0, 1e3])
+def test_a_window_that_refuses_one_balise_or_none_does_not_begin_anew(at: float) -> None:
+    restarts: list[float] = []
+    run_train(BaliseMovingHorizon(3), 40.0, 34.0, at=at, seed=round(at), restarts=restarts)
+    assert restarts[-1] == 0.0
 
 
 def test_with_squares_and_no_active_bound_it_is_the_filter() -> None:

@@ -27,30 +27,66 @@ from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.train.balise_odometer_ekf import (
     BALISE_ROW,
     FIRST_DEVIATIONS,
+    INNOVATION,
     LAST_TIME,
+    NIS,
     ODOMETER_ROW,
     ORDER,
     OWN_PARAMETERS,
     PAIRS,
     BaliseOdometerEkf,
     D,
+    P,
     V,
     covariance_of,
     transition,
 )
 from fmu_observer.observers.train.train_observer import BALISE
-from plant_models.hybrid import parameter, vector
+from plant_models.hybrid import OutputWarning, memory, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
-LAYOUT = RowLayout(inputs=ORDER + 3, measurements=1)
-OFFSETS, SPEED, EFFORT, IS_BALISE = slice(0, ORDER), ORDER, ORDER + 1, ORDER + 2  # inputs of a row
+LAYOUT = RowLayout(inputs=ORDER + 4, measurements=1)
+OFFSETS, SPEED, EFFORT, IS_BALISE, ANEW = slice(0, ORDER), ORDER, ORDER + 1, ORDER + 2, ORDER + 3  # inputs of a row
 WINDOW_PARAMETERS = (
     parameter("speed_limit", "m/s", 100.0, "Highest speed; the lowest is zero", min=0.1),
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
     parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
+)
+
+RESTARTS = output_signal(
+    "restarts",
+    "1",
+    "Times that the position began anew, since most balises were refused",
+    variability="discrete",
+    warning=OutputWarning(
+        "began its position anew where it had refused most of its balises and these agreed: what it told before was "
+        "off by more than its deviation. Look at the first telegrams, and at the deviations",
+    ),
+)
+
+
+class Refusals(NamedTuple):
+    """What is remembered of the balises that the window refused.
+
+    Attributes:
+        believed: balises believed since the position began. refused: in a row that agree. place: of the last balise, as
+            told [m]. restarts: of the position.
+    """
+
+    believed: Array
+    refused: Array
+    place: Array
+    restarts: Array
+
+
+REFUSALS = (
+    memory("balises_believed", "1", 0.0, "Balises believed since the position began"),
+    memory("balises_refused", "1", 0.0, "Balises refused in a row that agree"),
+    memory("told_place", "m", 0.0, "Place of the last balise, as told"),
+    memory("restart_count", "1", 0.0, "Times that the position began anew"),
 )
 
 
@@ -92,6 +128,11 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     gate of balises is off unless it is set. `odometer_fault` and likelihood are those of the filter's step. So is the
     output `nis`, which only the loss ``squares`` has: under another one what it doubts would be judged with the rest.
 
+    A false balise that comes first is believed, and the true ones after it are doubted. So balises in a row whose
+    innovations are beyond `loss_scale` of their own deviations, and agree with each other within that, are counted.
+    Where there are more of them than were believed, or `gate_recover`, the position begins anew at the last of them,
+    and `restarts` tells it.
+
     With the loss ``squares``, no bound active and every reading within its gate it is `BaliseOdometerEkf` at every
     window.
 
@@ -107,7 +148,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     description = "Moving-horizon observer of odometer and balises, with disturbance and creep"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
     parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
-    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW))
+    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW), RESTARTS)
     iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
@@ -130,7 +171,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     def own_states(self) -> tuple[Any, ...]:
         """States of the filter, then what is remembered of the window."""
         covariance = np.diag(np.square(FIRST_DEVIATIONS))
-        filtered = super().own_states()
+        filtered = (*super().own_states(), *REFUSALS)
         remembered = window_memory(np.zeros(ORDER), covariance, LAYOUT.width, self.window)
         places = {s.name: width((*filtered, *remembered)[: len(filtered) + i]) for i, s in enumerate(remembered)}
         self._places = (*places.values(), width((*filtered, *remembered)))
@@ -163,14 +204,16 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         start = joined(x[:ORDER], x[:ORDER], np.reshape(covariance_of(x), (ORDER * ORDER,)))
         known = self.problem.clipped(x[:ORDER], shared)
         before = np.where(begun, points[-ORDER:], x[:ORDER])
-        row = self._row(event, t, x, u, p, before)
+        refusals = self._refusals(event, x, u, p, filtered)
+        anew = refusals.restarts - x[self._places[0] - 1]
+        row = self._row(event, t, x, u, p, before, anew)
         packed = vector(*LAYOUT.packed(row))
         found = self.iterate(
             self.problem, self.passes, np.where(begun, arrival, start), window, points, packed, known, shared
         )
         covariance = np.reshape(found.covariance, (ORDER, ORDER))
         upper = vector(*(covariance[i, j] for i, j in PAIRS))
-        return joined(found.estimate, upper, filtered[LAST_TIME : self._places[0]], found.remembered)
+        return joined(found.estimate, upper, filtered[LAST_TIME:], vector(*refusals), found.remembered)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates now within their bounds, their deviations, how the last measurement fits, and the window."""
@@ -179,16 +222,35 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
         if self.loss != "squares":
             values.pop("nis")
-        return values | told(x[self._places[3] : self._places[4]])
+        return values | told(x[self._places[3] : self._places[4]]) | {RESTARTS.name: x[self._places[0] - 1]}
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _row(self, event: str, t: Array, x: Array, u: Any, p: Any, before: Array) -> WindowRow:
+    def _refusals(self, event: str, x: Array, u: Any, p: Any, filtered: Array) -> Refusals:
+        """What is remembered of refused balises after an event, from the innovation of the filter's own step."""
+        old = Refusals(*(x[self._places[0] - len(REFUSALS) + i] for i in range(len(REFUSALS))))
+        if event != BALISE.name or self.loss == "squares":
+            return old
+        error, nis, before = filtered[INNOVATION], filtered[NIS], x[INNOVATION]
+        doubt = p.loss_scale * p.loss_scale
+        refused = np.where(nis > doubt, 1.0, 0.0)
+        agrees = np.where(np.square(error - before) * nis <= 2.0 * doubt * np.square(error), 1.0, 0.0)
+        count = refused * (1.0 + agrees * old.refused)
+        anew = refused * np.where(count >= np.minimum(old.believed + 1.0, p.gate_recover), 1.0, 0.0)
+        believed = np.where(anew > 0.0, 1.0, old.believed + 1.0 - refused)
+        now = Refusals(believed, count * (1.0 - anew), u.balise_position, old.restarts + anew)
+        told = old.believed + old.refused > 0.0
+        again = np.where(
+            np.abs(u.balise_position - old.place) <= p.balise_deviation, told, False
+        )  # told twice, it is one
+        return Refusals(*(np.where(again, was, now_is) for was, now_is in zip(old, now, strict=True)))
+
+    def _row(self, event: str, t: Array, x: Array, u: Any, p: Any, before: Array, anew: Array) -> WindowRow:
         """The row that an event brings: what the flow added to the linear transition, and the measurement."""
         period, is_balise = t - x[LAST_TIME], float(event == BALISE.name)
         offset = x[:ORDER] - transition(period, x[V], u.effort, p).F @ before
         measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
-        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], u.effort + 0.0 * x[V], is_balise + 0.0 * x[V])
+        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], u.effort + 0.0 * x[V], is_balise + 0.0 * x[V], anew)
         return WindowRow(1.0 + 0.0 * x[V], period, t + 0.0 * x[V], inputs, vector(measured), vector(1.0 + 0.0 * x[V]))
 
 
@@ -198,7 +260,8 @@ def _shared(flat: Array) -> Shared:
 
 def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
     F, noise = transition(row.period, row.inputs[SPEED], row.inputs[EFFORT], _shared(shared))
-    return Moved(F @ x + row.inputs[OFFSETS], F, noise)
+    unknown = row.inputs[ANEW] * np.diag([FIRST_DEVIATIONS[P] ** 2, 0.0, 0.0, 0.0])
+    return Moved(F @ x + row.inputs[OFFSETS], F, noise + unknown)
 
 
 def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
