@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.suitability import require_mass
 from plant_models.hybrid import input_signal, state
 
 LOCOMOTIVE, WAGON = 90e3, 60e3  # [kg]
@@ -14,18 +15,30 @@ STIFFNESS, DAMPING = 2.5e6, 5e4  # of the coupler [N/m], [N.s/m]
 DRAG = 2e-3  # slope of the running resistance per mass [1/s]
 
 
-def coupled_vehicles() -> ObserverModel:
-    """``de = v1 - v2``, ``dv1 = (u - F) / m1 - r v1 + d``, ``dv2 = F / m2 - r v2``, ``F = K e + D (v1 - v2)`` [ours].
+def coupled_vehicles(
+    mass: float = LOCOMOTIVE,
+    wagon_mass: float = WAGON,
+    drag: float = DRAG,
+    effort: float = 1.0,
+    stiffness: float = STIFFNESS,
+    damping: float = DAMPING,
+) -> ObserverModel:
+    """``de = v1 - v2``, ``dv1 = (b u - F) / m1 - r v1 + d``, ``dv2 = F / m2 - r v2``, ``F = K e + D (v1 - v2)`` [ours].
 
     Both speeds are measured; the elongation e of the coupler is not, and the effort differs from the command u by an
     unknown ``m1 d``, a wheel that slides or a brake that fails. The smallest train on which decoupling shows
     something: the coupler is told from the wagon's speed, whatever the locomotive's wheels do.
+
+    Args:
+        mass: m1 [kg]. wagon_mass: m2 [kg]. drag: r, slope of the resistance per mass [1/s]. effort: force per effort, b
+            [1]. stiffness: K [N/m]. damping: D [N.s/m].
     """
+    require_mass("coupled_vehicles", mass=mass, wagon_mass=wagon_mass)
     A = np.array(
         [
             [0.0, 1.0, -1.0],
-            [-STIFFNESS / LOCOMOTIVE, -DAMPING / LOCOMOTIVE - DRAG, DAMPING / LOCOMOTIVE],
-            [STIFFNESS / WAGON, DAMPING / WAGON, -DAMPING / WAGON - DRAG],
+            [-stiffness / mass, -damping / mass - drag, damping / mass],
+            [stiffness / wagon_mass, damping / wagon_mass, -damping / wagon_mass - drag],
         ]
     )
     return ObserverModel(
@@ -43,7 +56,7 @@ def coupled_vehicles() -> ObserverModel:
             input_signal("wagon_speed", "m/s", 10.0, "Speed of the wagon"),
         ),
         A=A,
-        B=np.array([[0.0], [1.0 / LOCOMOTIVE], [0.0]]),
+        B=np.array([[0.0], [effort / mass], [0.0]]),
         C=np.eye(3)[1:],
         sample_period=0.1,
         unknown_inputs=(

@@ -10,8 +10,10 @@ import numpy as np
 
 from fmu_observer.condition import Condition
 from fmu_observer.design.decoupling import SOURCE, decoupled_gain, decoupling, decoupling_condition, require_decoupling
-from fmu_observer.models import ObserverModel, find_model
+from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.models.linearisation import start_of
+from fmu_observer.models.suitability import linear_part, with_unknown_inputs
+from fmu_observer.observers.continuous.errors_decay import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
 from plant_models.hybrid import Signal, state
@@ -34,29 +36,34 @@ class DecouplingUio(ModelObserver):
 
     Defaults [ours]: poles from -2 1/s on; L_r the identity.
 
+    Of a nonlinear model the estimate keeps phi; gains are those of the mean drift, and the condition asks for one
+    Lyapunov function over all slopes. A model that declares no unknown inputs has errors of its known ones, H = B.
+
     Args:
-        model: a linear model with unknown inputs, or the name of one.
+        model: any model, or the name of one. numbers: of a model by name, for any train: `mass` [kg], `drag` [1/s],
+            `effort` [1], and those that it is made of besides; gains and conditions follow.
 
     Raises:
         UnobservableError: an invariant zero does not decay; the message says in which states it lies.
-        ValueError: the model is nonlinear, declares no unknown inputs, or rank(C H) < rank(H).
+        ValueError: nothing unknown acts on the model, rank(C H) < rank(H), or a number is not one of the model's.
     """
 
     name = "decoupling_uio"
     description = "Unknown-input observer that decouples the unknown inputs, continuous measurements"
     source = "Aguiar Cota 2019, (2.12)"
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("coupled_vehicles", "braked_train")}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MODELS), **NUMBERS}
 
-    def __init__(self, model: str | ObserverModel = "coupled_vehicles") -> None:
-        chosen = find_model(model)
-        require_decoupling(chosen, self.name)
-        self._decoupling = decoupling(chosen.A, np.asarray(chosen.H), chosen.C)
-        K = decoupled_gain(chosen, -SPEED * (1.0 + 0.25 * np.arange(chosen.order)))
+    def __init__(self, model: str | ObserverModel = "coupled_vehicles", **numbers: float) -> None:
+        chosen = with_unknown_inputs(find_model(model, **numbers), self.name)
+        self._linear = linear_part(chosen)
+        require_decoupling(self._linear, self.name)
+        self._decoupling = decoupling(self._linear.A, np.asarray(chosen.H), chosen.C)
+        K = decoupled_gain(self._linear, -SPEED * (1.0 + 0.25 * np.arange(chosen.order)))
         text = "Gain K of what is left free, row by row"
         self.gain_parameters = (self.gain_parameter("gain", K, text), residual_gain(chosen))
         self.extra_outputs = residual_outputs(chosen)
-        super().__init__(chosen)
+        super().__init__(chosen, **numbers)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Filter state z, shape (n,)."""
@@ -72,12 +79,13 @@ class DecouplingUio(ModelObserver):
 
     def condition_of(self, p: Any) -> Condition:
         """Existence by ranks and invariant zeros, and the abscissa of N for the gain in use."""
-        existence = decoupling_condition(self.model)
-        abscissa = float(np.linalg.eigvals(self.matrices(p)["N"]).real.max())
+        existence = decoupling_condition(self._linear)
+        K = np.asarray(as_matrix(p.gain, self.model.order, len(self.model.measurements)))
+        found = errors_decay([self._decoupling.P @ A - K @ self.model.C for A in self.model.drifts])
         return Condition(
-            holds=existence.holds and abscissa < 0.0,
-            values={**existence.values, "abscissa": abscissa},
-            statement=f"{existence.statement}; N = P A - K C is Hurwitz (abscissa < 0)",
+            holds=existence.holds and found.holds,
+            values={**existence.values, **found.values},
+            statement=f"{existence.statement}; N = P A - K C {found.statement}",
             source=SOURCE,
         )
 

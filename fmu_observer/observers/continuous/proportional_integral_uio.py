@@ -12,8 +12,9 @@ import numpy as np
 from fmu_observer.condition import Condition
 from fmu_observer.design.extended_disturbance import check_rho, extended_gain, extended_matrices
 from fmu_observer.design.pole_placement import observability_matrix
-from fmu_observer.models import ObserverModel, find_model
-from fmu_observer.models.suitability import require_unknown_inputs
+from fmu_observer.models import MODELS, ObserverModel, find_model
+from fmu_observer.models.suitability import linear_part, with_unknown_inputs
+from fmu_observer.observers.continuous.errors_decay import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
 from plant_models.hybrid import output_signal, state, vector
@@ -38,12 +39,18 @@ class ProportionalIntegralUio(ModelObserver):
     with rho = 2, has gain and starts of 3.2.3: poles -50, -50 and -1.5 1/s, so it asks for internal steps of 1 to 2 ms
     and for a speed that comes as often.
 
+    Of a nonlinear model the estimate keeps phi; gains are those of the mean drift, and the condition asks for one
+    Lyapunov function over all slopes. A model that declares no unknown inputs has errors of its known ones, H = B.
+
     Args:
-        model: a linear model with unknown inputs, or the name of one. rho: how many of d, d' and so on are states.
+        model: any model, or the name of one. rho: how many of d, d' and so on are states. numbers: of a model by name,
+            for any train: `mass` [kg], `drag` [1/s], `effort` [1], and those that it is made of besides; gains and
+            conditions follow. The preset is that of the train of the thesis.
 
     Raises:
         UnobservableError: a mode of the extended pair is not observable; the message says which.
-        ValueError: the model is nonlinear or declares no unknown inputs, or rho is no whole number from 1 to 3.
+        ValueError: nothing unknown acts on the model, rho is no whole number from 1 to 3, or a number is not one of the
+            model's.
     """
 
     name = "proportional_integral_uio"
@@ -51,13 +58,13 @@ class ProportionalIntegralUio(ModelObserver):
     source = "Aguiar Cota 2019, (2.13)-(2.17)"
     internal_step = 1e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "model": ("braked_train", "coupled_vehicles"),
+        "model": tuple(MODELS),
         "rho": tuple(range(1, LARGEST + 1)),
+        **NUMBERS,
     }
 
-    def __init__(self, model: str | ObserverModel = "braked_train", rho: int = 2) -> None:
-        self.model = chosen = find_model(model)
-        require_unknown_inputs(chosen, self.name)
+    def __init__(self, model: str | ObserverModel = "braked_train", rho: int = 2, **numbers: float) -> None:
+        self.model = chosen = with_unknown_inputs(find_model(model, **numbers), self.name)
         check_rho(rho, self.name)
         if rho > LARGEST:
             raise ValueError(f"{self.name}: rho must be at most {LARGEST}, got {rho}: higher derivatives are noise.")
@@ -82,16 +89,16 @@ class ProportionalIntegralUio(ModelObserver):
             self.gain_parameter("gain", self.default_gain(chosen, self.rho), "Gain L, row by row"),
             residual_gain(chosen),
         )
-        if (chosen.name, self.rho) == ("braked_train", 2):
+        if (chosen.name, self.rho, numbers) == ("braked_train", 2, {}):
             self.presets = {"as_published": {"gain": PUBLISHED_GAIN, **PUBLISHED_START}}
-        super().__init__(chosen, rho=self.rho)
+        super().__init__(chosen, rho=self.rho, **numbers)
 
     @staticmethod
     def default_gain(model: ObserverModel, rho: int) -> np.ndarray:
         """Gain L of the default poles, shape (n + rho nd, q).
 
         Args:
-            model: a linear model with nd unknown inputs. rho: how many of d, d' and so on are states.
+            model: a model with nd unknown inputs. rho: how many of d, d' and so on are states.
 
         Raises:
             UnobservableError: a mode of the extended pair is not observable; the message says which.
@@ -99,13 +106,15 @@ class ProportionalIntegralUio(ModelObserver):
         disturbances = [f"{s.name}{_suffix(k)}" for k in range(rho) for s in model.unknown_inputs]
         states = (*(s.name for s in model.states), *disturbances)
         poles = -SPEED * (1.0 + 0.25 * np.arange(len(states)))
-        return extended_gain(model.A, np.asarray(model.H), model.C, rho, poles, states, model.name)
+        return extended_gain(linear_part(model).A, np.asarray(model.H), model.C, rho, poles, states, model.name)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Estimates and disturbances, shape (n + rho nd,)."""
         moved = self.A_e @ x + self._gain(p) @ (self.measured(u) - self.C_e @ x)
         driven = self.model.B @ self.known(u) if self.model.inputs else np.zeros(self.model.order)
         n = self.model.order
+        if self.model.phi is not None:
+            driven = driven + self.model.remainder(self.estimates(x), self.known(u))
         return vector(*(moved[i] + driven[i] if i < n else moved[i] for i in range(len(self.A_e))))
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
@@ -117,17 +126,21 @@ class ProportionalIntegralUio(ModelObserver):
 
     def condition_of(self, p: Any) -> Condition:
         """Observability of the extended pair by rank and smallest singular value, and the abscissa of A_e - L C_e."""
-        matrix = observability_matrix(self.A_e, self.C_e)
-        abscissa = float(np.linalg.eigvals(self.A_e - np.asarray(self._gain(p)) @ self.C_e).real.max())
+        linear = linear_part(self.model)
+        H, C, L = np.asarray(linear.H), linear.C, np.asarray(self._gain(p))
+        matrix = observability_matrix(extended_matrices(linear.A, H, C, self.rho)[0], self.C_e)
+        vertices = [extended_matrices(A, H, C, self.rho)[0] - L @ self.C_e for A in self.model.drifts]
+        sizes = np.tile(np.linalg.norm(H, axis=0), self.rho)  # a force counts by the acceleration that it makes
+        found = errors_decay(vertices, [*np.ones(linear.order), *sizes])
         return Condition(
-            holds=abscissa < 0.0,
+            holds=found.holds,
             values={
                 "rank": int(np.linalg.matrix_rank(matrix)),
                 "order": len(self.A_e),
                 "smallest_singular_value": float(np.linalg.svd(matrix)[1][-1]),
-                "abscissa": abscissa,
+                **found.values,
             },
-            statement="A_e - L C_e is Hurwitz (abscissa < 0); poles can be placed at will where rank = order",
+            statement=f"A_e - L C_e {found.statement}; poles can be placed at will where rank = order",
             source="Aguiar Cota 2019, (2.16)-(2.17)",
         )
 
