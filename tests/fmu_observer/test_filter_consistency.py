@@ -104,7 +104,8 @@ def test_squares_use_what_is_told_and_leave_out_what_is_singular() -> None:
 
 def test_too_little_and_infinite_are_told() -> None:
     assert judge(np.ones(4), 1.0, white=True).verdict == "too few samples"
-    assert judge(np.zeros(0), 1.0, white=True).verdict == "too few samples"
+    none = judge(np.zeros(0), 1.0, white=True)
+    assert (none.verdict, none.samples, none.independent) == ("too few samples", 0, 0.0)
     assert judge(np.array([1.0] * 9 + [np.inf]), 1.0, white=True).verdict == "not finite"
     assert judge(np.full(100, 0.1), 1.0, white=True).verdict == "underconfident"
     missing = np.where(np.arange(100) % 2 == 0, 1.0, 2.0)  # a sample may have one or two measurements

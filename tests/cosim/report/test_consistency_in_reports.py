@@ -110,7 +110,9 @@ def test_the_report_shows_it() -> None:
     assert nis_figure(result, SPEC).get_yscale() == "log"
     assert len(nees_figure(run(covariance=False), SPEC).lines) == 3  # the line at 1, and two quantities
     text = consistency_text(filter_consistency(result, SPEC), SPEC)
-    assert text.splitlines()[0].startswith("filter consistency  judged by")
+    heading, _, row = text.splitlines()[:3]
+    assert heading.startswith("filter consistency  judged by")
+    assert (heading[0] == " ", row[0] == " ") == (False, False)  # words begin at the left, numbers end at the right
     assert consistency_text([], SPEC) == ""
 
 
