@@ -8,6 +8,7 @@ Event Mode brings the row after it. So whoever listens gets the very inputs it h
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,11 @@ import numpy as np
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 
 from cosim.components.fmi3 import FMI3Component
-from cosim.components.recording_data import Interpolation, Recording, make_recording, whole_number_columns
+from cosim.components.recording_data import Chosen, Recording, make_recording, whole_number_columns
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.load import load_result
 from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
+from fmus.fmi.standard import TIME_TOLERANCE
 
 KIND = "recording"
 
@@ -142,6 +144,36 @@ class RecordingSlave:
         return read
 
 
+@dataclass(frozen=True)
+class Course:
+    """Some columns as functions of time, wherever the component stands; it ends with the last row.
+
+    Args:
+        recording: what is played back. places: of the columns, shape (m,).
+    """
+
+    recording: Recording
+    places: np.ndarray
+
+    def at(self, t: float, *, before: bool) -> np.ndarray:
+        """Values at `t` [s], shape (m,).
+
+        Args:
+            before: of several rows of this time the first one instead of the last one.
+        """
+        return np.asarray(self.recording.at(min(t, self._end), before=before)[self.places])
+
+    def mean(self, t: float, until: float) -> np.ndarray:
+        """Means from `t` to `until` [s], shape (m,)."""
+        if until > self._end or until - t <= 2.0 * TIME_TOLERANCE:
+            return 0.5 * (self.at(t, before=False) + self.at(until, before=True))
+        return np.asarray(self.recording.mean(t, until)[self.places])
+
+    @property
+    def _end(self) -> float:
+        return float(self.recording.time[-1])
+
+
 class RecordingComponent(FMI3Component):
     """The component; columns with gaps are refused only where somebody asks for them.
 
@@ -150,10 +182,52 @@ class RecordingComponent(FMI3Component):
     """
 
     def __init__(self, name: str, recording: Recording) -> None:
-        slave = RecordingSlave(recording)
         self.recording = recording
+        slave = RecordingSlave(recording)
         super().__init__(name, slave, slave.model_description, source=recording.source, kind=KIND)
-        self.held_outputs = recording.held_over_steps
+        self._player = slave
+        self._take(recording)
+
+    def _take(self, recording: Recording) -> None:
+        self.recording = self._player.recording = recording
+        self.held_outputs, self.line_outputs = recording.held_over_steps, recording.lines
+
+    def connected(self, name: str, *, flows: bool, target: str) -> None:
+        """A column is connected: where nobody said whether it is held, its targets do.
+
+        Args:
+            name: of the column. flows: whether the target is continuous. target: its name, for messages.
+
+        Raises:
+            CouplingError: it is said to run on lines, and the target takes no lines.
+        """
+        if flows or name not in self.recording.lines:
+            return
+        if name in self.recording.chosen:
+            raise CouplingError(
+                f"{self.name}.{name} is said to run on lines (interpolation 'linear'), and {target} is discrete: it "
+                f"keeps its value from row to row. Set interpolation to 'hold' for {name!r}, or leave it out."
+            )
+        self._take(self.recording.kept(name))
+        self.variables[name].variability = "discrete"
+
+    def course_of(self, name: str, *, sampled: bool) -> bool:
+        """Whether an input follows a column wherever the component stands.
+
+        Args:
+            name: of the column. sampled: whether the input is read at the end of a step alone: of a table also a held
+                column is known there.
+        """
+        return name in self.line_outputs or (sampled and name in self.held_outputs and not self.recording.of_run)
+
+    def course(self, names: Sequence[str]) -> Course:
+        """How columns run within a step.
+
+        Args:
+            names: of the columns.
+        """
+        places = np.array([[s.name for s in self.recording.signals].index(name) for name in names], dtype=np.intp)
+        return Course(self.recording, places)
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
         """As for `Described`; a column that was left out is refused with the reason.
@@ -177,12 +251,12 @@ def describe(recording: Recording) -> ModelDescription:
             valueReference=i,
             type="Int32" if is_whole else "Float64",
             causality="output",
-            variability="discrete" if is_whole else signal.variability,
+            variability="discrete" if is_whole or held else signal.variability,
             description=signal.description,
             unit=None if signal.unit == "1" else signal.unit,
             displayUnit=signal.display_unit,
         )
-        for i, (signal, is_whole) in enumerate(zip(recording.signals, whole, strict=True), start=1)
+        for i, (signal, is_whole, held) in enumerate(zip(recording.signals, whole, recording.held, strict=True), 1)
     ]
     abilities = CoSimulation(
         modelIdentifier=KIND,
@@ -206,7 +280,7 @@ def load_recording(
     path: Path,
     name: str,
     component: str | None,
-    interpolation: Interpolation,
+    interpolation: Chosen,
     span: tuple[float, float] | None,
     where: str,
     can_be_missing: Sequence[str] = (),
@@ -215,8 +289,8 @@ def load_recording(
 
     Args:
         path: of it. name: of the component that plays it back. component: whose columns to take, see `make_recording`.
-        interpolation: between the rows. span: start and stop of the run [s], or None. where: place for messages.
-        can_be_missing: columns in which NaN stands for a missing value.
+        interpolation: whether columns are held or run on lines. span: start and stop of the run [s], or None.
+        where: place for messages. can_be_missing: columns in which NaN stands for a missing value.
 
     Raises:
         ScenarioError: it cannot be read, or cannot be played back.

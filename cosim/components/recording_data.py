@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from cosim.results.result import Result, SignalInfo
 from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 
 Interpolation = Literal["linear", "hold"]
+Chosen = Interpolation | Mapping[str, Interpolation] | None
+"""What was said of the columns: of all, of some by name, or nothing."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,12 @@ class Recording:
         held: mask of the columns that keep their value until the next row, shape (n,); the others run on lines.
         events: times at which something may have jumped [s], increasing.
         left_out: columns that cannot be played back, by name, and why.
-        held_over_steps: signals of which the others took the value at the start of a step in the run that was recorded.
+        held_over_steps: columns of which the others take the value at the start of a step: held ones of a table, and of
+            a run of this package those that were held in it.
+        of_run: whether it is a run of this package.
+        chosen: names of the columns of which it was said whether they are held.
+        lines: columns that the others follow on lines within their steps: those of a table that are not held, and of a
+            run those that were lines in it. All others give the value of the end of a step, as they did in the run.
     """
 
     source: str
@@ -43,6 +50,9 @@ class Recording:
     events: np.ndarray
     left_out: Mapping[str, str] = field(default_factory=dict)
     held_over_steps: frozenset[str] = frozenset()
+    lines: frozenset[str] = frozenset()
+    chosen: frozenset[str] = frozenset()
+    of_run: bool = False
 
     @cached_property
     def digest(self) -> str:
@@ -72,13 +82,34 @@ class Recording:
         share = (t - self.time[row]) / (self.time[row + 1] - self.time[row])
         return np.asarray(np.where(self.held, here, here + share * (following - here)))
 
+    def mean(self, t: float, until: float) -> np.ndarray:
+        """Means of the lines from `t` to `until` [s], shape (n,): exact, whatever rows lie between.
+
+        Args:
+            t: within the recording, of several rows there the last one counts. until: later, there the first one.
+        """
+        inside = slice(*np.searchsorted(self.time, [t + TIME_TOLERANCE, until - TIME_TOLERANCE]))
+        instants = np.concatenate([[t], self.time[inside], [until]])
+        rows = np.vstack([self.at(t), self.values[inside], self.at(until, before=True)])
+        return np.asarray(np.diff(instants) @ (0.5 * (rows[1:] + rows[:-1])) / (until - t))
+
+    def kept(self, name: str) -> Recording:
+        """This recording with one more column held.
+
+        Args:
+            name: of the column.
+        """
+        names = [signal.name for signal in self.signals]
+        held = self.held | (np.array(names) == name)
+        return replace(self, held=held, held_over_steps=self.held_over_steps | {name}, lines=self.lines - {name})
+
 
 def make_recording(
     result: Result,
     source: str,
     component: str | None,
     name: str,
-    interpolation: Interpolation,
+    interpolation: Chosen,
     span: tuple[float, float] | None,
     can_be_missing: Collection[str] = (),
 ) -> Recording:
@@ -89,7 +120,8 @@ def make_recording(
         component: whose columns are taken. None: those of `name` where it was recorded, else all under their full
             names.
         name: of the component that plays it back.
-        interpolation: between the rows; what was recorded as discrete is always held.
+        interpolation: whether columns are held or run on lines: said of all, or of some by name. Of the others a run
+            of this package says what they were in it; what was recorded as discrete is held.
         span: start and stop of the run [s], which the recording must cover; None where nobody steps it.
         can_be_missing: columns in which NaN stands for a missing value, beside those recorded as such. Between two rows
             of which one is missing a line is missing too.
@@ -99,6 +131,7 @@ def make_recording(
         run.
     """
     chosen = _chosen(result, source, component, name)
+    said = _said(interpolation, [signal.name for signal in chosen.values()], source)
     time = np.array(result.time, dtype=float)
     _check_time(time, source, span)
     rows = _rows(time, span)
@@ -109,7 +142,7 @@ def make_recording(
         if signal.name in can_be_missing or signal.can_be_missing:
             known, values = replace(signal, can_be_missing=True), np.where(np.isfinite(values), values, np.nan)
         else:
-            values, fault = _without_gaps(values, time[rows], interpolation)
+            values, fault = _without_gaps(values, time[rows], said.get(signal.name, "linear"))
         if fault:
             left_out[signal.name] = fault
         else:
@@ -119,18 +152,50 @@ def make_recording(
         raise ScenarioError(
             f"{source}: no column can be played back; " + "; ".join(f"{n}: {w}" for n, w in left_out.items())
         )
-    held = np.array([interpolation == "hold" or s.variability == "discrete" for s in signals])
+    held = np.array([said.get(s.name) == "hold" or s.variability == "discrete" for s in signals])
     values = np.column_stack(columns)
     events = _events(time[rows], values, np.array([e.delivered_at for e in result.events]))
-    kept = _held_over_steps(result)
-    kept = frozenset(signal.name for column, signal in chosen.items() if column in kept)
-    return Recording(source, time[rows], tuple(signals), values, held, events, left_out, kept)
+    told = {signal.name: kind for column, signal in chosen.items() if (kind := _recorded(result).get(column))}
+    of_run = _is_run(result)
+    kinds = dict(zip((s.name for s in signals), np.where(held, "held", "line").tolist(), strict=True))
+    kinds = {n: kinds[n] if n in said or not of_run else told.get(n, "fresh") for n in kinds}
+    kept, lines = (frozenset(n for n, kind in kinds.items() if kind == one) for one in ("held", "line"))
+    return Recording(
+        source, time[rows], tuple(signals), values, held, events, left_out, kept, lines, frozenset(said), of_run
+    )
 
 
-def _held_over_steps(result: Result) -> frozenset[str]:
-    """Columns of which the run says that they were held; a measured table says nothing."""
-    algorithm = result.summary.get("master", {}).get("algorithm", {}) if isinstance(result.summary, Mapping) else {}
-    return frozenset(str(link).partition(" -> ")[0] for link in algorithm.get("held", ()))
+def _said(interpolation: Chosen, names: Sequence[str], source: str) -> dict[str, Interpolation]:
+    """What was said of each column, by name.
+
+    Raises:
+        ScenarioError: there is no such column.
+    """
+    if not isinstance(interpolation, Mapping):
+        return {} if interpolation is None else dict.fromkeys(names, interpolation)
+    for name in interpolation:
+        if name not in names:
+            raise ScenarioError(f"{source}: interpolation: there is no column {name!r}; {nearest(name, names)}")
+    return dict(interpolation)
+
+
+def _algorithm(result: Result) -> Mapping[str, Any]:
+    """What the run says of its algorithm; a measured table says nothing."""
+    summary = result.summary if isinstance(result.summary, Mapping) else {}
+    found: Mapping[str, Any] = summary.get("master", {}).get("algorithm", {})
+    return found
+
+
+def _is_run(result: Result) -> bool:
+    """Whether it is a run of this package, which knows at which end of a step its signals were taken."""
+    return "fresh" in _algorithm(result)
+
+
+def _recorded(result: Result) -> dict[str, str]:
+    """Columns of which the run says that they were held, or lines."""
+    algorithm = _algorithm(result)
+    held = {str(link).partition(" -> ")[0]: "held" for link in algorithm.get("held", ())}
+    return held | {str(name): str(kind) for name, kind in algorithm.get("played", {}).items()}
 
 
 def _chosen(result: Result, source: str, component: str | None, name: str) -> dict[str, SignalInfo]:

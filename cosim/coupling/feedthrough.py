@@ -46,6 +46,18 @@ def declared_feedthrough(component: Component) -> dict[str, list[str]]:
     return table
 
 
+def acting_on_derivatives(component: Component) -> set[str] | None:
+    """Inputs that act on derivatives of states, so over a whole step; None where the description does not say.
+
+    Args:
+        component: an instantiated component.
+    """
+    known = component.description.derivatives
+    if not known or any(unknown.dependencies is None for unknown in known):
+        return None
+    return {v.name for unknown in known for v in unknown.dependencies if v.causality == "input"}
+
+
 def undeclared_outputs(component: Component) -> list[str]:
     """Outputs and locals of which the description does not say what they depend on; by the standard that may be every
     input.

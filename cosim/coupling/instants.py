@@ -2,14 +2,17 @@
 
 A signal means the same instant in all its targets. It is *fresh* where its source is stepped before all of them: each
 takes the value at the end of the step. Else it is *held*: each takes the value at the start of the step, also those
-stepped after the source.
+stepped after the source. A column of a table is held, or a *line*: each takes its course within the step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from fmpy.model_description import ModelVariable
+
 from cosim.components.component import Component
+from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Connection
 from fmus.fmi.types import FLOATING_TYPES
 
@@ -26,7 +29,7 @@ def held_signals(
     """The signals that are held; all others are fresh.
 
     Besides those with a target that is stepped no later than the source these are: what a target takes at events only,
-    and what was held in the run that a recording plays back.
+    what was held in the run that a recording plays back, and held columns of tables.
 
     Args:
         components: by name. connections: checked. order: of execution.
@@ -38,6 +41,8 @@ def held_signals(
 
     def holds(c: Connection) -> bool:
         source, target = c.source[0], c.target[0]
+        if source in components and c.source[1] in components[source].line_outputs:
+            return False
         if source not in place:
             return True  # it is not stepped: its values change between steps only
         together = source in loop_of and loop_of[source] == loop_of.get(target)
@@ -50,10 +55,48 @@ def held_signals(
     return frozenset(c.source_variable for c in connections if holds(c))
 
 
+def settle_recordings(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
+    """Columns of tables of which nobody said whether they are held: they are where a target of theirs is discrete.
+
+    Args:
+        components: by name. connections: checked.
+
+    Raises:
+        CouplingError: a column that is said to run on lines has a discrete target.
+    """
+    for c in connections:
+        source = components.get(c.source[0])
+        if isinstance(source, RecordingComponent):
+            target = components[c.target[0]].variables[c.target[1]]
+            flows = is_continuous(target) and not c.table
+            source.connected(c.source[1], flows=flows, target=".".join(c.target))
+
+
+def followed(components: Mapping[str, Component], connections: Sequence[Connection]) -> frozenset[Signal]:
+    """The signals whose targets follow lines that are known ahead, whatever the algorithm.
+
+    Args:
+        components: by name. connections: checked.
+    """
+    return frozenset(
+        c.source_variable
+        for c in connections
+        if c.source[0] in components and c.source[1] in components[c.source[0]].line_outputs
+    )
+
+
+def is_continuous(variable: ModelVariable) -> bool:
+    """Whether a variable changes all the time.
+
+    Args:
+        variable: of a description.
+    """
+    return variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
+
+
 def _waits_for_events(source: Component, target: Component, connection: Connection) -> bool:
     """Whether the target is told at the end of the step, by an event, of what the source changes within the step."""
     if not target.capabilities.hasEventMode or source.capabilities.hasEventMode:
         return False
     variable = target.variables[connection.target[1]]
-    flows = variable.type in FLOATING_TYPES and variable.variability in (None, "continuous") and not variable.clocks
-    return not flows
+    return not is_continuous(variable) or bool(variable.clocks)

@@ -33,6 +33,9 @@ class InputInterpolator(Protocol):
     def send(self, t: float, until: float) -> None:
         """Tell of the line for a step from `t` to `until` [s]."""
 
+    def arrive(self, until: float) -> None:
+        """The component stands at `until` [s], the end of a step."""
+
     def forget(self, jumped: np.ndarray) -> None:
         """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
 
@@ -146,17 +149,21 @@ class PlannedComponent:
     def _advance(self, t: float, until: float) -> None:
         """In so many steps as the component wants."""
         if self.substeps == 1:
-            self.send(t, until)
-            self.component.advance(t, until)
+            self._go(t, until)
             return
         begin = t
         for i in range(1, self.substeps + 1):
             end = until if i == self.substeps else t + (until - t) * i / self.substeps
-            self.send(begin, end)
-            self.component.advance(begin, end)
+            self._go(begin, end)
             if self.component.terminated:
                 return
             begin = end
+
+    def _go(self, t: float, until: float) -> None:
+        self.send(t, until)
+        self.component.advance(t, until)
+        if self.interpolator is not None and not self.component.terminated:
+            self.interpolator.arrive(until)
 
     def _drive(self, t: float, until: float) -> None:
         self._advance(t, until)

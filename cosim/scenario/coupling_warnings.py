@@ -10,7 +10,7 @@ from cosim.coupling.graph import undeclared
 from cosim.scenario.models import make_system, values_in_use
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
-from cosim.scenario.tables import BalisesTable
+from cosim.scenario.tables import BalisesTable, ComponentTable
 
 ROUNDING = 1e-9  # of a period over a step
 CARRIED = {
@@ -90,6 +90,24 @@ def interpolation_note(interpolators: Mapping[str, str], inputs: str) -> str:
         by_interpolator.setdefault(interpolator, []).append(name)
     said = "; ".join(f"{CARRIED[interpolator]}: {', '.join(names)}" for interpolator, names in by_interpolator.items())
     return f"Inputs between communication points ({inputs}): {said or 'none are connected'}."
+
+
+def recording_notes(components: Mapping[str, Component], tables: Mapping[str, ComponentTable]) -> list[str]:
+    """Which columns of tables are held and which are lines, where the scenario leaves that to the targets.
+
+    Args:
+        components: by name. tables: of them.
+    """
+    notes = []
+    for name, component in components.items():
+        if tables[name].interpolation is not None:
+            continue
+        held, lines = sorted(component.held_outputs), sorted(component.line_outputs)
+        said = [f"held from row to row: {', '.join(held)}"] if held else []
+        said += [f"on lines between rows: {', '.join(lines)}"] if lines else []
+        if lines:
+            notes.append(f"{name}: {'; '.join(said)}. Where that is wrong say so by 'interpolation'.")
+    return notes
 
 
 def late_telegram_warnings(

@@ -19,6 +19,7 @@ from cosim.components.start_values import StartValue
 from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.coupling.clocks import ClockConnection, connect_clocks
 from cosim.coupling.connection import Connection, Link, connect
+from cosim.coupling.instants import followed, settle_recordings
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
@@ -43,7 +44,12 @@ from cosim.scenario.balise_summary import all_telegrams, balise_summary
 from cosim.scenario.certificates import check_certificates
 from cosim.scenario.conditions import check_conditions
 from cosim.scenario.connections import parse_connections
-from cosim.scenario.coupling_warnings import coupling_warnings, interpolation_note, late_telegram_warnings
+from cosim.scenario.coupling_warnings import (
+    coupling_warnings,
+    interpolation_note,
+    late_telegram_warnings,
+    recording_notes,
+)
 from cosim.scenario.gaps import Sources
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
@@ -181,8 +187,9 @@ class _Setup:
             self._warn(doubt)
         self.notes += notes
         self.notes += self.algorithm.notes
+        self.interpolators = attach_interpolators(self.plan, table.master.inputs)
+        self.notes += recording_notes(self.components, table.components)
         if table.master.inputs != "hold":
-            self.interpolators = attach_interpolators(self.plan, table.master.inputs)
             self.notes.append(interpolation_note(self.interpolators, table.master.inputs))
         if layout is not None:
             self._add_balises(layout, plant, receivers, starts[plant])
@@ -301,8 +308,10 @@ class _Setup:
         self.network = make_network(self.table, self.components, self.folder, self.where)
         if self.network is None:
             connections = connect(pairs, self.components)
+            settle_recordings(self.components, connections)
             return connections, connections
         found = connect_over(self.network, self.table, pairs, self.components, self.where)
+        settle_recordings(self.components, found[1])
         for warning in network_warnings(self.network, self.table, self.components, self.where):
             self._warn(warning)
         return found
@@ -323,8 +332,11 @@ class _Setup:
 
     def _instantiate(self, starts: dict[str, dict[str, StartValue]], connections: list[Connection]) -> None:
         for name, component in self.components.items():
-            if isinstance(component, FMI3Component) and self.table.master.inputs != "hold":
-                component.request_intermediate_updates([c.target[1] for c in connections if c.target[0] == name])
+            if isinstance(component, FMI3Component):
+                moving = followed(self.components, connections)
+                every = self.table.master.inputs != "hold"
+                own = [c for c in connections if c.target[0] == name and (every or c.source_variable in moving)]
+                component.request_intermediate_updates([c.target[1] for c in own])
             component.choose_log(self.table.components[name].log)
             if self.call_log is not None:
                 log_calls(component, self.call_log)

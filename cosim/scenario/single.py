@@ -57,7 +57,6 @@ def single_tables(
         source = Path(inputs).resolve()
         tables["connections"], doubts = _matches(source, component, where)
         tables["components"] = {SOURCE: {"recording": str(source)}, **tables["components"]}
-        tables["master"] = {"inputs": "interpolate"}  # else the FMU would be told at each step what comes at its end
     if values:
         table["parameters"] = values
     if record:

@@ -13,6 +13,7 @@ from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
 from cosim.coupling.graph import Group, undeclared
+from cosim.coupling.instants import settle_recordings
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.network.outputs import NAME as NETWORK
@@ -55,6 +56,7 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
     routed = connections = connect(pairs, components) if network is None else []
     if network is not None:
         connections, routed = connect_over(network, table, pairs, components, where)
+    settle_recordings(components, routed)
     stepped = [c for c in routed if c.source[0] != NETWORK]
     balises = _balises(table, components, where)
     plant, receivers = ("", ()) if balises is None else (balises.plant, balises.receivers)

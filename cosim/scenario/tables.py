@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
+from cosim.components.recording_data import Interpolation
 from cosim.errors import nearest
 from cosim.fmu_filter.settings import FilterTable
 from cosim.results.formats.catalogue import FORMATS
@@ -74,7 +75,7 @@ class ComponentTable(Table):
     observer: Model | None = None
     recording: str | None = None
     component: str | None = None
-    interpolation: Literal["linear", "hold"] = "linear"
+    interpolation: Interpolation | dict[str, Interpolation] | None = None
     backend: Backend | None = Field(default=None, alias="as")
     preset: str | None = None
     options: dict[str, Option] = {}

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from cosim.coupling.instants import held_signals
+from cosim.coupling.instants import followed, held_signals
 from cosim.coupling.plan import Plan
 from cosim.master.algorithms.choose import AlgorithmChoice
 
@@ -48,7 +48,9 @@ class Algorithm(ABC):
 
     def fresh(self) -> list[str]:
         """Connections whose value is that of the end of a step without any iteration, as ``a.y -> b.u``."""
-        others = [c for c in self.plan.connections if c.source_variable not in self.plan.held]
+        components = {step.component.name: step.component for step in self.plan.steps}
+        lines = followed(components, self.plan.connections)
+        others = [c for c in self.plan.connections if c.source_variable not in self.plan.held | lines]
         loop = self._loop_of
         return [str(c) for c in others if c.source[0] not in loop or loop[c.source[0]] != loop.get(c.target[0])]
 
@@ -70,7 +72,14 @@ class Algorithm(ABC):
         """What to tell of it after the run, plain data: the name, why, groups, held and fresh connections,
         iterations.
         """
-        return {"name": self.name, **self.choice.summary(), "held": self.held(), "fresh": self.fresh()}
+        found = {"name": self.name, **self.choice.summary(), "held": self.held(), "fresh": self.fresh()}
+        played = {
+            f"{step.component.name}.{name}": kind
+            for step in self.plan.steps
+            for kind, names in (("held", step.component.held_outputs), ("line", step.component.line_outputs))
+            for name in sorted(names)
+        }
+        return found | ({"played": played} if played else {})
 
     def close(self) -> None:
         """Free what it holds (saved states, threads)."""

@@ -1,4 +1,4 @@
-"""Jacobi: all components at once, every signal held. Threads, if wanted."""
+"""Jacobi: all components at once, every signal held but known lines. Threads, if wanted."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
+from cosim.coupling.instants import followed
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
 from cosim.master.algorithms.algorithm import Algorithm
@@ -28,7 +29,9 @@ class Jacobi(Algorithm):
 
     def __init__(self, plan: Plan, threads: int = 1) -> None:
         super().__init__(plan)
-        plan.hold(frozenset(c.source_variable for c in plan.connections))
+        components = {step.component.name: step.component for step in plan.steps}
+        every = frozenset(c.source_variable for c in plan.connections)
+        plan.hold(every - followed(components, plan.connections))
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads, "jacobi") if threads > 1 else None
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -36,6 +36,34 @@ class History:
         return History(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
 
 
+class Course(Protocol):
+    """Signals whose values are known ahead."""
+
+    def at(self, t: float, *, before: bool) -> np.ndarray:
+        """Values at `t` [s], shape (k,); where they jump those `before` or after it."""
+
+    def mean(self, t: float, until: float) -> np.ndarray:
+        """Means from `t` to `until` [s], shape (k,)."""
+
+
+@dataclass(frozen=True)
+class KnownInputs:
+    """Inputs ``factor * signal + offset`` of signals whose values are known ahead.
+
+    Args:
+        places: of the inputs, shape (k,). course: of the signals. factors, offsets: shape (k,).
+    """
+
+    places: np.ndarray
+    course: Course
+    factors: np.ndarray
+    offsets: np.ndarray
+
+    def converted(self, values: np.ndarray) -> np.ndarray:
+        """Values of the inputs where the signals have these, shape (k,)."""
+        return np.asarray(self.factors * values + self.offsets)
+
+
 class FirstOrderHold:
     """The course of the inputs of one component, ``u(s) = later + slope * (s - later_at)``.
 
@@ -44,10 +72,17 @@ class FirstOrderHold:
             continues the last line there.
         sources: the component that gives each input, shape (m,).
         continuous: inputs that may follow a line, shape (m,); the others are held.
+        known: of some of them the course is known ahead: which, and how it runs.
     """
 
-    def __init__(self, method: Method, sources: Sequence[Component], continuous: np.ndarray) -> None:
-        self.method, self.continuous = method, continuous
+    def __init__(
+        self,
+        method: Method,
+        sources: Sequence[Component],
+        continuous: np.ndarray,
+        known: Sequence[KnownInputs] = (),
+    ) -> None:
+        self.method, self.continuous, self._known = method, continuous, known
         self._distinct = list({id(c): c for c in sources}.values())
         self._source_of = np.array([[id(d) for d in self._distinct].index(id(c)) for c in sources], dtype=np.intp)
         count = len(continuous)
@@ -88,10 +123,31 @@ class FirstOrderHold:
         span = np.where(usable, history.later_at - history.earlier_at, 1.0)
         self.slope = np.where(usable, (history.later - history.earlier) / span, 0.0)
 
-    def at(self, time: float) -> np.ndarray:
-        """Values of the inputs at a time [s], shape (m,)."""
+    def at(self, time: float, *, begins: bool = False) -> np.ndarray:
+        """Values of the inputs at a time [s], shape (m,).
+
+        Args:
+            begins: of values that jump there those after the jump, not those before it.
+        """
         values: np.ndarray = self._history.later + self.slope * (time - self._history.later_at)
+        for known in self._known:
+            values[known.places] = known.converted(known.course.at(time, before=not begins))
         return values
+
+    def mean(self, t: float, until: float) -> np.ndarray:
+        """Means of the inputs from `t` to `until` [s], shape (m,)."""
+        values = self.at(0.5 * (t + until))
+        for known in self._known:
+            values[known.places] = known.converted(known.course.mean(t, until))
+        return values
+
+    def slopes(self, t: float, until: float) -> np.ndarray:
+        """Slopes of the inputs from `t` to `until` [s], shape (m,)."""
+        slopes = self.slope.copy()
+        for known in self._known:
+            ends = known.course.at(t, before=False), known.course.at(until, before=True)
+            slopes[known.places] = known.factors * (ends[1] - ends[0]) / (until - t)
+        return slopes
 
     def forget(self, which: np.ndarray) -> None:
         """Inputs whose source jumped, as a mask of shape (m,): no line leads over it.

@@ -4,7 +4,10 @@
 |---|---|---|
 | ``derivatives`` | FMI 1 or 2 with ``canInterpolateInputs`` | value at the start and slope: the line itself |
 | ``intermediate`` | FMI 3 with ``providesIntermediateUpdate`` | the line, set at each instant at which it asks |
-| ``mean`` | nothing | the mean of the line over the step, held; its value at the end for direct feedthrough |
+| ``mean`` | nothing | the mean of the line over the step, held, and its value at the end where the step ends |
+
+An input without influence on any declared derivative, a sample or direct feedthrough, has the value at the end already
+during the step.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import numpy as np
 
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
-from cosim.coupling.graph import declared_feedthrough
+from cosim.coupling.feedthrough import acting_on_derivatives, declared_feedthrough
 from cosim.coupling.inputs import Inputs
 from cosim.master.interpolation.first_order_hold import FirstOrderHold
 
@@ -50,6 +53,10 @@ class InputInterpolator(ABC):
         self._inputs.gather()
         self.hold.update(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
 
+    def arrive(self, until: float) -> None:
+        """The component stands at `until` [s]: where only a mean was told, outputs follow from the value there."""
+        return
+
     def forget(self, jumped: np.ndarray) -> None:
         """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
         self.hold.forget(jumped[self._inputs.sources])
@@ -79,12 +86,20 @@ class MeanInterpolator(InputInterpolator):
     def __init__(self, hold: FirstOrderHold, inputs: Inputs, component: Component) -> None:
         super().__init__(hold, inputs)
         direct = {name for names in declared_feedthrough(component).values() for name in names}
-        self._direct = np.array([name in direct for name in inputs.names], dtype=bool)
+        acting = acting_on_derivatives(component)
+        if acting is None:
+            acting = set(inputs.names) - direct - component.sampled_inputs
+        self._over = np.array([name in acting for name in inputs.names], dtype=bool)
+        self._passes = self._over & np.array([name in direct for name in inputs.names], dtype=bool)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        hold = self.hold
-        self._inputs.buffer[:] = np.where(self._direct, hold.at(until), hold.at(0.5 * (t + until)))
+        self._inputs.buffer[:] = np.where(self._over, self.hold.mean(t, until), self.hold.at(until))
         self._inputs.send()
+
+    def arrive(self, until: float) -> None:  # noqa: D102 - see InputInterpolator
+        if self._passes.any():
+            self._inputs.buffer[:] = self.hold.at(until)
+            self._inputs.send()
 
 
 class DerivativeInterpolator(InputInterpolator):
@@ -103,9 +118,9 @@ class DerivativeInterpolator(InputInterpolator):
         self._write_slopes, self._slopes = component.make_derivative_writer(names)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        self._inputs.buffer[:] = self.hold.at(t)
+        self._inputs.buffer[:] = self.hold.at(t, begins=True)
         self._inputs.send()
-        self._slopes[:] = self.hold.slope[self._moving]
+        self._slopes[:] = self.hold.slopes(t, until)[self._moving]
         self._write_slopes()
 
 
@@ -126,7 +141,7 @@ class IntermediateInterpolator(InputInterpolator):
         self.taken = component.follow_within_step(names, self._set)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        self._inputs.buffer[:] = self.hold.at(t)
+        self._inputs.buffer[:] = self.hold.at(t, begins=True)
         self._inputs.send()
 
     def _set(self, time: float) -> None:
