@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.components.recording_data import Chosen, column_courses, interval_ends, said_of
 from cosim.errors import CosimError, nearest
 from cosim.results.result import Result
 
@@ -27,12 +28,15 @@ class RecordedSignals:
         measured: what is fitted, by the name of the model's signal, each of shape (n,).
         inputs: what drives the model, by the name of its input, each of shape (n,).
         units: of the measured signals, by name.
+        ends: what inputs say at begin and end of each interval, by name, each of shape (2, n - 1); without an entry the
+            value at the begin is held.
     """
 
     time: Array
     measured: Mapping[str, Array]
     inputs: Mapping[str, Array]
     units: Mapping[str, str]
+    ends: Mapping[str, Array] = field(default_factory=dict)
 
 
 def sort_columns(
@@ -43,6 +47,8 @@ def sort_columns(
     signals: Sequence[str] | None,
     begin: float = -np.inf,
     end: float = np.inf,
+    between: Chosen = None,
+    discrete: Collection[str] = (),
 ) -> RecordedSignals:
     """Find what drives the model and what it is held against.
 
@@ -53,6 +59,8 @@ def sort_columns(
         recording: the table. source: its name, for messages.
         outputs: signals that the model has. inputs: inputs that it takes.
         signals: those to fit; None for all outputs that were recorded. begin, end: part of the recording to use [s].
+        between: whether inputs are held or run on lines between samples, said of all or of some by name. Of the others
+            a run of this package says it, else `discrete` does: inputs that are no continuous ones.
 
     Returns:
         The columns.
@@ -84,13 +92,26 @@ def sort_columns(
     part = (time >= begin) & (time <= end)
     if np.count_nonzero(part) < 2:
         raise CalibrationError(f"{source}: fewer than two samples in the part to use; there are {len(time)} in all.")
-    rows = rows[part]
+    last = np.append(rows[1:], len(recording.time)) - 1
+    rows, last = rows[part], last[part]
     driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
+    said = said_of(between, list(driving), source)
+    courses = column_courses(
+        recording,
+        driving.values(),
+        {driving[name]: kind for name, kind in said.items()},
+        [column for name, column in driving.items() if name in discrete],
+    )
+    ends = {
+        name: interval_ends(np.asarray(recording[column], dtype=float), rows, last, course)
+        for (name, column), course in zip(driving.items(), courses, strict=True)
+    }
     return RecordedSignals(
         time[part],
         {name: np.asarray(recording[column], dtype=float)[rows] for name, column in chosen.items()},
         {name: np.asarray(recording[column], dtype=float)[rows] for name, column in driving.items()},
         {name: units[column] for name, column in chosen.items()},
+        ends,
     )
 
 

@@ -5,31 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
+from cosim.coupling.instants import is_continuous
 from cosim.errors import CosimError, nearest
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.results.result import Result
 from cosim.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
-Held = Literal["hold", "linear"]
 
 
 class Runs(Protocol):
     """What can be run with other parameters.
 
     Attributes:
-        outputs: signals that it has. inputs: inputs that a recording may drive. start: first guesses by name.
+        outputs: signals that it has. inputs: inputs that a recording may drive. discrete: those that are no continuous
+            ones. start: first guesses by name.
         bounds: lowest and highest value by name.
     """
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
+    discrete: tuple[str, ...]
     start: dict[str, float]
     bounds: dict[str, tuple[float, float]]
 
@@ -62,7 +64,6 @@ class FmuRuns:
         fixed: other start values by name. guesses: first guesses by name, where the FMU's own are not wanted.
         interface: ``co-simulation`` or ``model-exchange``; None for co-simulation where the FMU has it.
         step: longest communication step [s]; None for the sampling of the recording.
-        between: what inputs do between samples: ``hold``, or ``linear``, as their mean over each step.
 
     Raises:
         CalibrationError: a parameter does not exist or cannot be set. FmuLoadError: the FMU cannot be opened.
@@ -77,13 +78,13 @@ class FmuRuns:
         guesses: Mapping[str, float] | None = None,
         interface: Interface | None = None,
         step: float | None = None,
-        between: Held = "hold",
     ) -> None:
-        self.path, self._step, self._between, self._fixed = str(path), step, between, dict(fixed or {})
+        self.path, self._step, self._fixed = str(path), step, dict(fixed or {})
         everything = dict.fromkeys(names, 0.0) | dict(guesses or {}) | self._fixed
         self._model = open_model(path, interface, states=(), parameters=everything)
         variables = self._model.instance.variables
         self.outputs, self.inputs = self._model.outputs, self._model.inputs
+        self.discrete = tuple(name for name in self.inputs if not is_continuous(variables[name]))
         self.start, self.bounds = {}, {}
         for name in names:
             variable = variables[name]
@@ -113,17 +114,21 @@ class FmuRuns:
         u = np.tile(model.start_inputs, (len(time), 1))
         for name, series in recorded.inputs.items():
             u[:, model.inputs.index(name)] = series
-        held = u if self._between == "hold" else np.vstack([0.5 * (u[1:] + u[:-1]), u[-1:]])
+        first, last = u[:-1].copy(), u[:-1].copy()
+        for name, (begins, ends) in recorded.ends.items():
+            place = model.inputs.index(name)
+            first[:, place], last[:, place] = begins, ends
         model.set_parameters(values)
         found = np.empty((len(time), len(places)))
         model.restart(float(time[0]), np.zeros(0), u[0])
         found[0] = model.read()[1][places]
         for k in range(len(time) - 1):
-            model.set_inputs(held[k])
             begin, span = float(time[k]), float(time[k + 1] - time[k])
             parts = 1 if self._step is None else max(1, ceil(span / self._step - 1e-9))
             for i in range(parts):
+                model.set_inputs(first[k] + (last[k] - first[k]) * ((i + 0.5) / parts))
                 model.advance(begin + span * i / parts, span / parts)
+            model.set_inputs(last[k])
             found[k + 1] = model.read()[1][places]
         return found.T
 
@@ -144,6 +149,7 @@ class ScenarioRuns:
     """
 
     inputs: tuple[str, ...] = ()
+    discrete: tuple[str, ...] = ()
 
     def __init__(self, scenario: Scenario, names: Sequence[str], guesses: Mapping[str, float] | None = None) -> None:
         self.scenario = scenario

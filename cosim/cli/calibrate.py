@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from cosim.calibration.fitting import Calibration, calibrate
 from cosim.calibration.recorded_signals import CalibrationError, sort_columns
 from cosim.calibration.runs import FmuRuns, Runs, ScenarioRuns
 from cosim.cli.scenarios import parse_setting
+from cosim.components.recording_data import Chosen, Interpolation
 from cosim.errors import OutputError, ScenarioError
 from cosim.results.load import load_result
 from cosim.results.summary_file import jsonable
@@ -56,9 +58,10 @@ def register(commands: Any) -> None:
     )
     parser.add_argument(
         "--between",
-        choices=("hold", "linear"),
-        default="hold",
-        help="what recorded inputs do between samples (default: hold)",
+        nargs="+",
+        default=[],
+        metavar="[NAME=]hold|linear",
+        help="what recorded inputs do between samples (default: as in the run; of a table linear, held if discrete)",
     )
     parser.add_argument("--interface", choices=("co-simulation", "model-exchange"), help="of an FMU that has both")
     parser.add_argument("--level", type=float, default=0.95, help="of the intervals (default: 0.95)")
@@ -81,7 +84,15 @@ def execute(options: argparse.Namespace) -> int:
     runs = _runs(options)
     try:
         recorded = sort_columns(
-            recording, options.recording, runs.outputs, runs.inputs, options.signals, options.begin, options.end
+            recording,
+            options.recording,
+            runs.outputs,
+            runs.inputs,
+            options.signals,
+            options.begin,
+            options.end,
+            between_samples(options.between),
+            runs.discrete,
         )
         noise = {name: _number("--noise", name, value) for name, value in map(parse_setting, options.noise)}
         found = calibrate(runs, recorded, noise=noise, level=options.level)
@@ -121,12 +132,31 @@ def _runs(options: argparse.Namespace) -> Runs:
             guesses=guesses,
             interface=options.interface,
             step=options.step,
-            between=options.between,
         )
     scenario = Scenario.load(options.model)
     for name, value in settings.items():
         scenario.set(name, value)
     return ScenarioRuns(scenario, names, guesses)
+
+
+def between_samples(texts: Sequence[str]) -> Chosen:
+    """What ``--between`` says: of all inputs, or of some.
+
+    Args:
+        texts: ``hold``, ``linear``, or ``name=hold``.
+
+    Raises:
+        ScenarioError: a text is none of these.
+    """
+    said: dict[str, Interpolation] = {}
+    for text in texts:
+        name, sign, kind = text.rpartition("=")
+        if kind not in ("hold", "linear") or (not sign and len(texts) > 1):
+            raise ScenarioError(f"--between {text}: expected hold or linear for all inputs, or NAME=hold for each.")
+        if not sign:
+            return kind  # type: ignore[return-value] # one of the two
+        said[name] = kind  # type: ignore[assignment] # one of the two
+    return said or None
 
 
 def _number(option: str, name: str, value: Any) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cosim.cli.scenarios import parse_setting
+from cosim.components.recording_data import column_courses, interval_ends
 from cosim.errors import CosimError, OutputError, ScenarioError, nearest
 from cosim.evaluation.numbers import number
 from cosim.results.load import load_result
@@ -47,6 +48,11 @@ def register(commands: Any) -> None:
     davis.add_argument("source", metavar="SOURCE", help="results folder, table of any tool, or an FMU, which is driven")
     davis.add_argument("--speed", metavar="NAME", help="signal of the speed (default: the only one in m/s)")
     davis.add_argument("--effort", metavar="N_OR_NAME", help="constant effort [N], or the signal of a recorded one")
+    davis.add_argument(
+        "--between",
+        choices=("hold", "linear"),
+        help="what a recorded effort does between samples (default: as in the run; of a table linear)",
+    )
     davis.add_argument("--mass", type=float, metavar="KG", help="mass with rotating parts; 1 for efforts by mass")
     davis.add_argument("--from", type=float, dest="begin", metavar="SECONDS", help="begin of the part to use [s]")
     davis.add_argument("--to", type=float, dest="end", metavar="SECONDS", help="end of the part to use [s]")
@@ -95,7 +101,7 @@ def execute(options: argparse.Namespace) -> int:
 def _identified(options: argparse.Namespace) -> DavisEstimate:
     driven = str(options.source).lower().endswith(".fmu")
     result = _driven(options) if driven else _loaded(options)
-    effort, series = _effort(options, result, driven)
+    effort, column = _effort(options, result, driven)
     instants, rows = np.unique(result.time, return_index=True)  # an event has two rows
     chosen = (instants >= (options.begin if options.begin is not None else -np.inf)) & (
         instants <= (options.end if options.end is not None else np.inf)
@@ -106,11 +112,12 @@ def _identified(options: argparse.Namespace) -> DavisEstimate:
         raise IdentificationError(
             f"no sample between --from and --to; there are some from {instants[0]:g} to {instants[-1]:g} s."
         )
+    last = (np.append(rows[1:], len(result.time)) - 1)[chosen]
     rows = rows[chosen]
     return identify_davis(
         instants[chosen],
         np.asarray(result[_signal(result, options.speed, "speed", "--speed")])[rows],
-        effort=effort if series is None else series[rows],
+        effort=effort if column is None else _course(options, result, column, rows, last),
         mass=options.mass,
         minimum_speed=options.minimum_speed,
         level=options.level,
@@ -153,14 +160,20 @@ def _number(text: str | None) -> float | None:
     return value if value is not None and isfinite(value) else None
 
 
-def _effort(options: argparse.Namespace, result: Result, driven: bool) -> tuple[float | None, Any]:
-    """The effort as a number, or as a recorded series; an FMU without a mass is left with the effort unknown."""
+def _course(options: argparse.Namespace, result: Result, column: str, rows: Any, last: Any) -> Any:
+    """A recorded effort at begin and end of each interval between samples [N], shape (2, n - 1)."""
+    said = {} if options.between is None else {column: options.between}
+    return interval_ends(np.asarray(result[column], float), rows, last, column_courses(result, [column], said)[0])
+
+
+def _effort(options: argparse.Namespace, result: Result, driven: bool) -> tuple[float | None, str | None]:
+    """The effort as a number, or the column of a recorded one; an FMU without a mass is left with it unknown."""
     if options.effort is None:
         return None, None
     constant = _number(options.effort)
     if constant is not None:
         return (None if driven and options.mass is None else constant), None
-    return None, np.asarray(result[_signal(result, options.effort, "effort", "--effort")])
+    return None, _signal(result, options.effort, "effort", "--effort")
 
 
 def _signal(result: Result, asked: str | None, what: str, option: str) -> str:

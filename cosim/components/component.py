@@ -74,8 +74,6 @@ class Component(Described, Slave):
         self.messages = MessageLog(name)
         # that others take at the start of a step, as where they were recorded
         self.held_outputs: frozenset[str] = frozenset()
-        # inputs that a step reads at its end alone, as samples
-        self.sampled_inputs: frozenset[str] = frozenset()
         # that others follow on lines within a step, known ahead by `course`
         self.line_outputs: frozenset[str] = frozenset()
         # says where it stands [s] while somebody else than Python steps it

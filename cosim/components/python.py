@@ -255,7 +255,6 @@ class PythonComponent(FMI3Component):
     def __init__(self, name: str, model: PythonModel, source: str) -> None:
         slave, self._model = PythonSlave(model), model
         super().__init__(name, slave, slave.model_description, source=source, kind="block")
-        self.sampled_inputs = frozenset(n for i in model.sampled for n in _scalars(model.inputs, i))
 
     def configure(self, starts: Mapping[str, StartValue]) -> None:
         """Nothing: shapes are declared.

@@ -66,7 +66,6 @@ class PythonModel:
         self.telegram = self._telegram()
         self._check_step()
         self.direct = self._direct()
-        self.sampled = self._sampled()
         names = Counter(s.name for s in (*self.inputs, *self.outputs, *self.parameter_signals))
         doubled = [name for name, count in names.items() if count > 1]
         if doubled:
@@ -143,13 +142,6 @@ class PythonModel:
             if output not in outputs or isinstance(sources, str) or not set(sources) <= set(inputs):
                 raise self._refused(f"direct = {declared!r} cannot be; write direct = {{'output': ['input']}}")
         return {output: list(sources) for output, sources in declared.items()}
-
-    def _sampled(self) -> frozenset[str]:
-        """Which inputs ``step`` reads as samples at its end, ``sampled = ["odometer"]``; the others act over the step."""
-        declared, known = getattr(self.given, "sampled", ()), [s.name for s in self.inputs]
-        if isinstance(declared, str) or not set(declared) <= set(known):
-            raise self._refused(f"sampled = {declared!r} cannot be; write sampled = ['input'] with names of inputs")
-        return frozenset(declared)
 
     def _check_step(self) -> None:
         bound = self.given is not self.cls or isinstance(getattr_static(self.cls, "step"), staticmethod)

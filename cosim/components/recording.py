@@ -48,16 +48,19 @@ class RecordingSlave:
         """Nothing to do."""
 
     def enterInitializationMode(self, startTime: float = 0.0, stopTime: float | None = None, **_: Any) -> None:
-        """Go to the start [s]; of an event there the row after it.
+        """Go to the start [s]; of an event there the row after it. What jumps when initialisation ends is what it was.
 
         Args:
             startTime: [s].
             stopTime: [s], without effect.
         """
         self._go(startTime, before=False)
+        for place, signal in enumerate(self.recording.signals):
+            self._values[place] = self.recording.before_start.get(signal.name, self._values[place])
 
     def exitInitializationMode(self) -> None:
-        """Nothing to do."""
+        """The first row."""
+        self._go(self._time, before=False)
 
     def terminate(self) -> None:
         """Nothing to do."""
@@ -166,7 +169,7 @@ class Course:
     def mean(self, t: float, until: float) -> np.ndarray:
         """Means from `t` to `until` [s], shape (m,)."""
         if until > self._end or until - t <= 2.0 * TIME_TOLERANCE:
-            return 0.5 * (self.at(t, before=False) + self.at(until, before=True))
+            return np.asarray(0.5 * (self.at(t, before=False) + self.at(until, before=True)))
         return np.asarray(self.recording.mean(t, until)[self.places])
 
     @property

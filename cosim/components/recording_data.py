@@ -5,7 +5,7 @@ results only.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -19,6 +19,7 @@ from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 Interpolation = Literal["linear", "hold"]
 Chosen = Interpolation | Mapping[str, Interpolation] | None
 """What was said of the columns: of all, of some by name, or nothing."""
+ColumnCourse = Literal["held", "line", "fresh"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Recording:
         held_over_steps: columns of which the others take the value at the start of a step: held ones of a table, and of
             a run of this package those that were held in it.
         of_run: whether it is a run of this package.
+        before_start: of a run, columns that jumped when it was initialised, and what they were before.
         chosen: names of the columns of which it was said whether they are held.
         lines: columns that the others follow on lines within their steps: those of a table that are not held, and of a
             run those that were lines in it. All others give the value of the end of a step, as they did in the run.
@@ -53,6 +55,7 @@ class Recording:
     lines: frozenset[str] = frozenset()
     chosen: frozenset[str] = frozenset()
     of_run: bool = False
+    before_start: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def digest(self) -> str:
@@ -131,7 +134,7 @@ def make_recording(
         run.
     """
     chosen = _chosen(result, source, component, name)
-    said = _said(interpolation, [signal.name for signal in chosen.values()], source)
+    said = said_of(interpolation, [signal.name for signal in chosen.values()], source)
     time = np.array(result.time, dtype=float)
     _check_time(time, source, span)
     rows = _rows(time, span)
@@ -155,18 +158,66 @@ def make_recording(
     held = np.array([said.get(s.name) == "hold" or s.variability == "discrete" for s in signals])
     values = np.column_stack(columns)
     events = _events(time[rows], values, np.array([e.delivered_at for e in result.events]))
-    told = {signal.name: kind for column, signal in chosen.items() if (kind := _recorded(result).get(column))}
-    of_run = _is_run(result)
-    kinds = dict(zip((s.name for s in signals), np.where(held, "held", "line").tolist(), strict=True))
-    kinds = {n: kinds[n] if n in said or not of_run else told.get(n, "fresh") for n in kinds}
-    kept, lines = (frozenset(n for n, kind in kinds.items() if kind == one) for one in ("held", "line"))
+    known = _algorithm(result).get("before_start", {})
+    at_start = len(result.time) and time[rows][0] == result.time[0]
+    before = {s.name: float(known[column]) for column, s in chosen.items() if at_start and column in known}
+    asked = {column: said[s.name] for column, s in chosen.items() if s.name in said}
+    kinds = {s.name: kind for s, kind in zip(chosen.values(), column_courses(result, chosen, asked), strict=True)}
+    kept, lines = (frozenset(s.name for s in signals if kinds[s.name] == one) for one in ("held", "line"))
     return Recording(
-        source, time[rows], tuple(signals), values, held, events, left_out, kept, lines, frozenset(said), of_run
+        source,
+        time[rows],
+        tuple(signals),
+        values,
+        held,
+        events,
+        left_out,
+        kept,
+        lines,
+        frozenset(said),
+        _is_run(result),
+        before,
     )
 
 
-def _said(interpolation: Chosen, names: Sequence[str], source: str) -> dict[str, Interpolation]:
+def column_courses(
+    result: Result, columns: Iterable[str], said: Mapping[str, Interpolation], discrete: Collection[str] = ()
+) -> list[ColumnCourse]:
+    """How columns run between their instants: ``held``, the value of the start of a step; on a ``line``; or ``fresh``,
+    the value of the end of a step, as in a run of this package.
+
+    Args:
+        result: a run, which knows how it took its signals, or a table. columns: names. said: by name what was said.
+        discrete: those of which the target is discrete; where nothing else is known they are held.
+    """
+    told, of_run = _recorded(result), _is_run(result)
+    found: list[ColumnCourse] = []
+    for name in columns:
+        if name in said:
+            found.append("held" if said[name] == "hold" or result.info(name).variability == "discrete" else "line")
+        elif of_run:
+            found.append(told.get(name, "fresh"))
+        else:
+            found.append("held" if name in discrete or result.info(name).variability == "discrete" else "line")
+    return found
+
+
+def interval_ends(values: np.ndarray, first: np.ndarray, last: np.ndarray, course: ColumnCourse) -> np.ndarray:
+    """What a column says at begin and end of each interval between instants, shape (2, n - 1).
+
+    Args:
+        values: of all rows. first, last: numbers of the first and the last row of each instant, shape (n,).
+        course: how it runs between them.
+    """
+    begin, end = values[last[:-1]], values[first[1:]]
+    return np.stack({"held": (begin, begin), "fresh": (end, end), "line": (begin, end)}[course])
+
+
+def said_of(interpolation: Chosen, names: Sequence[str], source: str) -> dict[str, Interpolation]:
     """What was said of each column, by name.
+
+    Args:
+        interpolation: of all columns, of some, or nothing. names: of the columns. source: for messages.
 
     Raises:
         ScenarioError: there is no such column.
@@ -191,11 +242,11 @@ def _is_run(result: Result) -> bool:
     return "fresh" in _algorithm(result)
 
 
-def _recorded(result: Result) -> dict[str, str]:
+def _recorded(result: Result) -> dict[str, ColumnCourse]:
     """Columns of which the run says that they were held, or lines."""
     algorithm = _algorithm(result)
-    held = {str(link).partition(" -> ")[0]: "held" for link in algorithm.get("held", ())}
-    return held | {str(name): str(kind) for name, kind in algorithm.get("played", {}).items()}
+    found: dict[str, ColumnCourse] = {str(k).partition(" -> ")[0]: "held" for k in algorithm.get("held", ())}
+    return found | dict(algorithm.get("played", {}))
 
 
 def _chosen(result: Result, source: str, component: str | None, name: str) -> dict[str, SignalInfo]:

@@ -61,6 +61,7 @@ class Plan:
         services: who took over how components move.
         interpolators: of the components with lines.
         held: signals of which all targets take the value at the start of a step; see `cosim.coupling.instants`.
+        before_start: of held signals that jumped when initialisation ended what they were before.
         relays: pass values on to those that belong to no step, while the components are initialised.
 
     Values behind those of the last step belong to something that is not stepped (a network).
@@ -80,6 +81,7 @@ class Plan:
     interpolators: list[InputInterpolator] = field(default_factory=list)
     held: Set[Signal] = frozenset()
     relays: list[Callable[[], None]] = field(default_factory=list)
+    before_start: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._now, self._start = self.values.data, self.start.data  # copied three times faster than as arrays
@@ -98,6 +100,12 @@ class Plan:
             self.non_numeric_start[:] = self.non_numeric
         for interpolator in self.interpolators:
             interpolator.begin()
+
+    def note_jumps(self) -> None:
+        """Initialisation ended: keep what held signals were before, which no row shows."""
+        held = {".".join(c.source) for c in self.connections if c.source_variable in self.held}
+        jumped = np.flatnonzero((self.values != self.start) & np.isfinite(self.start))
+        self.before_start = {name: float(self.start[i]) for i in jumped if (name := self.signals[i].name) in held}
 
     def find(self, component: str) -> PlannedComponent:
         """The planned component of this name.

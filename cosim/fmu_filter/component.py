@@ -86,7 +86,6 @@ class FmuFilterModel:
         self._driven = [self._words[name] for name in model.inputs]
         self._told = [self._words[name] for name in model.outputs]
         self._measured_inputs = [MEASURED + self._words[name] for name in table.measurements]
-        self.sampled = self._measured_inputs
         self._means = [self._words[name] for name in self._estimated]
         self._deviations = [f"{name}_std" for name in self._means]
         self._unchecked = not checked and table.kind != "particle"

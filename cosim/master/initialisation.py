@@ -59,6 +59,7 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
         step.inputs.send()
         step.component.exit_initialization()
         step.read()
+    plan.note_jumps()
     for relay in plan.relays:
         relay()
     rounds = settling.rounds

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cosim.components.component import Component
+from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
 from cosim.coupling.graph import undeclared
 from cosim.scenario.models import make_system, values_in_use
@@ -100,12 +101,14 @@ def recording_notes(components: Mapping[str, Component], tables: Mapping[str, Co
     """
     notes = []
     for name, component in components.items():
+        if not isinstance(component, RecordingComponent) or component.recording.of_run:
+            continue
         if tables[name].interpolation is not None:
             continue
         held, lines = sorted(component.held_outputs), sorted(component.line_outputs)
         said = [f"held from row to row: {', '.join(held)}"] if held else []
         said += [f"on lines between rows: {', '.join(lines)}"] if lines else []
-        if lines:
+        if said:
             notes.append(f"{name}: {'; '.join(said)}. Where that is wrong say so by 'interpolation'.")
     return notes
 

@@ -29,6 +29,7 @@ def single_tables(
     inputs: Mapping[str, Any] | str | Path | None,
     parameters: Mapping[str, Any],
     record: Sequence[str],
+    interpolation: Any = None,
 ) -> tuple[dict[str, Any], list[str]]:
     """The tables of a scenario of one FMU, and what is doubtful about it; arguments as for `Scenario.fmu`.
 
@@ -38,6 +39,7 @@ def single_tables(
         stop: end of the run [s]; None for that of the FMU's default experiment.
         step: communication step [s]; None for the FMU's own. inputs: constants by name, or a table, or its path.
         parameters: start values by name. record: signals to record; none for all.
+        interpolation: of the columns of the table, as for a recording.
 
     Raises:
         FmuLoadError: the FMU cannot be read.
@@ -54,9 +56,9 @@ def single_tables(
         _check_inputs(inputs, component, where)
         values |= inputs
     elif inputs is not None:
-        source = Path(inputs).resolve()
+        source, said = Path(inputs).resolve(), {} if interpolation is None else {"interpolation": interpolation}
         tables["connections"], doubts = _matches(source, component, where)
-        tables["components"] = {SOURCE: {"recording": str(source)}, **tables["components"]}
+        tables["components"] = {SOURCE: {"recording": str(source)} | said, **tables["components"]}
     if values:
         table["parameters"] = values
     if record:

@@ -28,6 +28,7 @@ from cosim.scenario.structure import scenario_structure
 from cosim.structure.structure import Structure
 
 if TYPE_CHECKING:
+    from cosim.components.recording_data import Interpolation
     from cosim.studies.sampling import Mode, Range
     from cosim.studies.sweep import Sweep
 
@@ -122,6 +123,7 @@ class Scenario:
         parameters: Mapping[str, Any] | None = None,
         record: Sequence[str] = (),
         name: str = "fmu",
+        interpolation: Interpolation | Mapping[str, Interpolation] | None = None,
     ) -> Scenario:
         """A scenario of one FMU alone: for a look at it, or for a regression test of its outputs.
 
@@ -130,16 +132,21 @@ class Scenario:
             stop: end of the run [s]. start: its begin [s]. step: communication step [s]. Where not given, those of the
                 FMU's default experiment; without a step there, a thousandth of the run.
             inputs: values by name, which are held; or a table (CSV, MAT, ...) or results folder whose columns are
-                played back into the inputs of the same names, on lines between its rows.
+                played back into the inputs of the same names: continuous inputs on lines between its rows, discrete
+                ones held from row to row.
             parameters: start values by name.
             record: variables to record besides the outputs.
             name: of the component: its outputs are recorded as ``name.output``.
+            interpolation: ``hold`` or ``linear`` for all columns of the table, or for some by name: a command that was
+                logged is held.
 
         Raises:
             FmuLoadError: the FMU cannot be read.
             ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
         """
-        tables, doubts = single_tables(Path(path), name, start, stop, step, inputs, parameters or {}, record)
+        tables, doubts = single_tables(
+            Path(path), name, start, stop, step, inputs, parameters or {}, record, interpolation
+        )
         scenario = cls(where=Path(path).name, **tables)
         scenario._doubts = doubts
         return scenario

@@ -21,7 +21,8 @@ def integration_grid(time: Array, forcing: Array | None) -> Array:
 
     Args:
         time: of the samples [s], shape (n,).
-        forcing: what is known of the acceleration at the samples [m/s2], shape (n,); None for a constant effort.
+        forcing: what is known of the acceleration at begin and end of each interval [m/s2], shape (2, n - 1); None for
+            a constant effort.
 
     Returns:
         Instants [s], from the first to the last sample.
@@ -43,25 +44,27 @@ def speeds_and_sensitivities(
     Args:
         time: of the samples [s], shape (n,), increasing.
         parameters: as `PARAMETERS`, shape (4, runs).
-        forcing: known part of the acceleration at the samples [m/s2], shape (n,), on lines between; None for none.
+        forcing: known part of the acceleration at begin and end of each interval between samples [m/s2], shape
+            (2, n - 1), on a line within it; None for none.
         grid: instants of the integration [s]; None for `integration_grid`.
 
     Returns:
         Shape (5, runs, n): the speed [m/s], and its derivatives in the order of `PARAMETERS`.
     """
     grid = integration_grid(time, forcing) if grid is None else grid
-    known = np.zeros(len(grid)) if forcing is None else np.interp(grid, time, forcing)
+    known = np.zeros((2, len(grid) - 1)) if forcing is None else forcing
     state = np.zeros((5, parameters.shape[1]))
     state[0], state[4] = parameters[3], 1.0
     values, rates = np.empty((len(grid), *state.shape)), np.empty((len(grid), *state.shape))
     for k, instant in enumerate(grid):
-        values[k], rates[k] = state, _rate(state, parameters, known[k])
+        begin, end = known[:, min(k, len(grid) - 2)]
+        values[k], rates[k] = state, _rate(state, parameters, begin)
         if k + 1 == len(grid):
             break
-        step, middle = grid[k + 1] - instant, 0.5 * (known[k] + known[k + 1])
+        step, middle = grid[k + 1] - instant, 0.5 * (begin + end)
         second = _rate(state + 0.5 * step * rates[k], parameters, middle)
         third = _rate(state + 0.5 * step * second, parameters, middle)
-        fourth = _rate(state + step * third, parameters, known[k + 1])
+        fourth = _rate(state + step * third, parameters, end)
         state = state + step / 6.0 * (rates[k] + 2.0 * second + 2.0 * third + fourth)
     return _between(grid, values, rates, time)
 

@@ -41,8 +41,9 @@ def identify_davis(
     Args:
         time: of the samples [s], shape (n,), increasing.
         speed: measured [m/s], shape (n,), without slip.
-        effort: traction positive [N], one number or shape (n,), on lines between samples; None where it is constant
-            and not known: w0 cannot be told from it then.
+        effort: traction positive [N], one number; or shape (n,), on lines between samples; or at begin and end of each
+            interval between samples, shape (2, n - 1), for one that is held. None where it is constant and not known:
+            w0 cannot be told from it then.
         mass: with rotating parts [kg]; 1 where efforts are by mass. None: coefficients by mass, effort not known.
         minimum_speed: slower samples are left out [m/s].
         level: probability with which an interval covers, between 0 and 1.
@@ -58,7 +59,7 @@ def identify_davis(
     times, speeds = _samples(time, speed, level, resolution)
     forcing, constant = _efforts(effort, mass, len(times))
     chosen = _part(times, speeds, minimum_speed)
-    forcing = None if forcing is None else forcing[chosen]
+    forcing = None if forcing is None else forcing[:, chosen.start : chosen.stop - 1]
     times, speeds = times[chosen], speeds[chosen]
     fits = fit_runs(times, speeds[None, :], forcing)
     if not (fits.converged[0] and np.all(np.isfinite(fits.parameters))):
@@ -147,7 +148,7 @@ def _samples(
 
 
 def _efforts(effort: ArrayLike | None, mass: float | None, count: int) -> tuple[Array | None, float | None]:
-    """The effort by mass [m/s2]: as a series where it changes, as a number where it is constant and known."""
+    """The effort by mass [m/s2]: at both ends of each interval where it changes, a number where it is constant."""
     if mass is not None and not 0.0 < mass < np.inf:
         raise IdentificationError(f"mass {mass!r} kg: expected a number above 0, rotating parts included.")
     if effort is None:
@@ -157,13 +158,14 @@ def _efforts(effort: ArrayLike | None, mass: float | None, count: int) -> tuple[
             "An effort in newtons needs the mass [kg], rotating parts included; for efforts by mass [m/s2] give mass 1."
         )
     efforts = np.asarray(effort, dtype=float)
-    if efforts.shape not in ((), (count,)) or not np.all(np.isfinite(efforts)):
+    if efforts.shape not in ((), (count,), (2, count - 1)) or not np.all(np.isfinite(efforts)):
         raise IdentificationError(
-            f"effort: expected one finite number or {count}, one for each sample (got shape {efforts.shape})."
+            f"effort: expected one finite number or {count}, one for each sample, or two for each interval between "
+            f"samples (got shape {efforts.shape})."
         )
     if np.ptp(efforts) == 0.0:
         return None, float(efforts.flat[0]) / mass
-    return efforts / mass, None
+    return (np.stack([efforts[:-1], efforts[1:]]) if efforts.ndim == 1 else efforts) / mass, None
 
 
 def _part(times: Array, speeds: Array, minimum_speed: float) -> slice:

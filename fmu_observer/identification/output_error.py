@@ -68,7 +68,8 @@ def fit_runs(time: Array, speeds: Array, forcing: Array | None = None) -> RunFit
     Args:
         time: of the samples [s], shape (n,), increasing.
         speeds: measured [m/s], shape (runs, n).
-        forcing: known part of the acceleration at the samples [m/s2], shape (n,); None for none.
+        forcing: known part of the acceleration at begin and end of each interval [m/s2], shape (2, n - 1); None for
+            none.
 
     Returns:
         The estimates with their covariances.
@@ -119,7 +120,7 @@ def with_covariance(
 
 def _first_guess(time: Array, speeds: Array, forcing: Array | None) -> Array:
     """Regression of the speed on integrals of itself: v = v0 + q t + a t - w1 int v - w2 int v^2, shape (4, runs)."""
-    known = 0.0 if forcing is None else scipy.integrate.cumulative_trapezoid(forcing, time, initial=0.0)
+    known = 0.0 if forcing is None else np.append(0.0, np.cumsum(np.diff(time) * forcing.mean(axis=0)))
     first = scipy.integrate.cumulative_trapezoid(speeds, time, axis=1, initial=0.0)
     second = scipy.integrate.cumulative_trapezoid(speeds**2, time, axis=1, initial=0.0)
     lines = np.broadcast_to(time, speeds.shape)

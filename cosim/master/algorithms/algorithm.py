@@ -79,7 +79,8 @@ class Algorithm(ABC):
             for kind, names in (("held", step.component.held_outputs), ("line", step.component.line_outputs))
             for name in sorted(names)
         }
-        return found | ({"played": played} if played else {})
+        before = self.plan.before_start
+        return found | ({"played": played} if played else {}) | ({"before_start": before} if before else {})
 
     def close(self) -> None:
         """Free what it holds (saved states, threads)."""

@@ -63,7 +63,7 @@ def _known(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent]
         name, _, signal = plan.signals[source].name.partition(".")
         giver = givers[source].component if source < len(givers) else None
         if isinstance(giver, RecordingComponent) and giver.course_of(
-            signal, sampled=inputs.names[place] in planned.component.sampled_inputs
+            signal, sampled=planned.component.can_be_missing(inputs.names[place])
         ):
             by_source.setdefault(name, []).append(place)
     found = []

@@ -88,8 +88,9 @@ class MeanInterpolator(InputInterpolator):
         direct = {name for names in declared_feedthrough(component).values() for name in names}
         acting = acting_on_derivatives(component)
         if acting is None:
-            acting = set(inputs.names) - direct - component.sampled_inputs
-        self._over = np.array([name in acting for name in inputs.names], dtype=bool)
+            acting = set(inputs.names) - direct
+        over = [name in acting and not component.can_be_missing(name) for name in inputs.names]  # those are samples
+        self._over = np.array(over, dtype=bool)
         self._passes = self._over & np.array([name in direct for name in inputs.names], dtype=bool)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
