@@ -73,7 +73,9 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
         return None
     name = table.model or table.observer
     if isinstance(model, type):
-        system: HybridSystem = _made(model, _chosen_options(model, table.options, where), where)
+        system: HybridSystem = _made(
+            model, _for_its_period(model, _chosen_options(model, table.options, where), table), where
+        )
     elif table.options != dict(model.options):
         raise ScenarioError(f"{where}: {name} is an instance, which has its options already; give the class instead.")
     else:
@@ -304,6 +306,14 @@ def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], whe
             raise ScenarioError(f"{where}: option {key} = {value!r} of {factory.name}; choose {_legal(choices)}.")
         chosen[key] = same[0] if same else value
     return chosen
+
+
+def _for_its_period(factory: type[HybridSystem], options: dict[str, Any], table: ComponentTable) -> dict[str, Any]:
+    """The options, with the period that the parameters set: a filter of a plant takes as many steps as that needs."""
+    period, told = table.parameters.get("sample_period"), {"period", "substeps"}
+    given = isinstance(period, int | float) and not isinstance(period, bool) and period > 0.0
+    built = "period" in factory.option_choices and given and not told & set(options)
+    return {**options, "period": float(period)} if built else options
 
 
 def _legal(choices: Sequence[Any]) -> str:

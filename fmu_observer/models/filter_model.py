@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +55,7 @@ class FilterModel:
         measured: h, likewise.
         event: name of the event at which a measurement arrives unless told otherwise. sample_period: [s].
         any_period: whether `moved` holds for any period from zero; otherwise for one sampling period at a time.
+        longest_period: the longest one for which it is as accurate as the system that it comes from [s].
         deviates: whether f or h is not affine in the state; None for what the traced functions show.
 
     Raises:
@@ -74,6 +76,7 @@ class FilterModel:
     event: str = "sample"
     sample_period: float = 0.1
     any_period: bool = True
+    longest_period: float = inf
     deviates: bool | None = None
 
     def __post_init__(self) -> None:
@@ -136,6 +139,28 @@ class FilterModel:
         """
         found = self._moved_jacobian(np.hstack([x, self.no_noise()]), np.hstack([*_flat(known), _row(period)]))
         return found[:, : self.order], found[:, self.order :] if self.process_noises else None
+
+    def transition_error(self, x: np.ndarray, known: Known, period: float) -> float:
+        """How far the transition and its Jacobian are from those in steps of half the length, as a share of the latter.
+
+        Args:
+            x: state before, shape (n,). known: time, inputs and parameters. period: [s].
+
+        Returns:
+            The largest difference of an entry over the largest entry, at least 1, of the finer Jacobian; infinite where
+            there are no numbers. Zero for a model that moves at its own period only.
+        """
+        if not self.any_period:
+            return 0.0
+        half, none = 0.5 * period, self.no_noise()
+        with np.errstate(all="ignore"):
+            whole, _ = self.transition_jacobians(x, known, period)
+            first, _ = self.transition_jacobians(x, known, half)
+            then = known._replace(t=known.t + half)
+            second, _ = self.transition_jacobians(self.moved(x, none, known, half), then, half)
+            finer = np.asarray(second) @ np.asarray(first)
+            share = np.abs(np.asarray(whole) - finer).max() / max(1.0, np.abs(finer).max())
+        return float(share) if np.isfinite(share) else inf
 
     def measurement_jacobians(self, x: Array, known: Known) -> tuple[Array, Array | None]:
         """Exact Jacobians of the measurements by state and noise, at no noise; also on traced symbols.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil, inf
 
 import casadi as ca
 import numpy as np
@@ -18,16 +19,60 @@ from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.registry import MODELS, find_model
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem, Signal, TracedSystem, input_signal, scalar_names, state, vector, width
+from plant_models.hybrid.exact_jacobian import is_affine
 from plant_models.hybrid.integration import step
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.option import is_number, require_whole
+from plant_models.hybrid.scan import Arrays, enclosed, scan_table
 from plant_models.hybrid.system import Array
 from plant_models.interop.continuous_part import known as known_name
 from plant_models.user_file import Expected, load_class, names_code
 
 SUBSTEPS = 4
-"""Steps of the system's own integrator in one period; by default each is an internal step of the system."""
+"""Internal steps of the system in the period of a filter that is told no other period."""
+UNROLLED = 8
+"""Steps that are written out; more of them are a loop in the generated code."""
+MOST_STEPS = 100_000
 
 USERS = Expected("subclass of HybridSystem", lambda found: isinstance(found, type) and issubclass(found, HybridSystem))
+
+SAME = 1e-9  # share by which a period may exceed its steps: rounding
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Integration steps of a system in a period of a filter.
+
+    Args:
+        period: of the filter [s]; None for `SUBSTEPS` internal steps of the system.
+        substeps: how many steps it has; None for as many as keep each within the internal step of the system.
+    """
+
+    period: float | None = None
+    substeps: int | None = None
+
+    def of(self, system: HybridSystem) -> int:
+        """How many steps there are.
+
+        Args:
+            system: that moves.
+
+        Raises:
+            ValueError: the period is not positive, or a number of steps is not possible; the message says which.
+        """
+        where = f"Filter model of {system.name}"
+        if self.period is not None and not (is_number(self.period) and self.period > 0.0):
+            raise ValueError(f"{where}: period = {self.period!r}; expected a time above 0 [s].")
+        if self.substeps is not None:
+            require_whole(where, substeps=self.substeps)
+            return self.substeps
+        count = SUBSTEPS if self.period is None else ceil(self.period / system.internal_step * (1.0 - SAME))
+        if count > MOST_STEPS:
+            raise ValueError(
+                f"{where}: a period of {self.period:g} s has {count} internal steps of {system.internal_step:g} s, "
+                f"expected {MOST_STEPS} at most; say by `substeps` how many are enough, which its condition judges."
+            )
+        return max(count, 1)
+
 
 Source = str | ObserverModel | FilterModel | HybridSystem | type[HybridSystem]
 
@@ -39,14 +84,14 @@ def system_model(
     *,
     process_noises: Sequence[str] = (),
     measurement_noises: Sequence[str] = (),
-    substeps: int = SUBSTEPS,
+    steps: Steps = Steps(),
     preset: str | None = None,
 ) -> FilterModel:
     """A hybrid system as the model of a filter.
 
     1. Continuous states are estimated. They move by the system's own method (dry friction and switches included) in
-       `substeps` equal steps a period; memory stays at its start, triggered events do not occur, and periodic ones
-       must leave the continuous states alone.
+       equal steps, none longer than the system's own internal step unless `steps` says how many; memory stays at its
+       start, triggered events do not occur, and periodic ones must leave the continuous states alone.
     2. A system without continuous states that jumps at one periodic event moves by this jump; all its memory is
        estimated, and the period of the event is that of the filter.
     3. Its parameters become parameters of the filter. Vectors are taken apart, ``x[1]`` as ``x_1``.
@@ -57,14 +102,13 @@ def system_model(
         process_noises: names of inputs, or of noises of the periodic event, through which the process noise enters,
             held over a period; none for additive noise on every state.
         measurement_noises: names of inputs through which noise enters the outputs; none for additive noise.
-        substeps: integration steps in a period. preset: of the start values; None for the default one.
+        steps: of the integration in a period. preset: of the start values; None for the default one.
 
     Raises:
         ValueError: a name is unknown, nothing is measured, or the system does not move so; the message says which.
     """
     _require_list(system, outputs)
-    require_whole(f"Filter model of {system.name}", substeps=substeps)
-    moving = _Moving(system, substeps, preset)
+    moving = _Moving(system, steps.of(system), preset, steps.period)
     noisy = (*process_noises, *measurement_noises)
     signals = {name: s for s in system.input_signals for name in s.scalar_names}
     names = [n for n in scalar_names(system.inputs) if n not in noisy] if inputs is None else list(inputs)
@@ -88,6 +132,8 @@ def system_model(
         measured=moving.measured(names, measurement_noises, rows),
         sample_period=moving.sample_period,
         any_period=moving.event is None,
+        longest_period=moving.longest_period(steps),
+        deviates=moving.deviates(names, process_noises, measurement_noises, rows),
     )
 
 
@@ -105,14 +151,15 @@ def find_filter_model(
     inputs: Sequence[str] | None = None,
     process_noises: Sequence[str] = (),
     measurement_noises: Sequence[str] = (),
-    substeps: int = SUBSTEPS,
+    steps: Steps = Steps(),
 ) -> FilterModel:
     """The model of a filter, of whatever names or is one.
 
     Args:
         model: name of an observer model, or of a plant, or ``file.py:Class``; or a model or hybrid system itself. A
             name that both bear is the observer model's, unless `outputs` are given.
-        outputs, inputs, process_noises, measurement_noises, substeps: of a hybrid system, see `system_model`.
+        outputs, inputs, process_noises, measurement_noises, steps: of a hybrid system, see `system_model`. An observer
+            model keeps the period that it has.
 
     Raises:
         ValueError: the name is unknown, or something is asked for that the model has not.
@@ -132,7 +179,7 @@ def find_filter_model(
         inputs,
         process_noises=process_noises,
         measurement_noises=measurement_noises,
-        substeps=substeps,
+        steps=steps,
     )
 
 
@@ -159,6 +206,7 @@ class _Moving:
     system: HybridSystem
     substeps: int
     preset: str | None
+    period: float | None = None
 
     def __post_init__(self) -> None:
         system = self.system
@@ -244,9 +292,35 @@ class _Moving:
     @property
     def sample_period(self) -> float:
         if self.event is None:
-            return float(self.substeps * self.system.internal_step)
+            return float(self.substeps * self.system.internal_step if self.period is None else self.period)
         names = scalar_names(self.system.parameter_signals)
         return float(self.system.start_parameters(self.preset)[names.index(self.system.periodic_events[0].period)])
+
+    def longest_period(self, steps: Steps) -> float:
+        """The longest period in which no step is longer than the system's own [s]; none where the steps were given."""
+        own = self.event is not None or steps.substeps is not None
+        return inf if own else float(self.substeps * self.system.internal_step) * (1.0 + SAME)
+
+    def deviates(
+        self, names: Sequence[str], noises: Sequence[str], readings: Sequence[str], rows: Sequence[int]
+    ) -> bool | None:
+        """Whether one step or an output is not affine in the state; None where no loop hides it."""
+        if self.substeps <= UNROLLED:
+            return None
+        one = replace(self, substeps=1)
+        kept, k = (len(self.states), len(names)), width(self.parameters)
+
+        def moved(xw: Array, flat: Array) -> Array:
+            known = Known(flat[0], flat[1 : 1 + kept[1]], flat[1 + kept[1] : 1 + kept[1] + k])
+            return one.transition(names, noises)(xw[: kept[0]], xw[kept[0] :], known, flat[-1])
+
+        def seen(xv: Array, flat: Array) -> Array:
+            known = Known(flat[0], flat[1 : 1 + kept[1]], flat[1 + kept[1] : 1 + kept[1] + k])
+            return self.measured(names, readings, rows)(xv[: kept[0]], xv[kept[0] :], known)
+
+        told = 2 + kept[1] + k
+        affine = is_affine(moved, kept[0] + len(noises), told) and is_affine(seen, kept[0] + len(readings), told)
+        return not affine
 
     def transition(self, names: Sequence[str], noises: Sequence[str]) -> Transition:
         """The state a period later."""
@@ -269,9 +343,25 @@ class _Moving:
         if self.event is not None:
             return self.system.jump_vector(self.event, known.t + period, x, u, p)
         n, h, whole = self.system.continuous_count, period / self.substeps, self._whole(x)
+        if self.substeps > UNROLLED:
+            return enclosed(self._rolled, whole, u, p, vector(known.t + 0.0 * h, h))[0][:n]
         for i in range(self.substeps):
-            whole = step(self.system, known.t + i * h, h, whole, u, p, self._jacobian(whole, u, p))
+            whole = self._step(known.t + i * h, h, whole, u, p)
         return whole[:n]
+
+    def _step(self, t: Array, h: Array, whole: Array, u: Array, p: Array) -> Array:
+        return step(self.system, t, h, whole, u, p, self._jacobian(whole, u, p))
+
+    @cached_property
+    def _rolled(self) -> Callable[..., tuple[Array, ...]]:
+        """All steps of a period as a loop: of the state, inputs, parameters, and time and length of the first one."""
+
+        def body(carry: Arrays, row: Arrays, shared: Arrays) -> tuple[Arrays, Arrays]:
+            u, p, clock = shared
+            return (self._step(clock[0] + row[0][0] * clock[1], clock[1], carry[0], u, p),), (row[0],)
+
+        numbers = np.arange(float(self.substeps)).reshape(-1, 1)
+        return lambda whole, u, p, clock: scan_table(body, (whole,), (numbers,), (u, p, clock))[0]
 
     def _jacobian(self, x: Array, u: Array, p: Array) -> Callable[[Array, Array], tuple[Array, Array]] | None:
         if self.system.method != "rosenbrock":

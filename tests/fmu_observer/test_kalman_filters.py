@@ -12,7 +12,7 @@ from block_systems import Driven
 
 from fmu_observer.models import cart_pendulum, linear_pendulum
 from fmu_observer.models.filter_model import FilterModel, Known
-from fmu_observer.models.system_model import find_filter_model, system_model
+from fmu_observer.models.system_model import Steps, find_filter_model, system_model
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
@@ -212,7 +212,7 @@ def test_a_plant_is_a_model_by_its_own_flow() -> None:
 def test_a_filter_of_a_plant_is_that_of_the_same_observer_model() -> None:
     values = {"sample_period": T, "measurement_covariance[1]": 1e-4}
     values |= {f"process_covariance[{i}]": 1e-3 * (i in (1, 4)) for i in range(1, 5)}
-    plant = system_model(PLANTS["pendulum"](), ["angle"], preset="rest")
+    plant = system_model(PLANTS["pendulum"](), ["angle"], preset="rest", steps=Steps(substeps=4))
     np.testing.assert_allclose(
         sampled(ExtendedKalmanFilter(plant), **values), sampled(PENDULUM, **values), rtol=1e-12, atol=1e-15
     )

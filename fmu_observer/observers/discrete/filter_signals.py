@@ -14,11 +14,11 @@ from plant_models.hybrid import memory as memory_signal
 NOT_POSITIVE = output_signal(
     "covariance_not_positive",
     "1",
-    "1 once the covariance was not positive semidefinite",
+    "1 once the covariance was not positive semidefinite, or a measurement left nothing of a variance",
     variability="discrete",
     warning=OutputWarning(
-        "rounding has made its covariance none, so its estimates mean nothing: take the form joseph or square_root, or "
-        "noises whose sizes differ less"
+        "rounding has made its covariance none, so its estimates or deviations mean nothing: take the form joseph or "
+        "square_root, or noises and first deviations whose sizes differ less"
     ),
 )
 
@@ -54,8 +54,7 @@ class SignalsOf:
             memory_signal("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory_signal("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
         ]
-        if not self.rooted:
-            found.append(memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive semidefinite"))
+        found.append(memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive, or lost a variance"))
         if self.arrivals.several:
             found.append(memory_signal("last_count", "1", 0.0, "How many measurements arrived last together"))
         if self.arrivals.timed:
@@ -80,8 +79,7 @@ class SignalsOf:
         told("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far")
         if self.arrivals.several:
             told("nis_degrees", "1", "Degrees of freedom of the last normalised innovation squared")
-        if not self.rooted:
-            found.append(NOT_POSITIVE)
+        found.append(NOT_POSITIVE)
         if self.covariances:
             told("covariance", "1", "Covariance of the estimate, row by row, SI units", n * n)
         return tuple(found)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -16,12 +17,12 @@ from fmu_observer.filtering.kalman import Corrected, flattened, log_likelihood, 
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
 from fmu_observer.models.process_noise import noise_over
-from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
+from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
 from fmu_observer.observers.discrete.arrivals import PERIODIC, Arrivals
 from fmu_observer.observers.discrete.belief import Belief, chosen
 from fmu_observer.observers.discrete.covariance_requirements import is_positive, positive
-from fmu_observer.observers.discrete.filter_condition import steady_condition
+from fmu_observer.observers.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.discrete.filter_signals import NOT_POSITIVE, SignalsOf
 from fmu_observer.observers.discrete.sampling import PRIMED
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
@@ -36,6 +37,8 @@ Form = Literal["joseph", "short", "square_root"]
 
 DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
 VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
+LARGEST_ENTRY = 1e150  # of a factor: its square and sums of such are numbers
+LEFT = 8.0 * float(np.finfo(np.float64).eps)  # of a variance, after a subtraction: what is smaller is rounding
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 
 
@@ -59,7 +62,10 @@ class GaussianFilter(GatedObserver):
 
     Args:
         model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
-        outputs, inputs, process_noises, measurement_noises, substeps: of a plant, see `models.system_model`.
+        outputs, inputs, process_noises, measurement_noises: of a plant, see `models.system_model`.
+        period: that the filter of a plant is built for [s], the start of `sample_period` and the longest one: its steps
+            are as short as the plant's own. By default four of them.
+        substeps: how many steps there are in place of those, whatever the period.
         unknown: names of its parameters or inputs that are estimated too, see `models.unknown_values`.
         arrival: see above. form: of the covariance equations, one of `forms`.
         covariances: whether the whole covariance of the estimate is an output, `covariance`, row by row.
@@ -78,6 +84,7 @@ class GaussianFilter(GatedObserver):
         "inputs": (),
         "process_noises": (),
         "measurement_noises": (),
+        "period": (),
         "substeps": (),
         "unknown": (),
         "arrival": (),
@@ -93,7 +100,8 @@ class GaussianFilter(GatedObserver):
         inputs: Sequence[str] | None = None,
         process_noises: Sequence[str] = (),
         measurement_noises: Sequence[str] = (),
-        substeps: int = SUBSTEPS,
+        period: float | None = None,
+        substeps: int | None = None,
         unknown: Sequence[str] = (),
         arrival: str | Sequence[str] = PERIODIC,
         form: Form | None = None,
@@ -106,7 +114,7 @@ class GaussianFilter(GatedObserver):
             "process_noises": process_noises,
             "measurement_noises": measurement_noises,
         }
-        self.model = find_filter_model(model, **named, substeps=substeps)
+        self.model = find_filter_model(model, **named, steps=Steps(period, substeps))
         if unknown:
             self.model = with_unknown(self.model, unknown)
         self.form: Form = self.forms[0] if form is None else form
@@ -119,7 +127,8 @@ class GaussianFilter(GatedObserver):
         super().__init__(
             model=model if isinstance(model, str) else self.model.name,
             **given,
-            **({} if substeps == SUBSTEPS else {"substeps": substeps}),
+            **({} if period is None else {"period": period}),
+            **({} if substeps is None else {"substeps": substeps}),
             **({"unknown": list(unknown)} if unknown else {}),
             arrival=arrival if isinstance(arrival, str) else list(arrival),
             form=self.form,
@@ -219,6 +228,7 @@ class GaussianFilter(GatedObserver):
             ahead = self.predicted(before, known, p.sample_period, noise, p)
             belief = chosen(primed, ahead, self.unmoved(before, p))
         kept = {name: x[first] for name, first in places.items()}
+        kept["covariance_lapsed"] = self._lapsed(x)
         q = len(self.model.measurements)
         first, second = places["last_innovation"], places["last_innovation_covariance"]
         e, S = x[first : first + q], as_matrix(x[second : second + q * q], q, q)
@@ -230,6 +240,9 @@ class GaussianFilter(GatedObserver):
             )
             there, found = is_there(y), after.innovation_covariance
             count = there @ np.ones(len(rows))
+            share = LEFT if self.form == "short" else 0.0  # the other forms subtract nothing
+            lost = _lost(self._variances(belief.spread), self._variances(after.covariance), share)
+            kept["covariance_lapsed"] = np.maximum(kept["covariance_lapsed"], lost)
             some = count > 0.5  # of nothing at all the prediction stays, to the last bit
             belief = chosen(some, Belief(after.estimate, after.covariance), belief._replace(drawn=None))
             kept["last_nis"] = np.where(some, normalised_square(error, found), kept["last_nis"])
@@ -246,18 +259,20 @@ class GaussianFilter(GatedObserver):
             *flattened(S),
             kept["last_nis"],
             kept["log_likelihood"],
-            *self._lapsed(x),
+            kept["covariance_lapsed"],
             *counted,
             *timed,
             1.0 + 0.0 * kept["primed"],
         )
 
-    def _lapsed(self, x: Array) -> tuple[Array, ...]:
+    def _lapsed(self, x: Array) -> Array:
         """Whether the covariance is none, or was none before; a correction may hide that."""
-        if self.rooted:
-            return ()
         before = x[self._places["covariance_lapsed"]]
-        return (np.maximum(before, 1.0 - is_positive(self.belief(x).spread)),)
+        return before if self.rooted else np.maximum(before, 1.0 - is_positive(self.belief(x).spread))
+
+    def _variances(self, spread: Array) -> list[Array]:
+        n = self.model.order
+        return [spread[i] @ spread[i] if self.rooted else spread[i, i] for i in range(n)]
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations, and what is known of the last innovation."""
@@ -272,8 +287,7 @@ class GaussianFilter(GatedObserver):
         values |= {"nis": x[places["last_nis"]], "innovation_likelihood": x[places["log_likelihood"]]}
         if self.arrivals.several:
             values["nis_degrees"] = x[places["last_count"]]
-        if not self.rooted:
-            (values[NOT_POSITIVE.name],) = self._lapsed(x)
+        values[NOT_POSITIVE.name] = self._lapsed(x)
         if self.covariances:
             values["covariance"] = np.reshape(P, (n * n,))
         return values
@@ -282,14 +296,17 @@ class GaussianFilter(GatedObserver):
         """Covariances are symmetric and positive; other parameters within their bounds."""
         s = self.model.reading_noise_count
         r = self.model.noise_count
-        needed = super().requirements(p) | within_bounds(self.own_parameters, p)
+        needed = super().requirements(p) | within_bounds(self.own_parameters, p) | within_steps(self.model, p)
         needed |= positive(self._process_name, getattr(p, self._process_name), r, definite=False)
         return needed | positive("measurement_covariance", p.measurement_covariance, s, definite=True)
 
     def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
-        """The covariance of the first estimate is one; of a factor every value is legal."""
-        n = self.model.order
-        return {} if self.rooted else positive("estimate_covariance", x[n : n + n * n], n, definite=False)
+        """The covariance of the first estimate is one; of a factor every value is legal whose square is a number."""
+        n, last = self.model.order, self.model.order * (self.model.order + 1)
+        if not self.rooted:
+            return positive("estimate_covariance", x[n:last], n, definite=False)
+        text = f"estimate_covariance_factor: entries below {LARGEST_ENTRY:g}, whose squares are numbers"
+        return {text: np.where(np.max(np.abs(x[n:last])) < LARGEST_ENTRY, 1.0, 0.0)}
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Whether the filter has a stable steady state with the gains of a preset, some replaced.
@@ -385,6 +402,15 @@ class GaussianFilter(GatedObserver):
 
 def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
     return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)
+
+
+def _lost(before: Sequence[Array], after: Sequence[Array], share: float) -> Array:
+    """1 where a correction left no more of a variance than a share of it: noise leaves some of every variance."""
+    lost = [
+        np.where(now > share * then, 0.0, np.where(then > 0.0, 1.0, 0.0))
+        for then, now in zip(before, after, strict=True)
+    ]
+    return reduce(np.maximum, lost)
 
 
 def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Array, there: Array) -> tuple[Array, Array]:

@@ -14,9 +14,9 @@ from fmu_observer.filtering.kalman import decoupled
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
 from fmu_observer.models.process_noise import noise_over
-from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
+from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.observers.discrete.covariance_requirements import positive
-from fmu_observer.observers.discrete.filter_condition import steady_condition
+from fmu_observer.observers.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.discrete.sampling import PRIMED
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -70,7 +70,7 @@ class MemberFilter(HybridSystem):
     Args:
         model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
         members: how many, 2 to 50.
-        outputs, inputs, process_noises, substeps: of a plant, see `models.system_model`.
+        outputs, inputs, process_noises: of a plant, see `models.system_model`. period, substeps: see `GaussianFilter`.
 
     Raises:
         ValueError: an option is not legal, or the model does not suit; the message says which.
@@ -87,6 +87,7 @@ class MemberFilter(HybridSystem):
         "outputs": (),
         "inputs": (),
         "process_noises": (),
+        "period": (),
         "substeps": (),
     }
 
@@ -98,9 +99,10 @@ class MemberFilter(HybridSystem):
         outputs: Sequence[str] = (),
         inputs: Sequence[str] | None = None,
         process_noises: Sequence[str] = (),
-        substeps: int = SUBSTEPS,
+        period: float | None = None,
+        substeps: int | None = None,
     ) -> None:
-        self.model = find_filter_model(model, outputs, inputs, process_noises, (), substeps)
+        self.model = find_filter_model(model, outputs, inputs, process_noises, (), Steps(period, substeps))
         if self.model.measurement_noises:
             raise ValueError(
                 f"{self.name}: measurement noise of {self.model.name!r} enters by inputs; expected additive noise. Use "
@@ -194,7 +196,7 @@ class MemberFilter(HybridSystem):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Covariances are symmetric and positive; other parameters within their bounds."""
         n, r, q = self.model.order, self.model.noise_count, len(self.model.measurements)
-        needed = super().requirements(p) | within_bounds(self.own_parameters, p)
+        needed = super().requirements(p) | within_bounds(self.own_parameters, p) | within_steps(self.model, p)
         needed |= positive("process_covariance", p.process_covariance, r, definite=False)
         needed |= positive("start_covariance", p.start_covariance, n, definite=False)
         return needed | positive("measurement_covariance", p.measurement_covariance, q, definite=True)
