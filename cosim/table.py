@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from numbers import Real
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator
+
+from plant_models.hybrid.noise import FROM_NAME, SEED_EXPECTED, is_seed
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 """Name of a component."""
+
+
+def _seed(value: Any) -> int:
+    if isinstance(value, Real) and not isinstance(value, bool) and is_seed(float(value)):
+        return int(value)
+    raise ValueError(f"expected {SEED_EXPECTED} (got {value!r})")
+
+
+def _own_seed(value: Any) -> int:
+    if isinstance(value, Real) and not isinstance(value, bool) and value == FROM_NAME:
+        return FROM_NAME
+    return _seed(value)
+
+
+Seed = Annotated[int, PlainValidator(_seed)]
+"""Seed of a run."""
+OwnSeed = Annotated[int, PlainValidator(_own_seed)]
+"""Seed of something that draws; -1: it follows from the seed of the run and the name."""
 
 
 class Table(BaseModel):

@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 from cosim.balises.letter import Letter, Sent
 from cosim.errors import ScenarioError
 from cosim.results.result import BaliseRecord
-from plant_models.hybrid.noise import standard_normal, uniform_pair
+from plant_models.hybrid.noise import Purpose, standard_normal, uniform_pair
 
 T = TypeVar("T", bound=Sent)
 NO_OUTCOMES: Mapping[str, str] = MappingProxyType({})
@@ -86,10 +86,10 @@ class Channel:
             outcomes: what became of it, where that is known already.
         """
         chance = self.missed_fraction > 0.0 or self.latency_jitter > 0.0
-        luck, jitter = uniform_pair(self.seed, 0, number) if chance else (1.0, 0.0)
+        luck, jitter = uniform_pair(self.seed, 0, number, Purpose.TELEGRAMS) if chance else (1.0, 0.0)
         missed = luck < self.missed_fraction or crossing.identity in self.missed
         spread = self.position_noise * crossing.location_accuracy
-        noise = spread * standard_normal(self.seed, 1, number) if spread > 0.0 else 0.0
+        noise = spread * standard_normal(self.seed, 1, number, Purpose.TELEGRAMS) if spread > 0.0 else 0.0
         return BaliseRecord(
             stamp=crossing.stamp,
             delivered_at=nan if missed else crossing.stamp + self.latency + jitter * self.latency_jitter,

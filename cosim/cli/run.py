@@ -50,7 +50,15 @@ def register(commands: Any) -> None:
         "--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)"
     )
     parser.add_argument(
-        "--seeds", type=positive, metavar="N", help="also run N balise seeds and report medians and quartiles"
+        "--seed",
+        action="append",
+        type="seed={}".format,
+        dest="settings",
+        metavar="N",
+        help="seed of the run: all chance",
+    )
+    parser.add_argument(
+        "--seeds", type=positive, metavar="N", help="also run the seeds 0 to N - 1 and report medians and quartiles"
     )
     parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
     parser.add_argument("--no-report", action="store_true", help="write result files only")

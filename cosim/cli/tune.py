@@ -56,7 +56,6 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     )
     parser.add_argument("--seeds", type=_seeds, default=[0], metavar="0:4", help="for training (default: 0)")
     parser.add_argument("--judge", type=_seeds, default=[], metavar="10:20", help="for judging before and after")
-    parser.add_argument("--seed-names", nargs="+", metavar="NAME", help="what a seed moves (default: every seed)")
     parser.add_argument("--iterations", type=positive, default=20, metavar="N", help="default: 20")
     parser.add_argument(
         "--searches", type=positive, default=1, metavar="N", help="searches, each with another seed of the method"
@@ -93,7 +92,6 @@ def execute(options: argparse.Namespace) -> int:
             cost=options.cost,
             seeds=options.seeds,
             judge=options.judge,
-            seed_names=options.seed_names,
             iterations=options.iterations,
             searches=options.searches,
             options=dict(parse_setting(text) for text in options.option),

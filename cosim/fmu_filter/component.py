@@ -26,6 +26,7 @@ from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states, usual_step
 from fmus.check.probe import probe
 from plant_models.hybrid.missing import MISSED_SAMPLES
+from plant_models.hybrid.noise import FROM_NAME, RUN_SEED, seed_of
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
 from plant_models.hybrid.units import UnitError, parse_unit
 
@@ -235,13 +236,16 @@ def legal_names(names: Sequence[str]) -> dict[str, str]:
 
 
 def _engine(table: FilterTable, model: SealedModel, noises: Noises) -> FmuFilter:
+    seed = (
+        seed_of(RUN_SEED, Path(model.path).stem) if table.seed == FROM_NAME else table.seed
+    )  # alone, without a scenario
     if table.kind == "ukf":
         return UnscentedFilter(model, noises, table.alpha)
     if table.kind == "ensemble":
-        return EnsembleFilter(model, noises, table.members, table.seed)
+        return EnsembleFilter(model, noises, table.members, seed)
     if table.kind == "particle":
         starts = {name: model.parameters[name] for name in table.start_deviation}
-        return ParticleFilter(model, noises, table.start_deviation, starts, table.members, table.seed)
+        return ParticleFilter(model, noises, table.start_deviation, starts, table.members, seed)
     return ExtendedFilter(model, noises)
 
 

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from cosim.table import Table
+from cosim.table import OwnSeed, Table
+from plant_models.hybrid.noise import FROM_NAME
 
 Kind = Literal["ekf", "ukf", "ensemble", "particle"]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -47,7 +48,10 @@ class FilterTable(Table):
     horizon: NotNegative = Field(default=10.0, description="how far back a late telegram is still taken in [s]")
     alpha: Positive = Field(default=1.0, description="spread of the sigma points of a `ukf` [1]")
     members: Annotated[int, Field(ge=2)] = Field(default=100, description="of an `ensemble`, or particles")
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the numbers that they draw")
+    seed: OwnSeed = Field(
+        default=FROM_NAME,
+        description="of the numbers that they draw; -1: follows from the seed of the run and the name",
+    )
 
     @model_validator(mode="after")
     def _sees_something(self) -> FilterTable:

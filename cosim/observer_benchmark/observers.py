@@ -27,6 +27,7 @@ from cosim.scenario.gaps import expected_gap
 from cosim.scenario.layouts import make_layout
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.schema import step_count
+from cosim.scenario.seeds import with_seeds
 from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[str, int, int], None]
@@ -267,7 +268,7 @@ class _Judge:
 
     def _gaps(self) -> tuple[Any, float | None]:
         """Gap to expect from the scenario, and the longest one told in the recording."""
-        table = self.sides.table
+        table = with_seeds(self.sides.table)
         if table.balises is None:
             return None, None
         layout = make_layout(table.balises, table.start, table.stop, self.scenario.folder, self.scenario.where)

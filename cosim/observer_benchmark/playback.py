@@ -185,6 +185,7 @@ def playback_scenario(
         "start": table.start,
         "stop": table.stop,
         "step": table.step,
+        "seed": table.seed,
         "certificates": "ignore",
         "components": components | {name: _table(observer)},
         "connections": [connection(link, f"{name}.{signal}") for signal, link in sources.items()],

@@ -23,6 +23,7 @@ from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
 from cosim.scenario.save import plain
 from fmus.versions import versions
+from plant_models.hybrid.noise import RUN_SEED
 from plant_models.user_file import names_code
 
 FILES_UP_TO = 50e6
@@ -175,8 +176,9 @@ def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summar
 
 
 def _seeds(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Every seed that the scenario gives; those it leaves to their defaults are in the versions of the packages."""
-    seeds = {f"balises.{k}": v for k, v in data.get("balises", {}).items() if "seed" in k}
+    """The seed of the run, from which all chance follows, and those that the scenario gives beside it."""
+    seeds = {"seed": data.get("seed", RUN_SEED)}
+    seeds |= {f"balises.{k}": v for k, v in data.get("balises", {}).items() if "seed" in k}
     seeds |= {f"network.{k}": v for k, v in data.get("network", {}).items() if "seed" in k}
     for name, component in data["components"].items():
         seeds |= {f"{name}.{k}": v for k, v in component.get("parameters", {}).items() if "seed" in k}

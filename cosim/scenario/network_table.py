@@ -11,7 +11,8 @@ from pydantic import Field, model_validator
 
 from cosim.errors import ScenarioError, nearest
 from cosim.network.settings import PRESETS, NetworkSettings, Node
-from cosim.table import Name, Table
+from cosim.table import Name, OwnSeed, Table
+from plant_models.hybrid.noise import FROM_NAME
 from plant_models.railway.network.protocols import silent_nodes, try_once_discard
 
 CYCLE, PERIOD = "cycle", "period"
@@ -41,7 +42,7 @@ class NetworkTable(Table):
     duplicate_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     sequence: Literal["checked", "ignored"] = "checked"
     receivers: list[Name] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: OwnSeed = FROM_NAME
 
     @model_validator(mode="after")
     def _complete(self) -> NetworkTable:

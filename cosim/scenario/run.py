@@ -60,6 +60,7 @@ from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
 from cosim.scenario.roles import check_roles, inferred_roles, report_spec, signals_to_record, with_roles
 from cosim.scenario.schema import ScenarioTable, step_count
+from cosim.scenario.seeds import component_seed, with_seeds
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import first_summary, judged_summary, run_summary
 from cosim.structure.divergence import explained_failure
@@ -129,7 +130,7 @@ class _Setup:
     """The parts of one run while it is put together; thrown away at its end."""
 
     def __init__(self, table: ScenarioTable, folder: Path, where: str, tell: Warn, building: Warn) -> None:
-        self.table, self.folder, self.where = table, folder, where
+        self.table, self.folder, self.where = with_seeds(table), folder, where
         self.axis = TimeAxis(table.start, table.step, step_count(table.start, table.stop, table.step))
         self.warnings: list[str] = []
         self._tell, self._tell_of_builds = tell, building
@@ -348,7 +349,8 @@ class _Setup:
         table = self.table.components[name]
         if table.filter is not None:
             return {}  # they are those of its FMU, which has taken them
-        return start_values(component, protocol_parameters(table, component, f"components.{name}") | table.parameters)
+        given = protocol_parameters(table, component, f"components.{name}") | table.parameters
+        return start_values(component, given | component_seed(component, table.parameters, self.table.seed))
 
     def _balise_roles(self) -> tuple[list[str], str]:
         balises = self.table.balises

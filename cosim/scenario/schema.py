@@ -29,8 +29,9 @@ from cosim.scenario.tables import (
     ReportTable,
     Tolerance,
 )
-from cosim.table import Name, Table
+from cosim.table import Name, Seed, Table
 from fmus.fmi.standard import TIME_TOLERANCE
+from plant_models.hybrid.noise import RUN_SEED
 
 
 def _expectation(given: Any) -> Expectation:
@@ -63,6 +64,7 @@ class ScenarioTable(Table):
     start: float = 0.0
     stop: float
     step: float
+    seed: Seed = RUN_SEED
     tolerance: Tolerance | None = None
     certificates: Literal["warn", "require", "ignore"] = "warn"
     components: dict[Name, ComponentTable]

@@ -37,6 +37,7 @@ def first_summary(name: str, table: ScenarioTable, plan: Plan) -> dict[str, Any]
         "start": table.start,
         "stop": table.stop,
         "step": table.step,
+        "seed": table.seed,
         "order": [s.component.name for s in plan.steps],
         "components": [_component(s.component, table.components[s.component.name]) for s in plan.steps],
         "connections": [str(item) for item in table.connections],

@@ -12,8 +12,9 @@ from cosim.errors import nearest
 from cosim.fmu_filter.settings import FilterTable
 from cosim.results.formats.catalogue import FORMATS
 from cosim.scenario.model_name import Model
-from cosim.table import Name, Table
+from cosim.table import Name, OwnSeed, Table
 from fmu_observer.event_protocol import LatePolicy
+from plant_models.hybrid.noise import FROM_NAME
 
 
 def _start(value: Any) -> Any:
@@ -133,7 +134,7 @@ class BalisesTable(Table):
     positions: list[float] | None = None
     file: str | None = None
     instants: list[float] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: OwnSeed = FROM_NAME
     min_gap: Annotated[float, Field(gt=0.0)] = 0.1
     max_gap: Annotated[float, Field(gt=0.0)] = 0.5
     dropout_after: float = 7.9

@@ -21,6 +21,7 @@ from cosim.scenario.connections import parse_connections
 from cosim.scenario.layouts import make_layout
 from cosim.scenario.models import LATE_PARAMETERS, OWN_PACKAGES, make_system, native_fmu
 from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.seeds import component_seed, with_seeds
 from cosim.scenario.starts import start_values
 from cosim.scenario.tables import ComponentTable
 from cosim.ssp.annotation import DIGEST, digest, write_extras
@@ -32,6 +33,7 @@ from cosim.ssp.reader import READS_BALISES, Reader, is_told_by_counts, make_read
 from cosim.ssp.write import TOOL, Definitions, add_connector, add_parameter, child, root_of, text_of
 from fmu_observer.event_protocol import EventProtocol
 from fmus.pack import check_target, pack_fmu
+from plant_models.hybrid.noise import RUN_SEED
 from plant_models.railway.sensors.balise_reader import BaliseReader
 
 ELEMENT_OF_ARRAY = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
@@ -94,6 +96,7 @@ class _Exporter:
         self.files: dict[str, bytes] = {}
         self.definitions = Definitions()
         self.parts: dict[str, Part] = {}
+        self.seeds: dict[str, dict[str, int]] = {}
 
     def build(self) -> None:
         """All files."""
@@ -134,7 +137,7 @@ class _Exporter:
         """The component that tells the others of balises in a tool that knows of none, where one is needed and can be
         made.
         """
-        balises = self.table.balises
+        balises = with_seeds(self.table).balises
         if balises is None:
             return None
         layout = make_layout(balises, self.table.start, self.table.stop, self.folder, self.where)
@@ -202,7 +205,9 @@ class _Exporter:
         try:
             component = describe_fmu(fmu, name)
             component.configure(table.parameters)
-            start_values(component, table.parameters)
+            seed = component_seed(component, table.parameters, self.table.seed)
+            start_values(component, table.parameters | seed)
+            self.seeds[name] = {} if self.table.seed == RUN_SEED else seed  # else the FMU finds the same by its name
         except CouplingError as error:
             raise ScenarioError(f"{self.where}: {error}") from error
         return component.description
@@ -229,6 +234,7 @@ class _Exporter:
         """The parameter set of a component, or None where it has none."""
         late = {k: getattr(part.table, k) for k in sorted(part.table.model_fields_set & LATE_PARAMETERS)}
         given = {k: v for k, v in late.items() if k in part.interface.variables} | part.table.parameters
+        given |= self.seeds[name]
         if not given:
             return None
         root = root_of("ssv", "ParameterSet", self.version, name=name, generationTool=TOOL)

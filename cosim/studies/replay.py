@@ -6,15 +6,17 @@ The plant does not run: the recorded signals are the inputs. Tuning needs this, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cosim.components.loading import describe_system
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CosimError, nearest
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.models import make_system
+from cosim.scenario.seeds import component_seed
 from fmus.batch.members import Batch
 from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.units import conversion, parse_unit
@@ -51,6 +53,7 @@ class Replay:
         table = _table(outcome, observer)
         self._component = table.components[observer]
         self.system = _system(self._component, observer)
+        self._given = self._component.parameters | self._seed(table.seed)
         self.instants = _instants(outcome, table)
         self._first, self._inputs = _inputs(outcome, table, observer, self.system)
         self._batches: dict[int, Batch] = {}
@@ -110,12 +113,16 @@ class Replay:
         signals, known = self.system.parameter_signals, scalar_names(self.system.parameter_signals)
         values = dict(zip(known, map(float, self.system.start_parameters(self._component.preset)), strict=True))
         told = {signal.name: signal.scalar_names for signal in signals} | {name: [name] for name in known}
-        for name, given in self._component.parameters.items():
+        for name, given in self._given.items():
             if name in told:
                 values |= zip(told[name], np.broadcast_to(np.asarray(given, float), len(told[name])), strict=True)
         return values
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _seed(self, run_seed: int) -> dict[str, Any]:
+        described = describe_system(self.system, self.name, 3, self._component.preset)
+        return component_seed(described, self._component.parameters, run_seed)
 
     def _moved(self, late: Mapping[str, int]) -> dict[str, np.ndarray]:
         """The inputs with some of them later; at an end the value there stays."""
@@ -137,7 +144,7 @@ class Replay:
             self._batches = {members: Batch(self.system, members, self._component.preset)}
         batch = self._batches[members]
         batch.reset()
-        for name, value in self._component.parameters.items():
+        for name, value in self._given.items():
             batch.set(name, np.asarray(value, dtype=float))
         return batch
 

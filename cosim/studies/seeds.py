@@ -1,4 +1,4 @@
-"""Studies: one scenario over several balise seeds, medians and quartiles of the errors, beside published numbers.
+"""Studies: one scenario over several seeds, medians and quartiles of the errors, beside published numbers.
 
 Of each seed only its row is kept, so memory does not grow with the number of runs.
 """
@@ -30,7 +30,7 @@ class SeedRow:
     """What one seed gave.
 
     Args:
-        seed: of the balises. errors: (observer, phase) -> maximal speed error [m/s]; not of phases that the run did not
+        seed: of the run. errors: (observer, phase) -> maximal speed error [m/s]; not of phases that the run did not
             reach. failure: why it did not reach its end, or None.
     """
 
@@ -107,7 +107,7 @@ class SeedStudy:
         rows = [["observer", "phase", "quartile", "median", "quartile", "published", "independent"]]
         for observer, phase, *sizes in (row.values() for row in self.rows()):
             rows.append([observer, phase, *(error_number(size) for size in sizes)])
-        head = f"Maximal speed error over {len(self.seeds)} balise seeds [m/s]"
+        head = f"Maximal speed error over {len(self.seeds)} seeds [m/s]"
         failed = [f"seed {seed} failed: {why}" for seed, why in self.failures.items()]
         return "\n".join([head, *text_table(rows, left=(0, 1)), *failed])
 
@@ -122,10 +122,10 @@ def seed_study(
     tell: Callable[[int, int], None] | None = None,
     done: Callable[[SeedRow], None] | None = None,
 ) -> SeedStudy:
-    """Run a scenario once for each balise seed. One that fails is kept as a failure and does not stop the others.
+    """Run a scenario once for each seed. One that fails is kept as a failure and does not stop the others.
 
     Args:
-        scenario: with a balise layout that depends on `balises.seed`.
+        scenario: that leaves something to chance.
         seeds: seeds to run.
         tell: called with the number done and the number in all.
         done: called with the row of each seed as soon as it is there.
@@ -134,12 +134,12 @@ def seed_study(
         The study.
 
     Raises:
-        ScenarioError: there are no seeds, or no balises. RunError: every seed failed.
+        ScenarioError: there are no seeds. RunError: every seed failed.
     """
     chosen = list(seeds)
     spec: ReportSpec | None = None
     rows: list[SeedRow] = []
-    sweep = scenario.copy().set("certificates", "ignore").vary({"balises.seed": chosen})
+    sweep = scenario.copy().set("certificates", "ignore").vary({"seed": chosen})
     # what is doubtful is said once, by the scenario's own run, and not for every seed
     for run in sweep.each(progress=tell):
         spec = spec or (None if run.outcome is None else run.outcome.spec)

@@ -18,7 +18,7 @@ from cosim.tuning.costs import Cost, make_cost
 from cosim.tuning.evaluation import Evaluator, closing
 from cosim.tuning.parameters import Bounds, Tunable, tunable
 from cosim.tuning.progress import Progress
-from cosim.tuning.seeds import seed_settings, with_seed
+from cosim.tuning.seeds import drawn, with_seed
 from cosim.tuning.study import Study
 from cosim.tuning.tuning_files import write_tuning
 from cosim.tuning.tuning_result import Tuning
@@ -33,7 +33,6 @@ def tune(
     cost: str | Cost | Callable[[Outcome], float] = "state",
     seeds: Sequence[int] = (0,),
     judge: Sequence[int] = (),
-    seed_names: Sequence[str] | None = None,
     iterations: int = 20,
     searches: int = 1,
     options: Mapping[str, Any] | None = None,
@@ -53,8 +52,8 @@ def tune(
             ``component.parameter``, or one of `observer`; ``process_covariance[1,1]`` for an entry of a diagonal.
         observer: component that is tuned, or a shipped observer that joins the scenario for it. method: one of
             `OPTIMISERS`, such as ``bbo`` or ``cma``. cost: see `cosim.tuning.costs.make_cost`.
-        seeds: for training; each moves every seed of the scenario by so much, 0 is the scenario as it is.
-        judge: seeds that compare before and after at the end. seed_names: settings that they move; None for all.
+        seeds: for training; each moves the seed of the scenario by so much, 0 is the scenario as it is.
+        judge: seeds that compare before and after at the end.
         iterations: populations after the first one. options: of the optimiser, such as ``{"population": 30}``.
         searches: how many times it is searched, with optimiser seeds 0, 1, ...; the best counts, all are told.
         workers: processes at a time; a script that uses more than 1 needs ``if __name__ == "__main__":``.
@@ -74,7 +73,7 @@ def tune(
     asked, (training, judging) = tunable(scenario, observer, parameters), _seeds(seeds, judge)
     judged_by = make_cost(cost, observer, _outputs(scenario, observer))
     with _folder(directory, resume) as folder:
-        benches, how = _benches(scenario, observer, asked, (*training, *judging), seed_names, whole_runs)
+        benches, how = _benches(scenario, observer, asked, (*training, *judging), whole_runs)
         evaluator = Evaluator(benches, asked, judged_by, folder, workers=workers, resume=resume)
         more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": progress}
         with closing(evaluator):
@@ -90,16 +89,16 @@ def _benches(
     observer: str | None,
     asked: Tunable,
     seeds: Sequence[int],
-    seed_names: Sequence[str] | None,
     whole_runs: bool,
 ) -> tuple[dict[int, Seeded], str]:
     """What candidates run with each seed, and in words how they do."""
-    heads, drawn = sorted({name.partition(".")[0] for name in asked.space.names}), seed_settings(scenario, seed_names)
-    if len(seeds) > 1 and not drawn:
+    heads = sorted({name.partition(".")[0] for name in asked.space.names})
+    if len(seeds) > 1 and not drawn(scenario):
         raise ScenarioError(
-            f"{scenario.where}: nothing in this scenario draws from a seed; give one training seed only."
+            f"{scenario.where}: nothing in this scenario draws from its seed; leave out the seeds of components, or "
+            "give one training seed only."
         )
-    found = {seed: seeded(with_seed(scenario, drawn, seed), seed, observer, heads, whole_runs) for seed in seeds}
+    found = {seed: seeded(with_seed(scenario, seed), seed, observer, heads, whole_runs) for seed in seeds}
     if found[seeds[0]].sides is not None:
         return found, "each beside the recorded plant side of its seed"
     return found, f"of the whole scenario: {'as asked for' if whole_runs else why_whole(scenario, observer, heads)}"

@@ -34,16 +34,23 @@ class Instance:
         counts_events: whether events are announced by counts or by clocks.
         protocol: start values of the parameters that decide about late events.
         preset: preset to start from.
+        name: of the instance.
 
     Raises:
         ValueError: the preset is unknown.
     """
 
     def __init__(
-        self, system: HybridSystem, token: str, counts_events: bool, protocol: EventProtocol, preset: str | None = None
+        self,
+        system: HybridSystem,
+        token: str,
+        counts_events: bool,
+        protocol: EventProtocol,
+        preset: str | None = None,
+        name: str | None = None,
     ) -> None:
         self.system, self.preset = system, preset
-        self.runtime = Runtime(system)
+        self.runtime = Runtime(system, name=name)
         self.events = Events(system, self.runtime, protocol)
         self.variables = Variables(system, self.runtime, self.events, counts_events)
         self._timing = Timing(system)

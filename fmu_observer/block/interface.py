@@ -80,7 +80,7 @@ class FMIInterface:
     Args:
         system: the hybrid system to present.
         preset: preset whose values are the start values.
-        instance_name: name used in messages; the system's name by default.
+        instance_name: name, in messages; its noise follows from it where no seed is given; the system's by default.
         late_policy: what to do with events stamped in the past: ``replay``, ``reject`` or ``late``; the start value of
             the parameter of that name. None for what the system declares.
         replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter of that name.
@@ -115,7 +115,7 @@ class FMIInterface:
         self.guid: str = self.model_description.instantiationToken
         self.instanceName = instance_name or system.name
         self.modelIdentifier = system.name
-        self.instance = Instance(system, self.guid, counts_events, protocol, preset)
+        self.instance = Instance(system, self.guid, counts_events, protocol, preset, self.instanceName)
         self._counts_events = counts_events
         self._sensitivity = Sensitivity(system, self.model_description.modelVariables)
         self._folder: str | None = None

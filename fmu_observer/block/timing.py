@@ -12,13 +12,12 @@ from math import inf, isfinite, ulp
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, Snapshot, scalar_names
+from plant_models.hybrid.noise import is_seed
 from plant_models.hybrid.requirements import unfulfilled
 from plant_models.hybrid.runtime import GRID_TOLERANCE
 
 MOST_INTERNAL_STEPS = 1e9
 """Internal steps in one communication step, and instants of one periodic event, as in the exported FMU."""
-
-LARGEST_WHOLE = 2**53
 
 
 class Timing:
@@ -74,7 +73,7 @@ class Timing:
             return False
         if not all(offset is None or isfinite(p[offset]) for _, offset in self._periodic):
             return False
-        if self._seed is not None and not 0.0 <= p[self._seed] < LARGEST_WHOLE:
+        if self._seed is not None and not is_seed(p[self._seed]):
             return False
         if unfulfilled(self._system, snapshot.memory[self._offset :]) is not None:
             return False

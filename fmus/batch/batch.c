@@ -105,7 +105,9 @@ EXPORT Batch *batch_create(int64_t count) {
     batch->before = malloc(runtime_memory_length() * sizeof(double));
     bool whole = batch->members != NULL && batch->before != NULL;
     for (int64_t i = 0; whole && i < count; i++) {
-        Instance *instance = batch->members[i].instance = instance_create("", &batch_face, false);
+        char name[256]; /* members draw numbers of their own where nobody gives them a seed */
+        snprintf(name, sizeof name, "%.200s[%lld]", model.name, (long long)i);
+        Instance *instance = batch->members[i].instance = instance_create(name, &batch_face, false);
         whole = instance != NULL;
         if (whole)
             instance->environment = batch;

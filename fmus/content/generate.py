@@ -274,6 +274,7 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "parameters": len(parameters),
         "internal_step": parameters.index("internal_step"),
         "seed": parameters.index("seed") if "seed" in parameters else -1,
+        "purpose": int(system.purpose),
         "integer_work": max((f.sz_iw() for f in functions), default=0),
         "real_work": max((f.sz_w() for f in functions), default=0),
         "start_x": "start_x",

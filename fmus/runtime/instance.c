@@ -116,6 +116,7 @@ PRIVATE Status instance_start(Instance *instance, Mode next) {
     const Requirement *unfulfilled = runtime_unfulfilled(&instance->runtime, true);
     if (unfulfilled != NULL)
         return not_fulfilled(instance, unfulfilled);
+    runtime_choose_seed(&instance->runtime, instance->name);
     int refused = runtime_start(&instance->runtime, instance->start_time);
     if (refused >= 0)
         return cannot_run(instance, parameter_name(refused), instance->runtime.p[refused]);

@@ -6,6 +6,7 @@
 #define MODEL_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "private.h"
 
@@ -94,6 +95,7 @@ typedef struct {
     int parameters;    /* length of p */
     int internal_step; /* position in p */
     int seed;          /* position in p, or -1 where there is no noise */
+    uint32_t purpose;  /* of what is drawn, see `Purpose` in `noise.py` */
     int integer_work;  /* length of iw */
     int real_work;     /* length of w */
     const double *start_x;

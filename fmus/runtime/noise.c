@@ -25,10 +25,19 @@ static double uniform(uint32_t high, uint32_t low) {
     return ((high >> 5) * 67108864.0 + (low >> 6) + 0.5) * 0x1p-53;
 }
 
-PRIVATE double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index) {
-    uint32_t word[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)signal, 0};
+PRIVATE double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index, uint32_t purpose) {
+    uint32_t word[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)signal, purpose};
     noise_philox4x32(word, (uint32_t)seed, (uint32_t)(seed >> 32));
     double first = uniform(word[0], word[1]);
     double second = uniform(word[2], word[3]);
     return sqrt(-2.0 * log(first)) * cos(2.0 * PI * second);
+}
+
+PRIVATE double noise_seed_of(uint64_t run_seed, const char *name) {
+    uint64_t hashed = UINT64_C(0xCBF29CE484222325); /* FNV-1a (Fowler, Noll, Vo) */
+    for (const char *byte = name; *byte != '\0'; byte++)
+        hashed = (hashed ^ (unsigned char)*byte) * UINT64_C(0x100000001B3);
+    uint32_t word[4] = {(uint32_t)hashed, (uint32_t)(hashed >> 32), (uint32_t)run_seed, (uint32_t)(run_seed >> 32)};
+    noise_philox4x32(word, UINT32_C(0x73656564), 0);
+    return (double)((uint64_t)(word[0] >> 5) << 26 | word[1] >> 6);
 }

@@ -215,7 +215,7 @@ static void draw_noises(Runtime *runtime, int event, int position) {
     uint64_t seed = model.seed < 0 ? 0 : (uint64_t)runtime->p[model.seed];
     for (int j = 0; j < model.periodic[event].noises; j++) {
         uint64_t signal = (uint64_t)(position - model.noise_offset + j);
-        runtime->u[position + j] = noise_standard_normal(seed, signal, (uint64_t)runtime->ticks[event]);
+        runtime->u[position + j] = noise_standard_normal(seed, signal, (uint64_t)runtime->ticks[event], model.purpose);
     }
 }
 
@@ -250,6 +250,15 @@ PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime, bool star
     return NULL;
 }
 
+static bool is_seed(double value) {
+    return value >= 0.0 && value < LARGEST_WHOLE && value == floor(value);
+}
+
+PRIVATE void runtime_choose_seed(Runtime *runtime, const char *name) {
+    if (model.seed >= 0 && runtime->p[model.seed] == SEED_FROM_NAME)
+        runtime->p[model.seed] = noise_seed_of(RUN_SEED, name);
+}
+
 PRIVATE int runtime_start(Runtime *runtime, double t0) {
     if (!is_positive(runtime->p[model.internal_step]))
         return model.internal_step;
@@ -263,7 +272,7 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
         if (!isfinite(runtime->offsets[i]))
             return offset;
     }
-    if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
+    if (model.seed >= 0 && !is_seed(runtime->p[model.seed]))
         return model.seed;
     runtime->clock.t = runtime->clock.t0 = t0;
     runtime->clock.h = runtime->p[model.internal_step];
@@ -375,7 +384,7 @@ static bool timing_is_sane(const Runtime *runtime) {
             return false;
     if (runtime_unfulfilled(runtime, false) != NULL)
         return false;
-    if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
+    if (model.seed >= 0 && !is_seed(runtime->p[model.seed]))
         return false;
     bool horizon = *runtime->horizon >= 0.0 && isfinite(*runtime->horizon);
     return horizon && runtime_count_steps(runtime, runtime->clock.t) <= MOST_INTERNAL_STEPS;

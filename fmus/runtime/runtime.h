@@ -12,6 +12,8 @@
 
 #define STAMP_NOW (-1e30)  /* a stamp of this, or less, means: at the current time */
 #define QUEUE_CAPACITY 64  /* events waiting at once, as in the Python block */
+#define SEED_FROM_NAME (-1.0) /* in place of a seed: it follows from the instance name */
+#define RUN_SEED 0            /* of a run whose master knows of none, as in `noise.py` */
 #define LARGEST_WHOLE 0x1p53 /* whole numbers below are exact */
 #define MOST_INTERNAL_STEPS 1e9 /* in one communication step, and instants of one periodic event, as in the Python block */
 
@@ -66,8 +68,12 @@ PRIVATE void runtime_reset(Runtime *runtime);
 PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime, bool starting);
 
 /* Begin at t0 [s], fire the periodic events due there, then the communication events. Returns -1, or the position in p of a
-   parameter with which time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */
+   parameter with which time cannot run: a step or period that is not positive, an offset that is not finite, a seed that is no whole number in [0, 2^53). */
 PRIVATE int runtime_start(Runtime *runtime, double t0);
+
+/* Before the start: a seed that nobody gave follows from the instance name. What is drawn then follows from the parameter alone, which
+   is saved and restored with the others. */
+PRIVATE void runtime_choose_seed(Runtime *runtime, const char *name);
 
 /* Integrate to t_end [s] and fire the periodic events on the way and at the end. */
 PRIVATE void runtime_advance(Runtime *runtime, double t_end);

@@ -14,13 +14,12 @@ import numpy as np
 from plant_models.hybrid.event import USED
 from plant_models.hybrid.integration import effective_flow
 from plant_models.hybrid.kernel import Kernel, make_kernel
-from plant_models.hybrid.noise import standard_normal
+from plant_models.hybrid.noise import FROM_NAME, RUN_SEED, SEED_EXPECTED, is_seed, seed_of, standard_normal
 from plant_models.hybrid.requirements import unfulfilled
 from plant_models.hybrid.signal import scalar_names, width
 from plant_models.hybrid.system import HybridSystem
 
 GRID_TOLERANCE = 1e-9  # of an internal step: closer to a grid point than this is on it
-LARGEST_SEED = 2.0**53  # whole numbers below are exact
 
 
 @dataclass(frozen=True)
@@ -47,10 +46,12 @@ class Runtime:
     Args:
         system: the hybrid system.
         kernel: how it is evaluated; by default the fastest the system allows.
+        name: of the instance, from which its noise follows where no seed is given; the system's name by default.
     """
 
-    def __init__(self, system: HybridSystem, kernel: Kernel | None = None) -> None:
+    def __init__(self, system: HybridSystem, kernel: Kernel | None = None, name: str | None = None) -> None:
         self.system = system
+        self.name = name or system.name
         self._kernel = kernel if kernel is not None else make_kernel(system)
         self.x, self.u, self.p, self.y = self._kernel.x, self._kernel.u, self._kernel.p, self._kernel.y
         self.memory = self._kernel.memory
@@ -77,6 +78,7 @@ class Runtime:
             ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed; or
                 parameters or start values do not fulfil what the system requires.
         """
+        self._choose_seed()
         self._check_timing()
         self._check_requirements()
         self.t = self.t0 = t0
@@ -147,6 +149,11 @@ class Runtime:
     def _timing(self, name: str | None) -> float:
         return 0.0 if name is None else float(self.p[self._parameter_names.index(name)])
 
+    def _choose_seed(self) -> None:
+        """What is drawn follows from the parameter alone, which is saved and restored with the others."""
+        if self.system.noises and self._timing("seed") == FROM_NAME:
+            self.p[self._parameter_names.index("seed")] = seed_of(RUN_SEED, self.name)
+
     def _check_timing(self) -> None:
         for name in ("internal_step", *(event.period for event in self.system.periodic_events)):
             if not 0.0 < self._timing(name) < inf:
@@ -154,8 +161,8 @@ class Runtime:
         for event in self.system.periodic_events:
             if event.offset is not None and not isfinite(self._timing(event.offset)):
                 raise ValueError(self._illegal(event.offset, "a finite number of seconds"))
-        if self.system.noises and not 0.0 <= self._timing("seed") < LARGEST_SEED:
-            raise ValueError(self._illegal("seed", "a whole number from 0 to 2**53"))
+        if self.system.noises and not is_seed(self._timing("seed")):
+            raise ValueError(self._illegal("seed", f"{SEED_EXPECTED}, or {FROM_NAME} where it follows from the name"))
 
     def _check_requirements(self) -> None:
         broken = unfulfilled(self.system, self.p, self.x)
@@ -188,8 +195,8 @@ class Runtime:
         for i, event in enumerate(self.system.periodic_events):
             if self._instant(i) <= self.t + self._tolerance(self.t):
                 for j in range(width(event.noises)):
-                    signal = position - self._noise_offset + j
-                    self.u[position + j] = standard_normal(int(self._timing("seed")), signal, self.ticks[i])
+                    signal, seed = position - self._noise_offset + j, int(self._timing("seed"))
+                    self.u[position + j] = standard_normal(seed, signal, self.ticks[i], self.system.purpose)
                 self._kernel.jump(event.name, self.t)
                 self.ticks[i] += 1
             position += width(event.noises)

@@ -18,6 +18,7 @@ import numpy as np
 from plant_models.hybrid.declarations import check_declarations
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.missing import MISSED_SAMPLES, is_there, or_else
+from plant_models.hybrid.noise import FROM_NAME, SEED_LIMIT, Purpose
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import Signal, memory, parameter, width
 
@@ -75,7 +76,9 @@ class HybridSystem:
         stamp, to be rejected, or, for equations that count with the delay, to act when it arrives (``late``).
     12. Measurements that an event reads are its `samples`. They become signals that can be missing, and the memory
         `MISSED` is put behind all states, which counts them; `jump` neither gets nor returns it.
-    13. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    13. `purpose` is what its noises are drawn for: two systems of different purpose draw independently even from the
+        same seed.
+    14. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -95,6 +98,7 @@ class HybridSystem:
     method: Method = "rk4"
     late_policy: Literal["replay", "reject", "late"] = "replay"
     internal_step: float = 1e-3
+    purpose: Purpose = Purpose.NOISE
     traceable: bool = True
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
 
@@ -210,7 +214,8 @@ class HybridSystem:
         step = parameter(
             "internal_step", "s", self.internal_step, f"Internal step of the {self.method} integrator", min=1e-9
         )
-        seed = parameter("seed", "1", 0.0, "Seed of the noise, a whole number", min=0.0)
+        text = "Seed of the noise, a whole number; -1: it follows from the instance name"
+        seed = parameter("seed", "1", FROM_NAME, text, min=FROM_NAME, max=SEED_LIMIT - 1)
         return (*self.parameters, step, *((seed,) if self.noises else ()))
 
     def unpack_inputs(self, values: Array, held_switches: Array | None = None) -> Any:

@@ -18,6 +18,7 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
+from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -59,6 +60,7 @@ class SignalFault(HybridSystem):
     description = "Faults of any signal: stuck, gain, offset, drift, ramped, lost samples"
     source = "Omar 2012, section 7.4, (7.6.12)"
     internal_step = 1e-2  # nothing flows
+    purpose = Purpose.FAULTS
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "channels": range(1, 65),
         "fault_count": range(1, 65),

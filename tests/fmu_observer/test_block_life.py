@@ -244,7 +244,8 @@ def test_a_start_time_is_a_finite_number(version: int, start_time: float) -> Non
         ("period", 0.0),
         ("period", float("nan")),
         ("offset", float("inf")),
-        ("seed", -1.0),
+        ("seed", -2.0),
+        ("seed", 1.5),
         ("seed", 2.0**53),
     ],
 )

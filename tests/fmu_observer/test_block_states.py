@@ -417,7 +417,14 @@ def test_reset_and_instantiate_return_to_the_preset_and_forget_active_clocks() -
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("internal_step", 0.0), ("internal_step", 1e300), ("period", -1.0), ("offset", -1e300), ("seed", -1.0)],
+    [
+        ("internal_step", 0.0),
+        ("internal_step", 1e300),
+        ("period", -1.0),
+        ("offset", -1e300),
+        ("seed", -1.0),
+        ("seed", 0.5),
+    ],
 )
 def test_a_state_with_which_time_cannot_run_is_refused(name: str, value: float) -> None:
     driven = _waiting()

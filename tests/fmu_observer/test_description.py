@@ -48,7 +48,7 @@ TABLE = [
     ("period", "parameter", "fixed", "exact", "s", 0.07),
     ("offset", "parameter", "fixed", "exact", "s", 0.013),
     ("internal_step", "parameter", "fixed", "exact", "s", 0.01),
-    ("seed", "parameter", "fixed", "exact", None, 0.0),
+    ("seed", "parameter", "fixed", "exact", None, -1.0),
 ]
 OUTCOMES = ("accepted", "replayed", "late", "rejected", "lost", "doubted", "ignored")
 EVENTS = {

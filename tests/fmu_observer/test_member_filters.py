@@ -138,7 +138,9 @@ def test_weights_survive_a_measurement_far_from_all_particles() -> None:
 
 @pytest.mark.parametrize("filter_class", [EnsembleKalmanFilter, ParticleFilter])
 def test_as_systems_they_follow_the_kalman_filter(filter_class: type) -> None:
-    """Of the linear pendulum, 50 members, from the fifth sample on; errors in standard deviations of the filter."""
+    """Of the linear pendulum, 50 members, from the fifth sample on; errors in standard deviations of the filter,
+    medians over nine seeds: of 30 the largest error of the particles was 0.6 to 4.4, above 1.5 in 8.
+    """
     count, A, B = 40, *zero_order_hold(linear_pendulum().A, linear_pendulum().B, 0.1)
     torques, random = np.sin(0.37 * np.arange(count)), np.random.default_rng(1)
     angles = 0.3 * np.cos(0.1 * np.arange(count + 1)) + 0.1 * random.normal(size=count + 1)
@@ -154,12 +156,12 @@ def test_as_systems_they_follow_the_kalman_filter(filter_class: type) -> None:
     )
     told = {f"process_covariance[{i + 1}]": float(v) for i, v in enumerate(noise.ravel())}
     told["measurement_covariance[1]"] = 0.01
-    found = sampled_run(filter_class("linear_pendulum", 50), torques, angles, 0.1, **told)
-    deviations = np.sqrt(np.einsum("kii->ki", exact.covariances))[5:]
-    error = np.abs(found[5:, :2] - exact.estimates[5:]) / deviations
-    assert error.max() < 1.5
-    assert error.mean() < 0.6  # sampling errors of some 20 effective members, carried from sample to sample
-    assert (found[5:, 3:5] / deviations).mean() == pytest.approx(1.0, abs=0.25)
+    system, deviations = filter_class("linear_pendulum", 50), np.sqrt(np.einsum("kii->ki", exact.covariances))[5:]
+    found = np.array([sampled_run(system, torques, angles, 0.1, **told, seed=seed)[5:] for seed in range(9)])
+    error = np.abs(found[:, :, :2] - exact.estimates[5:]) / deviations
+    assert np.median(error.max(axis=(1, 2))) < 1.5
+    assert np.median(error.mean(axis=(1, 2))) < 0.6  # sampling errors of some 20 effective members, carried on
+    assert np.median((found[:, :, 3:5] / deviations).mean(axis=(1, 2))) == pytest.approx(1.0, abs=0.25)
 
 
 def test_too_many_members_are_refused() -> None:

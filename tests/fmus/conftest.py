@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import Exchange, description_of
+from exchange_importer import INSTANCE, Exchange, description_of
 from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
@@ -340,7 +340,7 @@ class Component:
             "guid": self.description.guid,
             "unzipDirectory": str(folder),
             "modelIdentifier": self.description.coSimulation.modelIdentifier,
-            "instanceName": "component",
+            "instanceName": INSTANCE,
         }
         self.slave: Any = FMU2Slave(**identity) if self.version == 2 else FMU3Slave(**identity)
         self.early_return = False
@@ -454,7 +454,7 @@ class Reference:
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
-        self.runtime = Runtime(system)
+        self.runtime = Runtime(system, name=INSTANCE)
         self.inputs = {name: i for i, name in enumerate(scalar_names(system.input_signals))}
         self.parameters = {name: i for i, name in enumerate(scalar_names(system.parameter_signals))}
         self.states = {name: i for i, name in enumerate(scalar_names(system.states))}

@@ -22,6 +22,9 @@ from fmpy.fmi3 import FMU3Model
 from fmpy.model_description import ModelDescription
 from scipy.integrate import DOP853, RK45, Radau
 
+INSTANCE = "component"
+"""Name of every instance, from which its noise follows where a test gives no seed."""
+
 SOLVERS: dict[str, Any] = {"DOP853": DOP853, "RK45": RK45, "Radau": Radau}
 GUESSES = 4
 """Points inside a solver step at which the indicators are looked at too, so that two changes are not taken for none."""
@@ -65,7 +68,7 @@ class Exchange:
             "guid": self.description.guid,
             "unzipDirectory": str(folder),
             "modelIdentifier": self.description.modelExchange.modelIdentifier,
-            "instanceName": "model",
+            "instanceName": INSTANCE,
         }
         self.model: Any = FMU2Model(**identity) if self.version == 2 else FMU3Model(**identity)
         self._x, self._dx, self._z = np.zeros(self.nx), np.zeros(self.nx), np.zeros(self.nz)

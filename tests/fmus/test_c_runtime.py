@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 from collections.abc import Callable
-from ctypes import CDLL, POINTER, c_double, c_uint32, c_uint64
+from ctypes import CDLL, POINTER, c_char_p, c_double, c_uint32, c_uint64
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from fmus.build import plan_fmu, runtime_sources
 from fmus.toolchain.compile import compile_library, find_compiler, header_folder
 from plant_models.hybrid import HybridSystem
-from plant_models.hybrid.noise import philox4x32, standard_normal
+from plant_models.hybrid.noise import Purpose, is_seed, philox4x32, seed_of, standard_normal
 
 pytestmark = pytest.mark.compiler
 
@@ -54,7 +54,9 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Any:
     subprocess.run(command, cwd=folder, check=True)
     library = CDLL(str(folder / "noise.so"))
     library.noise_standard_normal.restype = c_double
-    library.noise_standard_normal.argtypes = [c_uint64] * 3
+    library.noise_standard_normal.argtypes = [c_uint64, c_uint64, c_uint64, c_uint32]
+    library.noise_seed_of.restype = c_double
+    library.noise_seed_of.argtypes = [c_uint64, c_char_p]
     library.noise_philox4x32.argtypes = [POINTER(c_uint32), c_uint32, c_uint32]
     library.noise_philox4x32.restype = None
     return library
@@ -78,9 +80,16 @@ def test_philox_is_that_of_python(noise: Any, counter: tuple[int, int, int, int]
     assert _philox(noise, counter, key) == philox4x32(counter, key)
 
 
-@given(st.integers(0, 2**53 - 1), st.integers(0, 100), st.integers(0, 2**53))
-def test_normal_numbers_are_those_of_python(noise: Any, seed: int, signal: int, index: int) -> None:
-    assert noise.noise_standard_normal(seed, signal, index) == standard_normal(seed, signal, index)
+@given(st.integers(0, 2**53 - 1), st.integers(0, 100), st.integers(0, 2**53), st.sampled_from(Purpose))
+def test_normal_numbers_are_those_of_python(noise: Any, seed: int, signal: int, index: int, purpose: Purpose) -> None:
+    assert noise.noise_standard_normal(seed, signal, index, purpose) == standard_normal(seed, signal, index, purpose)
+
+
+@given(st.integers(0, 2**53 - 1), st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"])))
+def test_the_seed_of_a_name_is_that_of_python(noise: Any, run_seed: int, name: str) -> None:
+    found = seed_of(run_seed, name)
+    assert noise.noise_seed_of(run_seed, name.encode()) == found
+    assert is_seed(found)
 
 
 def _write_sources(system: HybridSystem, version: Any, folder: Path) -> list[str]:

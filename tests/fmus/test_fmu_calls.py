@@ -105,7 +105,8 @@ def test_impossible_timing_is_refused_at_initialisation(version: int, component:
         ("internal_step", 0.0),
         ("period", -1.0),
         ("slow_offset", math.inf),
-        ("seed", -1.0),
+        ("seed", -2.0),
+        ("seed", 0.5),
         ("internal_step", math.nan),
     ):
         made = component("sampler", version)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exchange_importer import INSTANCE
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from hypothesis import HealthCheck, given, settings
@@ -180,7 +181,7 @@ def early(component: Callable[..., Any], reference: Callable[[str], Any]) -> Cal
     def make(name: str, is_block: bool) -> Any:
         made = component(name, 3)
         made.slave.freeInstance()
-        made.slave = make_block(reference(name).system, 3) if is_block else _another(made.slave)
+        made.slave = make_block(reference(name).system, 3, instance_name=INSTANCE) if is_block else _another(made.slave)
         made.early_return = True
         made.instantiate()
         return made

@@ -44,7 +44,7 @@ def loaded(fmu: Path, tmp_path: Path) -> Iterator[Loaded]:
 
 
 def block() -> Any:
-    made = make_block(Gatekeeper(), 2)
+    made = make_block(Gatekeeper(), 2, instance_name="one")
     made.instantiate()
     return made
 

@@ -176,7 +176,9 @@ def test_payload_is_read_at_its_event_only(reads: str, function: str) -> None:
         ("period", -0.1, "a positive number of seconds"),
         ("period", float("inf"), "a positive number of seconds"),
         ("offset", float("nan"), "a finite number of seconds"),
-        ("seed", -1.0, "a whole number"),
+        ("seed", -2.0, "a whole number"),
+        ("seed", 1.5, "a whole number"),
+        ("seed", 2.0**53, "a whole number"),
         ("seed", float("nan"), "a whole number"),
     ],
 )

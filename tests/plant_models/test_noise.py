@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from plant_models.hybrid.noise import philox4x32, standard_normal, uniform_pair
+from plant_models.hybrid.noise import Purpose, philox4x32, seed_of, standard_normal, uniform_pair
 
 FULL = 0xFFFFFFFF
 
@@ -47,9 +47,27 @@ def test_normal_numbers_are_standard_normal_and_uncorrelated() -> None:
 def test_seeds_and_signals_give_independent_streams() -> None:
     streams = np.array(
         [
-            [standard_normal(seed, signal, i) for i in range(4000)]
-            for seed, signal in ((0, 0), (1, 0), (0, 1), (2**40, 0))
+            [standard_normal(seed, signal, i, purpose) for i in range(4000)]
+            for seed, signal, purpose in (
+                *((0, 0, purpose) for purpose in Purpose),
+                *((seed, 0, 0) for seed in (1, 2**40, seed_of(0, "a"), seed_of(0, "b"), seed_of(1, "a"))),
+                (0, 1, 0),
+            )
         ]
     )
     correlation = np.corrcoef(streams) - np.eye(len(streams))
-    assert np.abs(correlation).max() < 4.5 / np.sqrt(4000)  # six pairs: a little more than four standard errors
+    assert np.abs(correlation).max() < 5.0 / np.sqrt(4000)  # 55 pairs: beyond in one of 30 000 sets of streams
+
+
+def test_names_are_hashed_as_fnv_says() -> None:
+    """Vectors of FNV-1a with 64 bits (draft-eastlake-fnv, appendix C): "", "a", "foobar"; the seed is 53 bits of Philox
+    over hash and run seed.
+    """
+    for name, hashed in (("", 0xCBF29CE484222325), ("a", 0xAF63DC4C8601EC8C), ("foobar", 0x85944171F73967E8)):
+        words = philox4x32((hashed & 0xFFFFFFFF, hashed >> 32, 7, 0), (0x73656564, 0))
+        assert seed_of(7, name) == (words[0] >> 5) * 2**26 + (words[1] >> 6)
+
+
+def test_seeds_of_names_and_runs_differ() -> None:
+    names = ["a", "b", "odometer", "odometer_2", "odometer_3", "radar", *(f"m[{i}]" for i in range(500))]
+    assert len({seed_of(run_seed, name) for name in names for run_seed in (0, 1, 2**32, 2**53 - 1)}) == 4 * len(names)

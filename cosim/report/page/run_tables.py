@@ -45,7 +45,7 @@ def expectations_table(judged: list[Judged]) -> Table:
 
 
 def seeds_table(result: Result) -> Table:
-    """Quartiles of the maximal speed errors over several balise seeds.
+    """Quartiles of the maximal speed errors over several seeds.
 
     Args:
         result: the run.

@@ -32,6 +32,7 @@ from plant_models.hybrid import (
     width,
 )
 from plant_models.hybrid.missing import is_there, or_else
+from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -77,6 +78,7 @@ class MemberFilter(HybridSystem):
     """
 
     internal_step = 0.1  # nothing flows between samples
+    purpose = Purpose.MEMBERS
     perturbs: ClassVar[bool] = False
     own_parameters: tuple[Signal, ...] = ()
     own_memory: tuple[Signal, ...] = ()

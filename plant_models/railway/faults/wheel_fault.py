@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, OutputWarning, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -66,6 +67,7 @@ class WheelFault(HybridSystem):
     description = "Wheel that jams and skids, given, drawn or by adhesion: speed in, wheel speed and distance out"
     source = "Aguiar Cota 2019, (2.26)-(2.29), Figs. 2-13 and 2-14; causes and time laws are ours"
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
+    purpose = Purpose.FAULTS
     outputs = (
         output_signal("wheel_speed", "m/s", "Circumferential speed of the wheel", display_unit="km/h"),
         output_signal("wheel_distance", "m", "Distance run by the wheel's rim"),

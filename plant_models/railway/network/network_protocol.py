@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -53,6 +54,7 @@ class NetworkProtocol(HybridSystem):
     description = "Network: signals in, values last received out, one node at a time, delayed"
     source = "Hann 2014, section 1.1.3, (2.3) to (2.7); loss is ours"
     internal_step = 1e-2  # nothing flows
+    purpose = Purpose.NETWORK
     events = (
         PeriodicEvent(
             "transmission",

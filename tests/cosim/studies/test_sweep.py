@@ -202,7 +202,7 @@ def test_the_scenario_is_left_as_it_was() -> None:
 def test_a_study_over_seeds_is_the_sweep_over_them() -> None:
     scenario = small().set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
     study = seed_study(scenario, [3, 5])
-    table = scenario.vary({"balises.seed": [3, 5]}).run().table()
+    table = scenario.vary({"seed": [3, 5]}).run().table()
     assert study.errors["observer", "whole run"] == [row["observer.speed_error_max"] for row in table]
 
 
@@ -211,7 +211,7 @@ def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch:
     whole, run, rows = seed_study(scenario, [3, 5, 7]), Scenario.run, []
 
     def failing(self: Scenario, **arguments: Any) -> Outcome:
-        if arguments["overrides"] == {"balises.seed": 5}:
+        if arguments["overrides"] == {"seed": 5}:
             raise RunError("the train is lost", "train", 0.1)
         return run(self, **arguments)
 
@@ -223,7 +223,7 @@ def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch:
     assert study.failures == {5: "the train is lost"}
     assert [row for row in study.each if row.seed != 5] == [row for row in whole.each if row.seed != 5]
     assert study.errors["observer", "whole run"] == [whole.errors["observer", "whole run"][i] for i in (0, 2)]
-    assert "over 2 balise seeds" in study.text()
+    assert "over 2 seeds" in study.text()
     assert "seed 5 failed: the train is lost" in study.text()
     assert [entry["failure"] for entry in study.to_data()["each"]] == [None, "the train is lost", None]
     assert rows == study.each

@@ -267,7 +267,6 @@ def test_anything_of_a_scenario_is_tuned_by_a_function_of_the_outcome() -> None:
         ({"parameters": {"process_variance[1]": 3.0}}, "expected .low, high."),
         ({"seeds": [0, 1], "judge": [1, 2]}, "Seeds 1 stand among"),
         ({"seeds": []}, "no training seeds"),
-        ({"seed_names": ["motr.seed"]}, "did you mean 'motor.seed'"),
         ({"method": "bob"}, "did you mean bbo"),
         ({"options": {"populaton": 3}}, "populaton"),
         ({"cost": "expectation"}, "say which"),
