@@ -32,6 +32,7 @@ from fmu_observer.observers.train.held_odometer_error import (
     unknown_level,
 )
 from fmu_observer.observers.train.held_odometer_presets import DRAG_SLOPES, HELD_ODOMETER_PRESETS
+from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
@@ -196,13 +197,15 @@ class HeldOdometerObserver(TrainObserver):
         decay = np.where(predicting, x[3] / p.rate_decay_time, 0.0)
         # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
         holding = np.maximum(self.friction(t, x, u, p)[0] - acceleration, 0.0)
+        # At standstill d and d' leave their equations, too: the carried bound is not told there, nor carried on.
+        standing = stands(speed, x[HELD_SPEED], x[HELD_ERROR])
+        drifts = x[3] + p.gain[1] * residual, p.gain[2] * residual - decay
         P = p.lyapunov_matrix
         own = np.sqrt(P[0]) * np.where(speed > 0.0, 0.0, holding) + np.sqrt(P[5]) * np.abs(decay)
         return (
             speed,
             acceleration,
-            x[3] + p.gain[1] * residual,
-            p.gain[2] * residual - decay,
+            *held_disturbance(standing, *drifts, x[3], 1.0 / p.rate_decay_time),
             reading + unknown_level(p) + own - p.bound_decay * x[LEVEL],
             told,
         )

@@ -23,6 +23,7 @@ from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, 
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
@@ -174,7 +175,9 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         innovation = (1.0 - lies) * self._difference(x)
         acceleration = self._free_acceleration(x, u, p) + gain[0] * innovation
         runs_on = 1.0 - lies if self.repaired else 1.0
-        return vector(x[V], acceleration, runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation, x[HELD])
+        drifts = runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation
+        standing = stands(x[V], x[HELD], p.odometer_noise if self.repaired else 0.0)
+        return vector(x[V], acceleration, *held_disturbance(standing, *drifts, x[RATE]), x[HELD])
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
