@@ -29,7 +29,8 @@ from plant_models.hybrid import Signal, input_signal, memory, output_signal, par
 from plant_models.hybrid.system import Array
 
 P, V, D, RATE, WAY = range(5)  # continuous states
-HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 14)
+HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION = range(5, 10)
+BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES, LEAD = range(10, 15)
 SPEEDS = 21  # between the vertices, for the certificate
 HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
@@ -48,6 +49,7 @@ OWN_MEMORY = (
     memory("balise_place", "m", 0.0, "Where it was"),
     memory("balise_reading", "m/s", 0.0, "Odometer then"),
     memory("balises_used", "1", 0.0, "Balises used so far"),
+    memory("onset_lead", "m", 0.0, "Position minus way of the odometer when the last fault began"),
 )
 
 
@@ -252,7 +254,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(BALISES + 1)]
+        own = [x[i] for i in range(LEAD + 1)]
         acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
         now = np.maximum(u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0), 0.0)
         told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
@@ -262,10 +264,13 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
         own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
         own[HELD], own[LAST_D], own[LAST_RATE] = now, own[D], own[RATE]
+        # What may have been the estimate's mistake costs no more than the odometer would have.
+        own[P] = np.where(judged.withdrawn > 0.0, x[WAY] + x[LEAD], x[P])
+        own[LEAD] = np.where(judged.onset > 0.0, x[P] - x[WAY], x[LEAD])
         return vector(*own, *judged.memory)
 
     def _at_balise(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(BALISES + 1)]
+        own = [x[i] for i in range(LEAD + 1)]
         told = Passing(
             t - x[BALISE_TIME],
             u.balise_position - x[BALISE_PLACE],
@@ -281,7 +286,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         own[CORRECTION] = np.where(judged.restart > 0.0, 0.0, x[CORRECTION])
         own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
         own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
-        own[BALISES] = x[BALISES] + 1.0
+        own[BALISES], own[LEAD] = x[BALISES] + 1.0, u.balise_position
         return vector(*own, *judged.memory)
 
     def _difference(self, x: Array) -> Array:
@@ -300,7 +305,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         return (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D]
 
     def _rule_memory(self, x: Array) -> tuple[Array, ...]:
-        return tuple(x[BALISES + 1 + i] for i in range(len(self.rules.memory)))
+        return tuple(x[LEAD + 1 + i] for i in range(len(self.rules.memory)))
 
 
 def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:
