@@ -44,8 +44,8 @@ class CertifiedGap:
     """What the gains are certified for, beside the gaps of the run.
 
     Args:
-        limit: gaps that vary are certified up to here [s], infinite where no limit was found; None where that is not
-            known.
+        limit: gaps that vary are certified up to here [s], or were found stable as far as was looked; infinite where
+            every gap is; None where that is not known.
         expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
             [s].
     """

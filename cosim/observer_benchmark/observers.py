@@ -287,7 +287,7 @@ class _Judge:
             return None  # parameters that cannot be: the run of this observer says so
         if candidate.name not in found:
             return None
-        limit = found[candidate.name]["aperiodic_limit"]
+        limit = found[candidate.name]["certified_up_to"]
         # plain data have None for an infinite limit
         return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
 

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.bounds.formulas import improved_dmo_bound
-from fmu_observer.bounds.gaps import FIRST, growth_over_missing_samples, largest_gap
+from fmu_observer.bounds.gaps import FIRST, HORIZON, growth_over_missing_samples, largest_gap
 from fmu_observer.bounds.worst_case import worst_case
 
+EXACT_HORIZON = 1e3  # [s] to which gaps of the worst case are looked for
 COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
 
 
@@ -137,7 +138,7 @@ class ErrorBounds:
             "carried": self.carried,
         }
         found = {name: largest_gap(bound, limit) for name, bound in bounds.items()}
-        found["exact"] = largest_gap(exact, limit, 1e3, COARSE)
+        found["exact"] = largest_gap(exact, limit, EXACT_HORIZON, COARSE)
         return found
 
     def largest_periods(self, limit: float) -> dict[str, float]:
@@ -155,7 +156,9 @@ class ErrorBounds:
         return {
             "as_printed": largest_gap(self.as_printed, limit),
             "carried": largest_gap(lambda period: self._at_period(period).carried(max(period, FIRST)), limit),
-            "exact": largest_gap(lambda period: self._at_period(period).exact(max(period, FIRST)), limit, 1e3, COARSE),
+            "exact": largest_gap(
+                lambda period: self._at_period(period).exact(max(period, FIRST)), limit, EXACT_HORIZON, COARSE
+            ),
         }
 
     def _at_period(self, period: float) -> ErrorBounds:
@@ -220,7 +223,7 @@ def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:
     ]
     if limit is not None:
         for what, found in (("gap", bounds.largest_gaps(limit)), ("period", bounds.largest_periods(limit))):
-            shown = ", ".join(f"{name.replace('_', ' ')} {_seconds(value)}" for name, value in found.items())
+            shown = ", ".join(f"{name.replace('_', ' ')} {_seconds(name, value)}" for name, value in found.items())
             lines.append(f"Largest {what} that keeps {limit:g} m/s: {shown}")
     lines.append(
         f"as printed, no bound: from the sample on, error there stated as {bounds.sample_error:g}, beta "
@@ -234,7 +237,6 @@ def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:
     return "\n".join(lines)
 
 
-def _seconds(value: float) -> str:
-    if value == inf:
-        return "any"
-    return "none" if value <= 0.0 else f"{value:.4g} s"
+def _seconds(name: str, value: float) -> str:
+    looked = EXACT_HORIZON if name == "exact" else HORIZON
+    return f"> {looked:.4g} s" if value == inf else f"{value:.4g} s"

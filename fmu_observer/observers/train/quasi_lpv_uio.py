@@ -32,7 +32,7 @@ P, V, D, RATE, WAY = range(5)  # continuous states
 HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION = range(5, 10)
 BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES, LEAD = range(10, 15)
 SPEEDS = 21  # between the vertices, for the certificate
-HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
+HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
 HoldChoice = Literal["innovation", "reading"]
@@ -232,10 +232,11 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             stable, longest = sampled
             holds, margin, P = stable.holds, stable.margin, stable.lyapunov_matrix
             constant, radius = stable.spectral_radius < 1.0, stable.spectral_radius
-            note = f"the odometer's period may be up to {longest:.3g} s at a steady speed"
+            reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any looked at, up to {HORIZON:g} s,"
+            note = f"the odometer's period {reach} at a steady speed"
         return Certificate(
             max_gap=max_gap,
-            horizon=max(HORIZON, max_gap),
+            horizon=inf,
             constant_limit=inf if constant else 0.0,
             aperiodic_limit=inf if holds else 0.0,
             spectral_radius=radius,

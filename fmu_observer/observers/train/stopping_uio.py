@@ -49,7 +49,6 @@ HELD_INNOVATION, AT_BALISE, BALISES, DETECTOR, READING, UNCHANGED, HELD = (
     12,
     13,
 )  # indices of the memory
-HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
 _PRINTED_START = {"estimated_speed": 30.0, "disturbance_estimate": -0.91, "disturbance_rate": 0.13}
 
@@ -234,7 +233,7 @@ class StoppingUio(GatedObserver, GapCertified):
             rows = tuple(tuple(map(float, row)) for row in rate @ form @ rate)
         return Certificate(
             max_gap=max_gap,
-            horizon=max(HORIZON, max_gap),
+            horizon=inf,
             constant_limit=inf if stable else 0.0,
             aperiodic_limit=inf if margin > 0.0 else 0.0,
             spectral_radius=radius ** (max_gap / period),
