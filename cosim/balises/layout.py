@@ -1,6 +1,6 @@
 """Layouts: where the balises lie on the track, or at which instants a test places one under the train.
 
-NumPy and the standard library only.
+Knows besides only what a telegram may tell.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.errors import ScenarioError
+from cosim.results.events_file import require_accuracy
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,6 +247,7 @@ def aperiodic(
 def _row_to_balise(path: Path, number: int, line: int, row: dict[str, str], usual: float) -> Balise:
     try:
         accuracy = float(row.get("location_accuracy") or usual)
+        require_accuracy(accuracy)
         return Balise(row.get("identity") or f"B{number}", float(row["position"]), accuracy)
     except (TypeError, ValueError) as error:
         raise ScenarioError(f"Balise list {path}, line {line}: {error}.") from error

@@ -17,7 +17,7 @@ from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import NO_OUTCOMES, Channel, Crossing
 from cosim.components.recording import RecordingComponent
 from cosim.errors import OutputError, ScenarioError
-from cosim.results.events_file import read_events
+from cosim.results.events_file import read_events, require_accuracy
 from cosim.results.folder import EVENTS
 from cosim.results.formats.telegram_csv import holds_telegrams, read_telegrams
 from cosim.results.load import load_result
@@ -46,6 +46,10 @@ class RecordedLayout:
                 raise ScenarioError(
                     f"{self.source}: telegram {number} ({record.identity}): its {what} is not a finite number."
                 )
+            try:
+                require_accuracy(record.location_accuracy)
+            except ValueError as error:
+                raise ScenarioError(f"{self.source}: telegram {number} ({record.identity}): {error}") from error
             if record.delivered_at < record.stamp:
                 raise ScenarioError(
                     f"{self.source}: telegram {number} ({record.identity}) was delivered at {record.delivered_at:g} s, "

@@ -27,6 +27,7 @@ from fmus.fmi.standard import TIME_TOLERANCE
 Row = tuple[float, np.ndarray]
 Snapshot = tuple[Crossing, np.ndarray]
 NO_ROWS: tuple[Row, ...] = ()
+REPEATED = "repeated"
 
 
 class BaliseService:
@@ -39,6 +40,8 @@ class BaliseService:
         odometer: column of the odometer reading that a telegram carries, or None.
         position: column of the plant's position.
 
+    A telegram that is told twice, with the same identity and stamp, counts once: receivers are not told again.
+
     After a run `mailbox` holds what was delivered, missed, and still on its way; `passed` counts the balises passed.
     """
 
@@ -49,6 +52,7 @@ class BaliseService:
         self.odometer, self.position = odometer, position
         self.mailbox: Mailbox[BaliseRecord] = Mailbox()
         self.passed = 0
+        self._told: dict[tuple[str, float], None] = {}  # in the order of delivery
         self._by_name = {r.planned.component.name: r for r in receivers}
         self._false = sorted(channel.false_telegrams, key=lambda f: f.time)
         self._t = self._until = nan
@@ -175,11 +179,14 @@ class BaliseService:
         """What a step changes here."""
         mailbox = list(self.mailbox.waiting), len(self.mailbox.log)
         receivers = [r.save() for r in self.receivers]
-        return mailbox, self.passed, list(self._false), self.localiser.save(), receivers, list(self._ahead)
+        passed = self.passed, len(self._told)
+        return mailbox, passed, list(self._false), self.localiser.save(), receivers, list(self._ahead)
 
     def restore(self, state: Any) -> None:
         """Return to a saved state."""
-        (waiting, logged), self.passed, false, localiser, receivers, ahead = state
+        (waiting, logged), (self.passed, told), false, localiser, receivers, ahead = state
+        while len(self._told) > told:
+            self._told.popitem()
         self._ahead = list(ahead)
         self.mailbox.waiting = list(waiting)
         del self.mailbox.log[logged:]
@@ -222,7 +229,16 @@ class BaliseService:
             self.passed += 1
         while self._false and self._false[0].time <= until + TIME_TOLERANCE:
             self.mailbox.post(self._false_telegram(self._false.pop(0), t, until))
-        return self.mailbox.due(until + TIME_TOLERANCE)
+        return [e for e in self.mailbox.due(until + TIME_TOLERANCE) if not self._is_repeated(e)]
+
+    def _is_repeated(self, telegram: BaliseRecord) -> bool:
+        """Whether it was told before, which is only logged. One of no balise has no identity."""
+        key = telegram.identity, telegram.stamp
+        if telegram.kind == "false" or key not in self._told:
+            self._told[key] = None
+            return False
+        self.mailbox.delivered(telegram, dict.fromkeys(self._by_name, REPEATED))
+        return True
 
     def _false_telegram(self, false: FalseTelegram, t: float, until: float) -> BaliseRecord:
         stamp = max(false.time, t)

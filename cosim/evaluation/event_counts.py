@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cosim.results.result import BaliseRecord
 
-KNOWN_OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "undelivered")
+KNOWN_OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "repeated", "undelivered")
 UNDELIVERED = "undelivered"
 USED = ("accepted", "replayed", "late", "doubted", "told")
 """Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that does not say."""

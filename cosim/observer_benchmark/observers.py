@@ -14,7 +14,6 @@ from cosim.balises.recorded import read_layout
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.evaluation.error_table import error_text
 from cosim.evaluation.numbers import cell
-from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.candidates import Candidate, find_candidates
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
@@ -264,7 +263,7 @@ class _Judge:
         self.outcomes[name] = outcome
         kind = next(c["kind"] for c in outcome.result.summary["components"] if c["name"] == name)
         scores = measured(outcome.result, outcome.spec, name)
-        failure = outcome.failure or divergence(scores.get("whole"), largest_tolerable(outcome.result, outcome.spec))
+        failure = outcome.failure or divergence(scores.get("whole"))
         return ObserverScore(name, failure=failure, costs=tuple(costs), kind=kind, **known, **scores)
 
     def _gaps(self) -> tuple[Any, float | None]:
@@ -287,7 +286,7 @@ class _Judge:
             return None  # parameters that cannot be: the run of this observer says so
         if candidate.name not in found:
             return None
-        limit = found[candidate.name]["certified_up_to"]
+        limit = found[candidate.name]["aperiodic_limit"]
         # plain data have None for an infinite limit
         return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
 

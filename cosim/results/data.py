@@ -48,8 +48,9 @@ class BaliseRecord:
         kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
         method: localisation method that gave the stamp.
         time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
-        outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``, ``told``
-            (it does not say), or ``undelivered`` (still on its way when the run ended).
+        outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``,
+            ``doubted`` or ``ignored`` by a gate, ``told`` (it does not say), ``repeated`` (told before, with the same
+            identity and stamp, so not told again), or ``undelivered`` (still on its way when the run ended).
     """
 
     stamp: float

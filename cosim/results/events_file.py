@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
+from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote
@@ -63,11 +64,25 @@ def record_from_row(row: Mapping[str, Any]) -> BaliseRecord:
         row: cells by column.
 
     Raises:
-        KeyError: a column is missing. ValueError: a number or an outcome cannot be read.
+        KeyError: a column is missing. ValueError: a number or an outcome cannot be read, or is not legal.
     """
     values: dict[str, Any] = {name: float(row[name]) if name in NUMBERS else str(row[name]) for name in COLUMNS}
+    require_accuracy(values["location_accuracy"])
     values["outcomes"] = parse_outcomes(values["outcomes"])
     return BaliseRecord(**values)
+
+
+def require_accuracy(value: float) -> None:
+    """Refuse a location accuracy that is none.
+
+    Args:
+        value: as told [m].
+
+    Raises:
+        ValueError: it is below zero, infinite or no number.
+    """
+    if not 0.0 <= value < inf:
+        raise ValueError(f"location_accuracy: expected a finite number of 0 m or more, got {value!r}.")
 
 
 def write_events(path: str | Path, events: Iterable[BaliseRecord]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, TypeGuard
+from typing import Any, ClassVar, Literal, TypeGuard
 
 import numpy as np
 
@@ -24,8 +24,13 @@ from plant_models.hybrid.system import Array
 GATED_EVENT = "balise"
 TOLD_POSITION = "balise_position"
 LOCATION_ACCURACY = input_signal(
-    "balise_location_accuracy", "m", 0.0, "Location accuracy of the balise just passed", variability="discrete"
+    "balise_location_accuracy",
+    "m",
+    0.0,
+    "Location accuracy of the balise just passed, either way; 0: not told",
+    variability="discrete",
 )
+Weighing = Literal["innovation", "position", "itself"]
 
 
 class GatedObserver(HybridSystem):
@@ -38,7 +43,11 @@ class GatedObserver(HybridSystem):
     2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event
        gets `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
     3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what
-       `gate` is where nobody sets it: `REJECT`, unless true telegrams are doubted in the shipped scenarios.
+       `gate` is where nobody sets it.
+    4. `weighing` says how the accuracy of a telegram weighs it. ``innovation``: the observer sees the innovation times
+       the weight of the gate, so its gain is scaled down by it, and never up. ``position``: at a balise it sets
+       `weighed_states`, and they go to that value by the weight. ``itself``: it has a variance of the place, and
+       `place_deviation` gives it.
 
     Args:
         options: of the observer, see its `option_choices`.
@@ -46,6 +55,8 @@ class GatedObserver(HybridSystem):
 
     position_state: int = 0
     gate_start: float = REJECT
+    weighing: ClassVar[Weighing] = "innovation"
+    weighed_states: ClassVar[tuple[int, ...]] = (0,)
 
     def __init__(self, **options: Any) -> None:
         self.own_count = width(self.states)
@@ -93,19 +104,36 @@ class GatedObserver(HybridSystem):
             return vector(*(after[i] for i in range(self.own_count)), *gate)
         estimate = own[self.position_state]
         before, odometer = GateMemory(*gate), self.odometer_of(u)
-        if odometer is not None:  # where it is missing, the one at the doubted telegram is the last that is known
-            odometer = or_else(odometer, before.doubted_odometer)
-        told = Told(u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), odometer, t)
-        judged = judge(before, told, p)
+        if odometer is not None:  # where it is missing, the one at the telegram before is the last that is known
+            odometer = or_else(odometer, before.last_odometer)
+        place, accuracy, own_bound = u.balise_position, u.balise_location_accuracy, self.own_bound(x, p)
+        judged = judge(before, Told(place, accuracy, estimate, own_bound, odometer, t), p)
         listens = self.listens(p)
         used = np.where(listens > 0.0, judged.used, 1.0)
         kept = list(own)
         kept[self.position_state] = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
-        after = self.update(event, t, vector(*kept), u, p)
+        after = self._weighed_update(t, kept, u, p, judged.weight)
         return vector(
             *(np.where(used > 0.0, after[i], own[i]) for i in range(self.own_count)),
             *(np.where(listens > 0.0, new, old) for new, old in zip(judged.memory, gate, strict=True)),
         )
+
+    def _weighed_update(self, t: Array, own: list[Array], u: Any, p: Any, weight: Array) -> list[Array]:
+        """`update` at a telegram that weighs so much [1]; own states afterwards."""
+        estimate, told = own[self.position_state], u.balise_position
+        if self.weighing == "innovation":
+            u = u._replace(balise_position=_towards(estimate, told, weight))
+        updated = self.update(GATED_EVENT, t, vector(*own), u, p)
+        after = [updated[i] for i in range(self.own_count)]
+        if self.weighing == "position":
+            for i in self.weighed_states:
+                after[i] = _towards(own[i], after[i], weight)
+        return after
+
+
+def _towards(own: Array, told: Array, weight: Array) -> Array:
+    """What is told, to the bit, where it weighs one."""
+    return np.where(weight < 1.0, own + weight * (told - own), told)
 
 
 def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:

@@ -1,18 +1,32 @@
-"""The innovation gate: whether a position that is told can be true, beside what the observer believes. Pure functions,
-ours.
+"""The gate of telegrams: whether a position that is told can be true beside what the observer believes, and how much it
+weighs. Pure functions, ours.
 
 The limit of the innovation ``|estimate - told|`` is
 
-    ``gate_floor + location accuracy + own bound + gate_drift * way + gate_spread * recent``
+    ``gate_floor + location accuracy + g``, ``g = own error + gate_spread * recent``
 
-with the way since the last position that was used, as the observer believes it, and `recent` the largest innovation of
-late, halved at every telegram: the bound of its own error that an observer without a covariance has. While an observer
-converges the gate is therefore open; and nothing is doubted before `gate_recover` telegrams in a row were within the
-limit, for an observer may start anywhere. It is touched at telegrams only, so it costs nothing between them.
+`recent` is the largest innovation of late beyond its accuracy, halved at every telegram: the gate is open while an
+observer converges. The own error follows from what is known. It is the bound that the observer carries (three standard
+deviations of a covariance, or an error bound), and at least what the last telegram left and a share of the way since
+then as the observer believes it, as the root of their squares. That share is `gate_creep` for wheels that roll, and
+rises to `gate_drift` (what SUBSET-041 grants an odometer) where the odometer has changed its speed since the last
+telegram by 0.3 m/s2 or more, for wheels creep as they pull and brake; it is ``gate_spread`` times the largest share
+seen of late, halved at every telegram, where that lies between them and is larger. Nothing is doubted before
+`gate_recover` telegrams in a row were within the limit, for an observer may start anywhere. The gate is touched at
+telegrams only, so it costs nothing between them.
 
-Positions that were doubted may be right and the estimate wrong. So each is compared with the one doubted before it:
-they agree where the way between them is the way of the odometer, or that of the estimate. After `gate_recover` that
-agree, the position is taken, the estimate restarts there, and the gate is open again until it has settled.
+Positions that were doubted may be right and the estimate wrong. So each is compared with the telegram before it. A
+doubted one counts one; one more where the way between both is that of the odometer, by its mean of both ends, or that
+of the estimate. The first in a row has only the odometer, and only where that does not agree with the estimate as well.
+It counts half more where no more than the mean speeds of the last two ways agree: they differ by no more than a train
+can cause that changes its speed by `gate_acceleration` at most. At `gate_recover` the position is taken, the estimate
+restarts there, and the gate is open again until it has settled. True telegrams always agree in their speeds, whatever
+odometer and estimate say: of ``2 gate_recover - 1`` in a row that follow a true one at least one is used.
+
+A place within ``+-a`` has a standard deviation of ``a / sqrt(3)``: the rectangular distribution, JCGM 100:2008, 4.3.7.
+A telegram told with it weighs ``(g^2 + f^2) / (g^2 + max(f, a)^2)``, f `gate_floor`: the ratio of the gain of a Kalman
+filter at this accuracy to that at the floor, g the half-width of the estimate's own error. So it is one where nothing
+is told, and never more.
 """
 
 from __future__ import annotations
@@ -30,7 +44,11 @@ OFF, WARN, REJECT = 0.0, 1.0, 2.0
 counted.
 """
 
-FORGETTING = 0.5  # of the recent innovation, at each telegram
+FORGETTING = 0.5  # of the recent innovation and share, at each telegram
+BY_SPEED = 0.5  # what counts that a doubted telegram agrees by the speeds of telegrams alone
+LEAST_TIME = 1e-3  # between two telegrams of which a speed is made [s]
+LEAST_SHARE = 1e-6  # in place of a drift of zero
+PULLING = 0.3  # change of speed from which on wheels may creep by the whole drift [m/s2] [ours]
 VERDICT = "gate_verdict"
 
 GATE_PARAMETERS = (
@@ -43,12 +61,16 @@ GATE_PARAMETERS = (
         max=2.0,
     ),
     parameter("gate_floor", "m", 0.5, "Innovation that is never doubted", min=1e-3),
-    parameter("gate_drift", "1", 0.05, "Error granted for the way since the last balise, a share of it", min=0.0),
+    parameter(
+        "gate_drift", "1", 0.05, "Share of the way since the last balise granted, wheels that pull or brake", min=0.0
+    ),
+    parameter("gate_creep", "1", 0.01, "Likewise, wheels that roll: the least", min=0.0),
     parameter("gate_spread", "1", 3.0, "Error granted as a multiple of the largest recent innovation", min=0.0),
+    parameter("gate_acceleration", "m/s2", 1.5, "Largest acceleration of the train, either way", min=0.0),
     parameter(
         "gate_recover",
         "1",
-        3.0,
+        2.0,
         "Balises within the limit until others are doubted, and doubted ones that agree until they are believed",
         min=1.0,
     ),
@@ -56,13 +78,18 @@ GATE_PARAMETERS = (
 GATE_MEMORY = (
     memory(VERDICT, "1", 0.0, "Last balise: 0 used, 1 doubted and used, 2 doubted and ignored"),
     memory("gate_settled", "1", 0.0, "Balises in a row whose innovation was within the limit"),
-    memory("gate_recent", "m", 0.0, "Largest recent innovation of a balise, halved at each"),
+    memory("gate_recent", "m", 0.0, "Largest recent innovation of a balise beyond its accuracy, halved at each"),
+    memory("gate_share", "1", 0.0, "The same as a share of the way since the balise before, halved at each"),
     memory("gate_reference", "m", 0.0, "Position of the last balise that was used"),
+    memory("gate_left", "m", 0.0, "Error that its accuracy left"),
     memory("gate_doubted", "1", 0.0, "Balises doubted in a row that agree with each other"),
-    memory("gate_doubted_position", "m", 0.0, "Position of the last doubted balise"),
-    memory("gate_doubted_innovation", "m", 0.0, "Its innovation"),
-    memory("gate_doubted_time", "s", 0.0, "Its stamp"),
-    memory("gate_doubted_odometer", "m/s", 0.0, "Odometer at it"),
+    memory("gate_last_position", "m", 0.0, "Position of the last balise, used or not"),
+    memory("gate_last_accuracy", "m", 0.0, "Its location accuracy"),
+    memory("gate_last_innovation", "m", 0.0, "Its innovation"),
+    memory("gate_last_time", "s", 0.0, "Its stamp"),
+    memory("gate_last_odometer", "m/s", 0.0, "Odometer at it"),
+    memory("gate_last_speed", "m/s", 0.0, "Mean speed between the last two balises"),
+    memory("gate_last_slack", "m/s", 0.0, "By how much it may differ from the speed halfway"),
 )
 
 
@@ -72,19 +99,25 @@ class GateMemory(NamedTuple):
     verdict: Array
     settled: Array
     recent: Array
+    share: Array
     reference: Array
+    left: Array
     doubted: Array
-    doubted_position: Array
-    doubted_innovation: Array
-    doubted_time: Array
-    doubted_odometer: Array
+    last_position: Array
+    last_accuracy: Array
+    last_innovation: Array
+    last_time: Array
+    last_odometer: Array
+    last_speed: Array
+    last_slack: Array
 
 
 class Told(NamedTuple):
     """What is told, and what is believed at its stamp.
 
     Args:
-        position: told [m]. accuracy: of the place of the balise, either way [m]. estimate: believed position [m].
+        position: told [m]. accuracy: of the place of the balise, either way, zero where it is not known [m]. estimate:
+            believed position [m].
         bound: of the estimate's own error, where the observer has one [m]. odometer: reading [m/s]; None where there is
             none.
         t: stamp [s].
@@ -99,13 +132,67 @@ class Told(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. memory:
-    afterwards.
+    """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. weight: of the
+    innovation, 0 to 1. memory: afterwards.
     """
 
     used: Array
     restart: Array
+    weight: Array
     memory: GateMemory
+
+
+def known_accuracy(told: Array) -> Array:
+    """The location accuracy, zero where it is told below zero or as no number [m].
+
+    Args:
+        told: location accuracy [m].
+    """
+    return np.where(told > 0.0, told, 0.0)
+
+
+def place_deviation(accuracy: Array, floor: Array) -> Array:
+    """Standard deviation of the place of a balise, ``accuracy / sqrt(3)`` and not below a floor [m].
+
+    Args:
+        accuracy: half-width of where it lies [m]. floor: its deviation where nothing is told [m].
+    """
+    return np.maximum(known_accuracy(accuracy) / np.sqrt(3.0), floor)
+
+
+def gain_ratio(error: Array, place: Array, floor: Array) -> Array:
+    """Gain of a Kalman filter for a place told so well over that for one at the floor, 0 to 1.
+
+    Args:
+        error: of the estimate [m]. place: of the place as told [m]. floor: of a place of which nothing is told [m]; all
+            three deviations, or all three half-widths.
+    """
+    known = error * error
+    # where the place is no worse than the floor, both may be zero
+    told = np.where(place > floor, known + place * place, 1.0)
+    return np.where(place > floor, (known + floor * floor) / told, 1.0)
+
+
+def granted_error(before: GateMemory, told: Told, p: Any) -> Array:
+    """What is granted of the estimate's error, g [m].
+
+    Args:
+        before: memory of the gate before the telegram. told: the telegram and what the observer knows then.
+        p: parameters, as in `HybridSystem.flow`.
+    """
+    drift = np.maximum(p.gate_drift, p.gate_creep)
+    seen = np.clip(p.gate_spread * before.share, p.gate_creep, drift)
+    share = np.maximum(seen, p.gate_creep + (drift - p.gate_creep) * _pulled(before, told))
+    since = _root_of_squares(before.left, share * (told.estimate - before.reference))
+    return np.maximum(told.bound, since) + p.gate_spread * before.recent
+
+
+def _pulled(before: GateMemory, told: Told) -> Array:
+    """How hard the wheels have pulled or braked since the last telegram, 0 to 1; 1 where there is no odometer."""
+    if told.odometer is None:
+        return 1.0
+    time = np.maximum(told.t - before.last_time, LEAST_TIME)
+    return np.minimum(np.abs(told.odometer - before.last_odometer) / (PULLING * time), 1.0)
 
 
 def gate_limit(before: GateMemory, told: Told, p: Any) -> Array:
@@ -115,58 +202,71 @@ def gate_limit(before: GateMemory, told: Told, p: Any) -> Array:
         before: memory of the gate before the telegram. told: the telegram and what the observer knows then.
         p: parameters, as in `HybridSystem.flow`.
     """
-    way = np.abs(told.estimate - before.reference)
-    granted = _granted(way, told.accuracy, p)
-    return granted + told.bound + p.gate_spread * before.recent
+    return p.gate_floor + known_accuracy(told.accuracy) + granted_error(before, told, p)
 
 
 def judge(before: GateMemory, told: Told, p: Any) -> Judgement:
-    """Whether a told position is used, and what the gate remembers of it.
+    """Whether a told position is used, how much it weighs, and what the gate remembers of it.
 
     Args:
         before: memory at the telegram. told: telegram and belief. p: named tuple with `GATE_PARAMETERS`.
     """
-    innovation = told.estimate - told.position
-    size = np.abs(innovation)
+    size, accuracy = np.abs(told.estimate - told.position), known_accuracy(told.accuracy)
+    granted = granted_error(before, told, p)
+    settled = _is(before.settled >= p.gate_recover)
     outside = _is(size > gate_limit(before, told, p))
-    doubted = outside * _is(before.settled >= p.gate_recover) * _is(p.gate > OFF)
-    count = doubted * _agreeing(before, told, innovation, p)
+    doubted = outside * settled * _is(p.gate > OFF)
     refused = doubted * _is(p.gate >= REJECT)
-    restart = refused * _is(count >= p.gate_recover)
+    row = _row(before, told, p)
+    restart = refused * _is(row[0] >= p.gate_recover)
     used = 1.0 - refused + restart
-    verdict = np.where(used > 0.0, np.where(doubted > 0.0, float(DOUBTED), float(USED)), float(IGNORED))
+    # nothing is known of an estimate that has not settled, so nothing speaks against the telegram
+    weight = np.where(settled * (1.0 - restart) > 0.0, gain_ratio(granted, accuracy, p.gate_floor), 1.0)
+    beyond = np.maximum(size - accuracy, 0.0)
+    share = beyond / (p.gate_floor / np.maximum(p.gate_drift, LEAST_SHARE) + np.abs(told.estimate - before.reference))
     after = GateMemory(
-        verdict,
-        np.where(used > 0.0, np.where(outside > 0.0, 0.0, before.settled + 1.0), before.settled),
-        np.where(used > 0.0, np.maximum(size, FORGETTING * before.recent), before.recent),
-        np.where(used > 0.0, told.position, before.reference),
-        np.where(used > 0.0, 0.0, count),
-        np.where(doubted > 0.0, told.position, before.doubted_position),
-        np.where(doubted > 0.0, innovation, before.doubted_innovation),
-        np.where(doubted > 0.0, told.t, before.doubted_time),
-        before.doubted_odometer
-        if told.odometer is None
-        else np.where(doubted > 0.0, told.odometer, before.doubted_odometer),
+        np.where(used > 0.0, np.where(doubted > 0.0, float(DOUBTED), float(USED)), float(IGNORED)),
+        np.where(outside > 0.0, 0.0, before.settled + 1.0),
+        np.maximum(beyond, FORGETTING * before.recent),
+        np.maximum(share, FORGETTING * before.share),
+        told.position,
+        _root_of_squares((1.0 - weight) * granted, weight * accuracy),
+        *row,
     )
-    return Judgement(used, restart, after)
+    kept = (np.where(used > 0.0, new, old) for new, old in zip(after[1:6], before[1:6], strict=True))
+    return Judgement(
+        used, restart, weight, GateMemory(after[0], *kept, np.where(used > 0.0, 0.0, after.doubted), *after[7:])
+    )
 
 
-def _agreeing(before: GateMemory, told: Told, innovation: Array, p: Any) -> Array:
-    """How many doubted positions in a row agree, this one included; one told twice is one."""
-    spacing = told.position - before.doubted_position
-    tolerance = _granted(np.abs(spacing), told.accuracy, p)
-    agrees = is_same = _is(np.abs(spacing) <= tolerance)
-    # the way of the estimate
-    agrees = np.maximum(agrees, _is(np.abs(innovation - before.doubted_innovation) <= tolerance))
+def _row(before: GateMemory, told: Told, p: Any) -> tuple[Array, ...]:
+    """How many doubted telegrams in a row agree, this one included, and what is remembered of it; one told twice is
+    one.
+    """
+    innovation, accuracy = told.estimate - told.position, known_accuracy(told.accuracy)
+    spacing, passed = told.position - before.last_position, told.t - before.last_time
+    places = p.gate_floor + accuracy + before.last_accuracy
+    tolerance = places + p.gate_drift * np.abs(spacing)
+    is_first = _is(before.doubted <= 0.0)
+    by_way = (1.0 - is_first) * _is(np.abs(innovation - before.last_innovation) <= tolerance)
     if told.odometer is not None:
-        way = 0.5 * (told.odometer + before.doubted_odometer) * (told.t - before.doubted_time)
-        agrees = np.maximum(agrees, _is(np.abs(spacing - way) <= tolerance))
-    in_a_row = before.doubted + np.where(is_same > 0.0, 0.0, 1.0)
-    return np.where(_is(before.doubted > 0.0) * agrees > 0.0, in_a_row, 1.0)
+        beyond = spacing - 0.5 * (told.odometer + before.last_odometer) * passed
+        # an odometer that agrees with both says nothing against the estimate
+        against = _is(np.abs(beyond + innovation - before.last_innovation) > tolerance)
+        by_way = np.maximum(by_way, _is(np.abs(beyond) <= tolerance) * np.maximum(against, 1.0 - is_first))
+    time = np.maximum(passed, LEAST_TIME)
+    speed, slack = spacing / time, 0.5 * p.gate_acceleration * time + (p.gate_floor + places) / time
+    by_speed = (1.0 - is_first) * _is(np.abs(speed - before.last_speed) <= slack + before.last_slack)
+    agreeing = np.maximum(by_way, BY_SPEED * by_speed)
+    count = np.where(agreeing > 0.0, np.maximum(before.doubted, 1.0) + agreeing, 1.0)
+    odometer = before.last_odometer if told.odometer is None else told.odometer
+    new = (count, told.position, accuracy, innovation, told.t, odometer, speed, slack)
+    repeated = (1.0 - is_first) * _is(np.abs(spacing) <= p.gate_floor)
+    return tuple(np.where(repeated > 0.0, a, b) for a, b in zip(before[6:], new, strict=True))
 
 
-def _granted(way: Array, accuracy: Array, p: Any) -> Array:
-    return p.gate_floor + np.maximum(accuracy, 0.0) + p.gate_drift * way
+def _root_of_squares(a: Array, b: Array) -> Array:
+    return np.sqrt(a * a + b * b)
 
 
 def _is(condition: Array) -> Array:

@@ -137,5 +137,4 @@ def _certificate(system: Any, preset: str | None) -> CertificateRow:
 
 
 def _limit(limit: float, certificate: Any) -> str:
-    reach = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
-    return reach if isinf(limit) else f"{limit:.3g} s"
+    return f"none up to {certificate.horizon:g} s" if isinf(limit) else f"{limit:.3g} s"

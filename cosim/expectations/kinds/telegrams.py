@@ -1,4 +1,4 @@
-"""So many balise telegrams were missed, false, rejected, late, undelivered or used."""
+"""So many balise telegrams were missed, false, rejected, ignored, doubted, late, undelivered or used."""
 
 from __future__ import annotations
 
@@ -19,14 +19,21 @@ if TYPE_CHECKING:
     from cosim.expectations.before import Before
 
 OF_THE_TRACK = ("missed", "false")
-OF_A_RECEIVER = ("rejected", "late", "undelivered")
+OF_A_RECEIVER = {
+    "rejected": ("rejected", "ignored"),
+    "ignored": ("ignored",),
+    "doubted": ("doubted",),
+    "late": ("late",),
+    "undelivered": ("undelivered",),
+}
+"""Outcomes that count: what a gate ignored was not taken either, whoever refused it."""
 COUNTS = (*OF_THE_TRACK, *OF_A_RECEIVER, "used")
 NAMES_SHOWN = 5
 
 
 class TelegramsExpectation(WindowExpectation):
-    """So many balise telegrams at most were missed, false, rejected, late or undelivered; so many at least were
-    used.
+    """So many balise telegrams at most were missed, false, rejected (by a policy for late ones, or ignored by a gate),
+    ignored, doubted, late or undelivered; so many at least were used.
     """
 
     check: Literal["telegrams"]
@@ -34,6 +41,8 @@ class TelegramsExpectation(WindowExpectation):
     missed: Count | None = None
     false: Count | None = None
     rejected: Count | None = None
+    ignored: Count | None = None
+    doubted: Count | None = None
     late: Count | None = None
     undelivered: Count | None = None
     used: Count | None = None
@@ -41,7 +50,8 @@ class TelegramsExpectation(WindowExpectation):
     @model_validator(mode="after")
     def _counted(self) -> TelegramsExpectation:
         if all(getattr(self, key) is None for key in COUNTS):
-            raise ValueError("give at least one of 'missed', 'false', 'rejected', 'late', 'undelivered' and 'used'")
+            names = ", ".join(map(repr, COUNTS[:-1]))
+            raise ValueError(f"give at least one of {names} and {COUNTS[-1]!r}")
         return self
 
     def prepare(self, before: Before) -> Self:
@@ -75,9 +85,9 @@ class TelegramsExpectation(WindowExpectation):
                 found.append(_at_most(f"telegrams {key}{where}", getattr(self, key), chosen, window))
         for receiver in receivers or [""]:
             at = f" at {receiver}" if receiver else ""
-            for key in OF_A_RECEIVER:
+            for key, outcomes in OF_A_RECEIVER.items():
                 if getattr(self, key) is not None:
-                    chosen = [e for e in within if e.outcomes.get(receiver) == key]
+                    chosen = [e for e in within if e.outcomes.get(receiver) in outcomes]
                     found.append(_at_most(f"telegrams {key}{at}{where}", getattr(self, key), chosen, window))
             if self.used is not None:
                 used = [e for e in within if e.outcomes.get(receiver) in USED]

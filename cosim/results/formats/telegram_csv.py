@@ -12,7 +12,7 @@ from typing import Any
 
 from cosim.errors import OutputError, nearest
 from cosim.results.data import BaliseRecord
-from cosim.results.events_file import COLUMNS, NUMBERS, parse_outcomes
+from cosim.results.events_file import COLUMNS, NUMBERS, parse_outcomes, require_accuracy
 from cosim.results.formats.csv_dialect import csv_dialect
 from cosim.results.formats.headings import split_unit
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
@@ -100,6 +100,7 @@ def _record(row: dict[str, str], factors: dict[str, float], identity: str) -> Ba
     for name in NEEDED:
         if name not in values:
             raise ValueError(f"{name} is empty.")
+    require_accuracy(values["location_accuracy"])
     if values["kind"] not in KINDS:
         raise ValueError(f"kind {values['kind']!r}: expected one of {', '.join(KINDS)}.")
     values.setdefault("delivered_at", nan if values["kind"] == "missed" else values["stamp"])

@@ -26,6 +26,7 @@ from fmu_observer.observers.discrete.filter_condition import steady_condition, w
 from fmu_observer.observers.discrete.filter_signals import NOT_POSITIVE, SignalsOf
 from fmu_observer.observers.discrete.sampling import PRIMED
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
+from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Signal, parameter, vector, width
@@ -210,6 +211,28 @@ class GaussianFilter(GatedObserver):
         """
         return spread @ spread.T if self.rooted else spread
 
+    def told_accuracy(self, event: str, u: Any) -> Array:
+        """The location accuracy that comes with an event, zero where none does [m].
+
+        Args:
+            event: its name. u: inputs of the filter, payload included.
+        """
+        return known_accuracy(u.balise_location_accuracy) if self.gated and event == GATED_EVENT else 0.0
+
+    def reading_noise(self, accuracy: Array, p: Any) -> Array:
+        """Covariance of the measurement noise with a balise told so accurately, shape (s, s).
+
+        Args:
+            accuracy: of its place [m]. p: all parameters.
+        """
+        s = self.model.reading_noise_count
+        noise = as_matrix(p.measurement_covariance, s, s)
+        if self.weighing != "itself":
+            return noise
+        place = [m.name for m in self.model.measurements].index("position")
+        at = np.diag(np.eye(s)[place])
+        return noise + at * np.maximum(np.square(accuracy) / 3.0 - noise[place, place], 0.0)
+
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -234,10 +257,8 @@ class GaussianFilter(GatedObserver):
         e, S = x[first : first + q], as_matrix(x[second : second + q * q], q, q)
         if rows:
             y = self.arrivals.measured(event, u)
-            s = self.model.reading_noise_count
-            after, error = self.corrected(
-                belief, self.known(t, u, p), y, rows, as_matrix(p.measurement_covariance, s, s), p
-            )
+            noise = self.reading_noise(self.told_accuracy(event, u), p)
+            after, error = self.corrected(belief, self.known(t, u, p), y, rows, noise, p)
             there, found = is_there(y), after.innovation_covariance
             count = there @ np.ones(len(rows))
             share = LEFT if self.form == "short" else 0.0  # the other forms subtract nothing
@@ -368,6 +389,7 @@ class GaussianFilter(GatedObserver):
         self.parameters += (parameter("sample_period", "s", model.sample_period, period, min=1e-6),)
         if GATED_EVENT in self.arrivals.names:
             self.position_state = self._position_state()
+            self.weighing = "innovation" if model.measurement_noises else "itself"
 
     def _declared_noise(self) -> tuple[Signal, ...]:
         r, s = self.model.noise_count, self.model.reading_noise_count

@@ -32,6 +32,7 @@ from fmu_observer.moving_horizon.window import RowLayout, WindowRow
 from fmu_observer.moving_horizon.window_observability import window_observability
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.discrete.gaussian_filter import Form
+from fmu_observer.observers.gated_observer import GATED_EVENT
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal, parameter, vector
@@ -187,7 +188,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         names = [s.name for s in self.model.states]
         return WindowProblem(
             order=self.model.order,
-            layout=RowLayout(len(self.model.inputs), len(self.model.measurements)),
+            layout=self._layout,
             moved=self._moved,
             seen=self._seen,
             bounded=tuple(names.index(name) for name in self.bounds),
@@ -211,7 +212,9 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         place, there, y = {row: i for i, row in enumerate(arrived)}, is_there(y), or_else(y, 0.0)
         measured = vector(*(y[place[j]] if j in place else 0.0 * primed for j in range(q)))
         used = vector(*(there[place[j]] if j in place else 0.0 * primed for j in range(q)))
-        return WindowRow(primed, period, t + 0.0 * primed, known.u, measured, used)
+        told = (self.told_accuracy(event, u) + 0.0 * primed,) if self._told_accurately else ()
+        inputs = vector(*(known.u[i] for i in range(len(self.model.inputs))), *told) if told else known.u
+        return WindowRow(primed, period, t + 0.0 * primed, inputs, measured, used)
 
     def _predicted_point(self, x: Array, row: WindowRow, shared: Array) -> Array:
         """Where the first pass linearises the newest row: the estimate before, moved on, within the bounds."""
@@ -220,7 +223,19 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         return self.problem.clipped(np.where(row.moves > 0.5, moved, x), shared)
 
     def _known_of(self, row: WindowRow, p: Any) -> Known:
-        return Known(row.time - row.period, row.inputs, self.known_parameters(p))
+        return Known(row.time - row.period, self._inputs_of(row), self.known_parameters(p))
+
+    def _inputs_of(self, row: WindowRow) -> Array:
+        return row.inputs[: len(self.model.inputs)]
+
+    @property
+    def _told_accurately(self) -> bool:
+        """Whether rows of balises carry their location accuracy, behind the inputs."""
+        return GATED_EVENT in self.arrivals.names and self.weighing == "itself"
+
+    @property
+    def _layout(self) -> RowLayout:
+        return RowLayout(len(self.model.inputs) + self._told_accurately, len(self.model.measurements))
 
     def _moved(self, x: Array, row: WindowRow, shared: Array) -> Moved:
         p = self.unpack_parameters(shared)
@@ -233,10 +248,11 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         return Moved(model.moved(x, model.no_noise(), known, row.period), F, through(noise, W))
 
     def _seen(self, x: Array, row: WindowRow, shared: Array) -> Seen:
-        p, model, s = self.unpack_parameters(shared), self.model, self.model.reading_noise_count
-        known = Known(row.time, row.inputs, self.known_parameters(p))
+        p, model = self.unpack_parameters(shared), self.model
+        known = Known(row.time, self._inputs_of(row), self.known_parameters(p))
         H, V = model.measurement_jacobians(x, known)
-        noise = through(as_matrix(p.measurement_covariance, s, s), V)
+        accuracy = row.inputs[len(model.inputs)] if self._told_accurately else 0.0
+        noise = through(self.reading_noise(accuracy, p), V)
         return Seen(model.measured(x, model.no_reading_noise(), known), H, noise)
 
     def _declare(self) -> None:
@@ -264,8 +280,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
                 )
         self.own_parameters = own
         super()._declare()
-        row_width = RowLayout(len(model.inputs), q).width
-        self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
+        self.states += window_memory(model.start, np.eye(model.order), self._layout.width, self.window)
         self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
         self.outputs = (*(s for s in self.outputs if not (self.robust and s.name == "nis")), *told_outputs(self.window))
 

@@ -29,6 +29,7 @@ from fmu_observer.observers.adaptive_law import (
 )
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.adaptive_davis_states import (
     FIRST_GAIN,
     SCALE,
@@ -41,7 +42,6 @@ from fmu_observer.observers.train.adaptive_davis_states import (
     parts_of,
     sensitivity_of,
 )
-from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE
 from plant_models.hybrid import PeriodicEvent, Signal, input_signal, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
@@ -63,7 +63,7 @@ ADAPTIVE = (
     parameter("least_excitation", "1", 1e-4, "Mean excitation below which a coefficient is held", min=0.0),
     parameter("excitation_time", "s", 120.0, "Window of that mean", min=1e-9),
     parameter("first_gain", "1", FIRST_GAIN, "Adaptation gain R at the first reading", min=0.0),
-    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=0.0),
+    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise, at least", min=0.0),
     parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
     parameter("odometer_period", "s", 0.2, "Time between two readings", min=1e-4),
     parameter("reading_age", "s", 0.0, "Mean age of a reading at its sample", min=0.0),
@@ -83,9 +83,8 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     Only effort over mass is known, so a mass or an effort that is wrong by a share is told as resistance, and so are
     gradients: use it where the line is level or its gradient is part of the effort, with the effort that acts. One
     speed tells the resistance at that speed and no more: b and c are learnt where the speed varies.
-    Constant resistance and brake are dry friction, which holds a train that stands.
-    `resistance_per_mass_deviation` is the standard deviation of the resistance at the speed now, always much surer than
-    its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held: from one
+    `resistance_per_mass_deviation` is the standard deviation of the resistance at the speed now, always much surer
+    than its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held: from one
     sample to the next.
 
     Gains [ours]: mu 0.2 1/s; coefficients do not forget.
@@ -95,7 +94,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     description = "Train observer that learns the Davis coefficients per unit mass"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
-    frictions = ("estimated_speed",)
+    weighing = "itself"
     states = STATES
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort that acts at the wheel rim: traction positive, brake negative"),
@@ -144,11 +143,10 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         slope = (p.davis_b + 2.0 * p.davis_c * x[V]) / p.mass
         drift = A - np.vstack([np.zeros((1, 2)), np.hstack([0.0, slope])])
         gain = inverse_s @ C.T
-        predicted = vector(x[V], self._free_acceleration(x, now, u, p))
+        predicted = vector(x[V], self._acceleration(x, now, u, p))
         moving = since_flow(since, gain, drift, C, p.unknown_acceleration * DISTURBED)
         d_sensitivity = drift @ sensitivity - gain @ (since.decay @ known.seen)
-        moves = 1.0 - stands(x[V])  # the speed of a train that its friction holds follows no coefficient
-        d_speed = [moves * (d_sensitivity[1, j] - r) for j, r in enumerate(_regressor(x[V]))]
+        d_speed = [d_sensitivity[1, j] - r for j, r in enumerate(_regressor(x[V]))]
         d_inverse = p.mu * inverse_s + drift @ inverse_s + inverse_s @ drift.T - gain @ gain.T
         return vector(
             *entries(predicted - gain @ now.innovation + sensitivity @ now.rates),
@@ -158,23 +156,21 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             *moving_values(moving),
         )
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Constant resistance and brake [m/s2], shape (1,)."""
-        now = constants_now(*parts_of(x))
-        return vector(np.maximum(self._coefficients(now, p)[0], 0.0) + np.maximum(-u.effort, 0.0) / p.mass)
-
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """One component of the innovation is set to what is measured; the first measurement sets the estimate too."""
         row = 0 if event == BALISE.name else 1
         known, since = parts_of(x)
         now = constants_now(known, since)
         if row == 0:
-            measured, deviation = u.balise_position, p.balise_deviation
+            measured = u.balise_position
+            deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
+            gain = gain_ratio(self.own_bound(x, p), deviation, p.balise_deviation)
         else:
             measured = u.odometer + p.reading_age * self._acceleration(x, now, u, p)
-            deviation = p.odometer_deviation
-        weight, used = float(C[row, row]), list(entries(of_state(x, "samples_used")))
+            deviation, gain = p.odometer_deviation, 1.0
+        used = list(entries(of_state(x, "samples_used")))
         first = np.where(used[row] > 0.0, 0.0, 1.0)
+        weight = float(C[row, row]) * gain
         used[row] = used[row] + 1.0
         estimate, sensitivity = [x[P], x[V]], list(entries(of_state(x, "sensitivity")))
         # what has just been measured for the first time does not depend on the coefficients
@@ -189,7 +185,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         if row == 1:
             R = np.where(first > 0.0, p.first_gain * np.eye(3), R)
         before = covariance_now(known, since, now.by_innovation, SIZES)
-        moved = covariance_at_sample(before, C, row, reads, (weight * deviation) ** 2, SIZES)
+        moved = covariance_at_sample(before, gain * C, row, reads, (weight * deviation) ** 2, SIZES)
         begun = covariance_at_first(before, row, row, deviation**2, SIZES)
         excitation = excitation_now(known, since, p.excitation_time)
         innovation = x[P] - measured if row == 0 else of_state(x, "last_innovation")[0]
@@ -272,14 +268,9 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         a, b, c = self._coefficients(now, p)
         return a + b * x[V] + c * x[V] ** 2
 
-    def _free_acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
-        """Acceleration without dry friction [m/s2]."""
-        a, b, c = self._coefficients(now, p)
-        return np.maximum(u.effort, 0.0) / p.mass - np.minimum(a, 0.0) - (b + c * np.abs(x[V])) * x[V]
-
     def _acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
-        """Acceleration of a train that moves, else 0 [m/s2]."""
-        return np.where(x[V] > 0.0, u.effort / p.mass - self._resistance(x, now, p), 0.0)
+        moves = np.where(x[V] > 0.0, 1.0, 0.0)
+        return u.effort / p.mass - moves * self._resistance(x, now, p)
 
 
 DISTURBED = np.array([[0.0, 0.0], [0.0, 1.0]])

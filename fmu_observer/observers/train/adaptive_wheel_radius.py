@@ -15,7 +15,6 @@ from fmu_observer.observers.adaptive_law import (
     adaptation_flow,
     adaptation_of,
     adaptation_states,
-    covariance_after,
     error_drift,
     gains_of,
     learnt_constants,
@@ -24,7 +23,7 @@ from fmu_observer.observers.adaptive_law import (
 )
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.train.standstill import stands
+from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.requirements import within_bounds
@@ -47,7 +46,7 @@ ADAPTIVE = (
     ),
     parameter("excitation_time", "s", 20.0, "Window of that mean", min=1e-9),
     parameter("first_gain", "1", FIRST_GAIN, "Adaptation gain R at the first balise", min=0.0),
-    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=0.0),
+    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise, at least", min=0.0),
     parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
     parameter("odometer_period", "s", 0.2, "Time between readings of independent noise", min=0.0),
     parameter("reading_age", "s", 0.0, "Mean age of the reading that is held", min=0.0),
@@ -85,6 +84,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     description = "Train observer that learns the error of the wheel radius from balises"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
+    weighing = "itself"
     inputs: tuple[Signal, ...] = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed, by the believed wheel radius"),
         input_signal(
@@ -135,9 +135,6 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[SCALE]) ** 2
         plant = Plant(np.zeros((1, 1)), reading, np.reshape(reading, (1, 1)), C, noise * DISTURBED)
         gains = self._gains(adaptation, p)
-        moves = 1.0 - stands(0.0 * reading, reading, 3.0 * p.odometer_deviation)
-        # Time at standstill makes nothing older.
-        p = p._replace(forgetting=moves * p.forgetting, excitation_time=p.excitation_time / np.maximum(moves, 1e-9))
         c = x[P] - x[PREDICTED]
         drift = error_drift(plant, gains, SIZES, True)
         return np.hstack(
@@ -153,12 +150,17 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         """The predicted position is that of the balise; the first one sets the position too."""
         used = x[self.own_count - 2]
         first = np.where(used > 0.0, 0.0, 1.0)
-        covariance, variance = self._adaptation(x).covariance, p.balise_deviation**2
+        covariance = self._adaptation(x).covariance
+        deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
+        gain, variance = gain_ratio(self.own_bound(x, p), deviation, p.balise_deviation), deviation**2
         told = u.balise_position - p.reading_age * _without_creep(u, p) * (1.0 + x[SCALE])
-        quickest = x[R] / (1.0 + x[R] * x[L] ** 2 / QUICKEST)
-        later = (x[P], told, x[SCALE], quickest, x[L], x[L], x[INVERSE_S], x[EXCITATION])
+        seen = gain * x[L]
+        quickest = x[R] / (1.0 + x[R] * seen**2 / QUICKEST)
+        predicted = np.where(gain < 1.0, x[P] + gain * (told - x[P]), told)
+        later = (x[P], predicted, x[SCALE], quickest, x[L], seen, x[INVERSE_S], x[EXCITATION])
         begun = (told, told, x[SCALE], p.first_gain, 0.0, 0.0, x[INVERSE_S], 0.0)
-        moved = packed(covariance_after(covariance, C, 0, variance, SIZES, True), SIZES.error)
+        jump = np.vstack([UNMOVED, np.hstack([1.0 - gain, 0.0, 0.0])])
+        moved = packed(jump @ covariance @ jump.T + gain**2 * variance * OF_PREDICTED, SIZES.error)
         known = packed(variance * SAME_PLACE + covariance[1, 1] * OF_SCALE, SIZES.error)
         return vector(
             *(np.where(first > 0.0, new, old) for new, old in zip(begun, later, strict=True)),
@@ -216,6 +218,8 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
 DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position
 SAME_PLACE = DISTURBED
 OF_SCALE = np.diag([0.0, 1.0, 0.0])
+OF_PREDICTED = np.diag([0.0, 0.0, 1.0])
+UNMOVED = np.eye(2, 3)  # position and scale at a balise
 
 
 def _without_creep(u: Any, p: Any) -> Array:

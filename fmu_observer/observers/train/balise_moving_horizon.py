@@ -23,7 +23,7 @@ from fmu_observer.moving_horizon.real_time_iteration import (
 )
 from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
-from fmu_observer.observers.innovation_gate import OFF
+from fmu_observer.observers.innovation_gate import OFF, known_accuracy, place_deviation
 from fmu_observer.observers.train.balise_odometer_ekf import (
     BALISE_ROW,
     FIRST_DEVIATIONS,
@@ -39,7 +39,6 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     P,
     V,
     covariance_of,
-    moving_speed,
     transition,
 )
 from fmu_observer.observers.train.train_observer import BALISE
@@ -49,8 +48,9 @@ from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
-LAYOUT = RowLayout(inputs=ORDER + 4, measurements=1)
-OFFSETS, SPEED, EFFORT, IS_BALISE, ANEW = slice(0, ORDER), ORDER, ORDER + 1, ORDER + 2, ORDER + 3  # inputs of a row
+LAYOUT = RowLayout(inputs=ORDER + 5, measurements=1)
+OFFSETS, SPEED, EFFORT = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
+IS_BALISE, ANEW, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
 WINDOW_PARAMETERS = (
     parameter("speed_limit", "m/s", 100.0, "Highest speed; the lowest is zero", min=0.1),
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
@@ -214,9 +214,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         )
         covariance = np.reshape(found.covariance, (ORDER, ORDER))
         upper = vector(*(covariance[i, j] for i, j in PAIRS))
-        now = [found.estimate[i] for i in range(ORDER)]
-        now[V] = moving_speed(now[V], x, u, p)
-        return joined(vector(*now), upper, filtered[LAST_TIME:], vector(*refusals), found.remembered)
+        return joined(found.estimate, upper, filtered[LAST_TIME:], vector(*refusals), found.remembered)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates now within their bounds, their deviations, how the last measurement fits, and the window."""
@@ -253,7 +251,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         period, is_balise = t - x[LAST_TIME], float(event == BALISE.name)
         offset = x[:ORDER] - transition(period, x[V], u.effort, p).F @ before
         measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
-        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], u.effort + 0.0 * x[V], is_balise + 0.0 * x[V], anew)
+        told = known_accuracy(u.balise_location_accuracy) if event == BALISE.name else 0.0
+        others = (u.effort, is_balise, anew, told)
+        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], *(value + 0.0 * x[V] for value in others))
         return WindowRow(1.0 + 0.0 * x[V], period, t + 0.0 * x[V], inputs, vector(measured), vector(1.0 + 0.0 * x[V]))
 
 
@@ -270,7 +270,8 @@ def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
 def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
     p, balise = _shared(shared), row.inputs[IS_BALISE]
     H = balise * BALISE_ROW + (1.0 - balise) * ODOMETER_ROW
-    deviation: Array = np.where(balise > 0.5, p.balise_deviation, p.odometer_deviation)
+    place = place_deviation(row.inputs[ACCURACY], p.balise_deviation)
+    deviation: Array = np.where(balise > 0.5, place, p.odometer_deviation)
     return Seen(H @ x, H, np.reshape(deviation * deviation, (1, 1)))
 
 

@@ -19,7 +19,7 @@ from fmu_observer.filtering.kalman import (
 from fmu_observer.observers.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.train.standstill import stands
+from fmu_observer.observers.innovation_gate import place_deviation
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, parameter, state, vector
@@ -54,7 +54,7 @@ TUNABLE = (
     parameter("creep_effort", "m/s2", 0.3, "Effort over mass at which the wheels creep so; less with less", min=1e-6),
     parameter("creep_time", "s", 20.0, "Correlation time of the creep", min=1e-3),
     parameter("odometer_deviation", "m/s", 0.1, "Standard deviation of the noise of a reading", min=1e-6),
-    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=1e-6),
+    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise, at least", min=1e-6),
     parameter("odometer_gate", "1", 4.0, "Standard deviations beyond which a reading is not used", min=0.1),
     parameter("odometer_recover", "s", 15.0, "Time of refused readings after which they are believed", min=0.0),
 )
@@ -115,6 +115,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     source = "Allaoui 2024, section II.5; the train case is ours"
     internal_step = 1e-2
     frictions = (SPEED.name,)
+    weighing = "itself"
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Applied effort at the wheel rim: traction positive, brake negative"),
         input_signal("odometer", "m/s", 0.0, "Odometer speed"),
@@ -191,7 +192,8 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         before = predicted_covariance(covariance_of(x), moved.F, moved.QN)
         estimate = x[:ORDER]
         if event == BALISE.name:
-            error, row, deviation = u.balise_position - x[P], BALISE_ROW, p.balise_deviation
+            error, row = u.balise_position - x[P], BALISE_ROW
+            deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
         else:
             error, row, deviation = self.reading(t, x, u, p) - x[V] - x[CREEP], ODOMETER_ROW, p.odometer_deviation
         innovation = vector(error)
@@ -200,7 +202,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         told = log_likelihood(innovation, after.innovation_covariance)
         refused = 0.0 * nis if event == BALISE.name else np.where(nis > p.odometer_gate**2, 1.0, 0.0)
         kept = [np.where(refused > 0.0, estimate[i], after.estimate[i]) for i in range(ORDER)]
-        kept[V] = moving_speed(kept[V], x, u, p)
+        kept[V] = np.maximum(kept[V], 0.0)  # the odometer has no sign, and a train that stands is not pushed back
         covariance = [np.where(refused > 0.0, before[i, j], after.covariance[i, j]) for i, j in PAIRS]
         refused_time = x[REFUSED_TIME] if event == BALISE.name else refused * (x[REFUSED_TIME] + p.odometer_period)
         anew = refused * np.where(refused_time + ROUNDING >= p.odometer_recover, 1.0, 0.0)
@@ -376,17 +378,6 @@ def covariance_of(x: Array) -> Array:
     """
     place = {pair: COVARIANCE + k for k, pair in enumerate(PAIRS)}
     return np.vstack([np.hstack([x[place[min(i, j), max(i, j)]] for j in range(ORDER)]) for i in range(ORDER)])
-
-
-def moving_speed(speed: Array, x: Array, u: Any, p: Any) -> Array:
-    """A corrected speed, zero where the train stands before and after it [m/s].
-
-    A speed above zero, however small, would be friction's to stop, and would move the position on the way.
-
-    Args:
-        speed: after a correction [m/s]. x: state before it. u: inputs. p: parameters of `BaliseOdometerEkf`.
-    """
-    return np.where(stands(x[V], u.odometer, SIGMAS * p.odometer_deviation) > 0.0, 0.0, np.maximum(speed, 0.0))
 
 
 class Settled(NamedTuple):

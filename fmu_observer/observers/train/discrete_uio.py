@@ -8,7 +8,6 @@ import numpy as np
 
 from fmu_observer.certificates import Certificate, TwoRateError, certify_two_rate_error
 from fmu_observer.design.uio_design import uio_matrices
-from fmu_observer.observers.innovation_gate import WARN
 from fmu_observer.observers.train.train_observer import POSITION, Estimate, TrainObserver
 from plant_models.hybrid import PeriodicEvent, memory, parameter, state, vector
 from plant_models.hybrid.system import Array
@@ -33,8 +32,8 @@ class DiscreteUio(TrainObserver):
     acts at its own stamp. The printed matrix has the slip disturbance in the wrong column (see `uio_design`). The gains
     are not
     printed: ours are steady-state Kalman gains with the covariances of `UioCovariances`.
-    It leans on the odometer: while the wheels of a locomotive spin its position is off by metres, and true balises lie
-    outside the gate (1.4 of 1000 on profile B). So its `gate` starts as 1: doubted balises are used and counted.
+    It leans on the odometer: while the wheels of a locomotive spin its position is off by metres, and true balises may
+    lie outside the gate, which then finds its way back by the ones that follow.
 
     The adhesion force [ours] is ``effort - (J / r^2) dy``, the wheelset's balance.
     """
@@ -42,7 +41,6 @@ class DiscreteUio(TrainObserver):
     name = "discrete_uio"
     description = "Discrete unknown-input observer, slip and acceleration disturbance as unknown inputs"
     source = "Bouchama 2024, (3.88)-(3.91)"
-    gate_start = WARN
     estimator_states = (
         POSITION,
         state("odometer_speed", "m/s", 1.0, "Estimate of the odometer speed y"),

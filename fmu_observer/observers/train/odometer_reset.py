@@ -24,6 +24,7 @@ class OdometerReset(GatedObserver):
     source = "Aguiar Cota 2019, section 3.3.2"
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     gate_start = WARN
+    weighing = "position"
     states = (POSITION, memory("last_innovation", "m", 0.0, "Position error seen at the last balise"))
     inputs = (input_signal("odometer", "m/s", 0.0, "Odometer speed"),)
     outputs = (

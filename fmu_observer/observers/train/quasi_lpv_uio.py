@@ -23,16 +23,15 @@ from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, 
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.train.standstill import held_disturbance, stands
+from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 
 P, V, D, RATE, WAY = range(5)  # continuous states
-HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION = range(5, 10)
-BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES, LEAD = range(10, 15)
+HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 14)
 SPEEDS = 21  # between the vertices, for the certificate
-HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for
+HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
 HoldChoice = Literal["innovation", "reading"]
@@ -49,7 +48,6 @@ OWN_MEMORY = (
     memory("balise_place", "m", 0.0, "Where it was"),
     memory("balise_reading", "m/s", 0.0, "Odometer then"),
     memory("balises_used", "1", 0.0, "Balises used so far"),
-    memory("onset_lead", "m", 0.0, "Position minus way of the odometer when the last fault began"),
 )
 
 
@@ -110,6 +108,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     source = "Aguiar Cota 2019, (3.36)-(3.45), Algorithm 3-3, section 3.3.2; the repaired rules ours"
     internal_step = 1e-2
     frictions = (SPEED.name,)
+    weighing = "position"
     events = (BALISE, replace(ODOMETER_SAMPLE, samples=("odometer",)))
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort as commanded: traction positive, brake negative"),
@@ -177,9 +176,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         innovation = (1.0 - lies) * self._difference(x)
         acceleration = self._free_acceleration(x, u, p) + gain[0] * innovation
         runs_on = 1.0 - lies if self.repaired else 1.0
-        drifts = runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation
-        standing = stands(x[V], x[HELD], p.odometer_noise if self.repaired else 0.0)
-        return vector(x[V], acceleration, *held_disturbance(standing, *drifts, x[RATE]), x[HELD])
+        return vector(x[V], acceleration, runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation, x[HELD])
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
@@ -232,11 +229,10 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             stable, longest = sampled
             holds, margin, P = stable.holds, stable.margin, stable.lyapunov_matrix
             constant, radius = stable.spectral_radius < 1.0, stable.spectral_radius
-            reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any looked at, up to {HORIZON:g} s,"
-            note = f"the odometer's period {reach} at a steady speed"
+            note = f"the odometer's period may be up to {longest:.3g} s at a steady speed"
         return Certificate(
             max_gap=max_gap,
-            horizon=inf,
+            horizon=max(HORIZON, max_gap),
             constant_limit=inf if constant else 0.0,
             aperiodic_limit=inf if holds else 0.0,
             spectral_radius=radius,
@@ -255,7 +251,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(LEAD + 1)]
+        own = [x[i] for i in range(BALISES + 1)]
         acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
         now = np.maximum(u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0), 0.0)
         told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
@@ -265,20 +261,17 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
         own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
         own[HELD], own[LAST_D], own[LAST_RATE] = now, own[D], own[RATE]
-        # What may have been the estimate's mistake costs no more than the odometer would have.
-        own[P] = np.where(judged.withdrawn > 0.0, x[WAY] + x[LEAD], x[P])
-        own[LEAD] = np.where(judged.onset > 0.0, x[P] - x[WAY], x[LEAD])
         return vector(*own, *judged.memory)
 
     def _at_balise(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(LEAD + 1)]
+        own = [x[i] for i in range(BALISES + 1)]
         told = Passing(
             t - x[BALISE_TIME],
             u.balise_position - x[BALISE_PLACE],
             x[WAY],
             x[P] - x[BALISE_PLACE],
             x[HELD] - x[BALISE_ODOMETER],
-            2.0 * np.maximum(u.balise_location_accuracy, 0.0),
+            2.0 * known_accuracy(u.balise_location_accuracy),
             # Exactly on the balise: the gate has restarted the position there, and the way before it says nothing.
             np.where(x[BALISES] > 0.0, np.where(x[P] == u.balise_position, 0.0, 1.0), 0.0),
         )
@@ -287,7 +280,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         own[CORRECTION] = np.where(judged.restart > 0.0, 0.0, x[CORRECTION])
         own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
         own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
-        own[BALISES], own[LEAD] = x[BALISES] + 1.0, u.balise_position
+        own[BALISES] = x[BALISES] + 1.0
         return vector(*own, *judged.memory)
 
     def _difference(self, x: Array) -> Array:
@@ -306,7 +299,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         return (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D]
 
     def _rule_memory(self, x: Array) -> tuple[Array, ...]:
-        return tuple(x[LEAD + 1 + i] for i in range(len(self.rules.memory)))
+        return tuple(x[BALISES + 1 + i] for i in range(len(self.rules.memory)))
 
 
 def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,6 @@ import pytest
 
 from cosim import Scenario
 from cosim.errors import CosimError
-from fmu_observer import OBSERVERS
 
 STUDIES = Path(__file__).resolve().parents[3] / "docs" / "studies"
 OBSERVER = "takagi_sugeno_cdo"
@@ -73,7 +72,7 @@ def test_a_part_of_the_study_comes_out_again() -> None:
     finally:
         sys.path.remove(str(STUDIES))
         sys.modules.pop("telegram_gate", None)
-    telegrams = study.follow(OBSERVERS[OBSERVER](), study.record("slippery", stop=25.0), spacing=20.0, start=0.0)
-    assert len(telegrams) > 10
-    assert study.missed_true(telegrams) == 0.0
-    assert study.accepted_false(telegrams, (0.3, 3.0, 30.0)).tolist() == [1.0, 0.0, 0.0]
+    telegrams = study.follow(OBSERVER, study.record("wet", stop=120.0), 100.0, 0.5, "wrong")
+    assert len(telegrams) > 30
+    assert study.ignored_true(telegrams) == 0.0
+    assert np.interp((1.0, 100.0), study.OFFSETS, study.accepted_false(telegrams)).tolist() == [1.0, 0.0]

@@ -10,8 +10,12 @@ from pathlib import Path
 import pytest
 
 from cosim import Scenario
-from cosim.balises.recorded import read_layout
+from cosim.balises.layout import from_csv
+from cosim.balises.recorded import RecordedLayout, read_layout
 from cosim.errors import ScenarioError
+from cosim.observer_benchmark.playback import train_observers
+from cosim.results.data import BaliseRecord
+from cosim.results.events_file import read_events, write_events
 
 LOG = "time,odometer [km/h],effort [N]\n0,36,0\n2,36,0\n"
 
@@ -109,3 +113,47 @@ def test_position_and_speed_are_left_out_only_beside_a_recording_and_together(tm
         alone.copy().balises(position="plant.position", **recorded).run()
     with pytest.raises(ScenarioError, match="layout 'instants' needs 'position' and 'speed', outputs of the plant"):
         alone.copy().balises(layout="instants", instants=[0.5]).run()
+
+
+@pytest.mark.parametrize("accuracy", ["nan", "-0.5", "inf"])
+def test_an_accuracy_that_is_none_is_refused_by_row_and_column(tmp_path: Path, accuracy: str) -> None:
+    path = table(tmp_path, f"stamp,position,location_accuracy\n0.5,5,3\n0.6,6,{accuracy}\n")
+    said = r"telegrams\.csv, line 3: location_accuracy: expected a finite number of 0 m or more, got "
+    with pytest.raises(ScenarioError, match=said + accuracy):
+        read_layout(path)
+    (tmp_path / "track.csv").write_text(f"position,location_accuracy\n5,3\n6,{accuracy}\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"track\.csv, line 3: location_accuracy: expected .* got " + accuracy):
+        from_csv(tmp_path / "track.csv")
+    record = BaliseRecord(0.5, 0.5, "B1", 5.0, 5.0, float(accuracy))
+    with pytest.raises(ScenarioError, match=r"a run: telegram 1 \(B1\): location_accuracy: expected"):
+        RecordedLayout((record,), "a run")
+    write_events(tmp_path / "events.csv", [record])
+    with pytest.raises(ValueError, match=r"events\.csv, line 2: location_accuracy: expected"):
+        read_events(tmp_path / "events.csv")
+
+
+RECEIVERS = [name for name in train_observers() if name != "delayed_train_observer"]
+
+
+@pytest.mark.parametrize("way", ["block2", "block3"])
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_a_telegram_that_is_told_twice_counts_once(tmp_path: Path, name: str, way: str) -> None:
+    """LAW: no receiver changes by a bit; another telegram of this stamp, and this balise later, are told."""
+    ends = []
+    for again in ("", "B1,0.5,0.5,5,20\nB1,0.5,0.75,5,20\nB2,1.0,1.3,7,0\n"):
+        told = "identity,stamp,delivered_at,position,location_accuracy\nB1,0.5,0.5,5,20\nB2,1.0,1.1,11,0\n" + again
+        scenario = without_position(tmp_path, told)
+        signals = {s.name for s in train_observers()[name]().input_signals}
+        scenario.add("receiver", observer=name, **{"as": way})
+        wired = [f"log.{s} -> receiver.{s}" for s in ("odometer", "effort") if s in signals]
+        outcome = scenario.connect(*wired).set("certificates", "ignore").run(warn=quietly)
+        ends.append({s: outcome.result.table[s][-1] for s in outcome.result.table.dtype.names if "receiver." in s})
+        fates = [e.outcomes["receiver"] for e in outcome.result.events]
+        assert fates.count("repeated") == (3 if again else 0)
+    assert ends[0] == ends[1]
+
+
+def test_false_telegrams_of_one_instant_are_two(tmp_path: Path) -> None:
+    told = "stamp,position,identity,kind\n0.5,5,false,false\n0.5,25,false,false\n"
+    outcome = without_position(tmp_path, told).run(warn=quietly)
+    assert [e.outcomes["observer"] for e in outcome.result.events] == ["accepted", "accepted"]

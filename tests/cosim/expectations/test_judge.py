@@ -138,6 +138,8 @@ TELEGRAMS = [
     ({"false": 0}, [False], [1]),
     ({"false": 0, "from": 2.5}, [True], [0]),
     ({"rejected": 0}, [False, True], [1, 0]),  # observer, other
+    ({"ignored": 0}, [True, True], [0, 0]),
+    ({"doubted": 0}, [True, True], [0, 0]),
     ({"rejected": 0, "of": "other"}, [True], [0]),
     ({"late": 0}, [False, True], [1, 0]),
     ({"undelivered": 0, "of": "observer"}, [False], [1]),
@@ -152,6 +154,20 @@ def test_telegrams(item: dict[str, Any], passed: list[bool], counts: list[int]) 
     found = judged(hand_made(), {"check": "telegrams"} | item)
     assert [j.passed for j in found] == passed
     assert [j.measured for j in found] == counts
+
+
+def test_what_a_gate_ignored_was_not_taken() -> None:
+    """No receiver rejected it by a policy for late ones, and yet none of them is "not rejected"."""
+    run = hand_made()
+    true = [e for e in run.events if e.kind == "true"]
+    ignored = replace(run, events=[*true, replace(true[0], stamp=3.5, outcomes={"other": "ignored"})])
+    (rejected, doubts, used) = (
+        judged(ignored, {"check": "telegrams", "of": "other"} | item)[0]
+        for item in ({"rejected": 0}, {"ignored": 1}, {"used": 4})
+    )
+    assert (rejected.passed, rejected.measured) == (False, 1.0)
+    assert (doubts.passed, doubts.measured) == (True, 1.0)
+    assert not used.passed
 
 
 def test_telegrams_that_are_too_many_are_named() -> None:
