@@ -219,5 +219,11 @@ def _info(component: Component, name: str) -> SignalInfo:
     display = variable.displayUnit or (declared.displayUnit if declared is not None else None)
     flows = variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
     unit = component.unit_name(name) or "1"
-    kind, text = "continuous" if flows else "discrete", variable.description or ""
-    return SignalInfo(f"{component.name}.{name}", unit, display, kind, text, component.can_be_missing(name))
+    return SignalInfo(
+        f"{component.name}.{name}",
+        unit,
+        display,
+        "continuous" if flows else "discrete",
+        variable.description or "",
+        component.can_be_missing(name),
+    )

@@ -11,6 +11,7 @@ import numpy as np
 from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
 from fmu_observer.annotated_variable import declared_warnings
+from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.output_warning import OutputWarning
 
 DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
@@ -45,6 +46,18 @@ def warnings_after(
         if wrong:
             counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
             yield f"{name} logged {counts}; the last says: {component.messages.reason}"
+
+
+def missed_samples(components: Mapping[str, Component]) -> Iterator[str]:
+    """Notes of the measurements that were missing, one a component that left some out.
+
+    Args:
+        components: by name.
+    """
+    for name, component in components.items():
+        count = (component.outcomes() or {}).get(MISSED_SAMPLES, 0)
+        if count:
+            yield f"{name}: {count} measurements were missing at its samples, and left out."
 
 
 def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning) -> Iterator[str]:

@@ -87,7 +87,7 @@ def watched_plant(table: BalisesTable, components: Mapping[str, Component], wher
         table: of the balises. components: by name. where: name of the scenario, for messages.
 
     Raises:
-        ScenarioError: position and speed are not of one component, or are neither outputs nor locals.
+        ScenarioError: position and speed are not of one component, are neither outputs nor locals, or can be missing.
     """
     if table.position is None or table.speed is None:
         plant = next((name for name, component in components.items() if component.kind == RECORDING), "")
@@ -112,6 +112,11 @@ def _checked(table: BalisesTable, plant: str, components: Mapping[str, Component
         if name is not None:
             component, signal = split_name(name, components, f"{where}: balises.{key}")
             components[component].variable(signal, *SOURCES)
+            if components[component].can_be_missing(signal):
+                raise ScenarioError(
+                    f"{where}: balises.{key}: {name} can be missing (NaN), and neither a passing nor a telegram leaves "
+                    "that out; name a signal that is always there."
+                )
     return plant
 
 

@@ -73,9 +73,8 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
         return None
     name = table.model or table.observer
     if isinstance(model, type):
-        system: HybridSystem = _made(
-            model, _for_its_period(model, _chosen_options(model, table.options, where), table), where
-        )
+        options = _for_its_period(model, _chosen_options(model, table.options, where), table)
+        system: HybridSystem = _made(model, options, where)
     elif table.options != dict(model.options):
         raise ScenarioError(f"{where}: {name} is an instance, which has its options already; give the class instead.")
     else:
@@ -247,7 +246,8 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     given = (table.model or table.observer or ModelName()).given is system
     if given:
         return system
-    lasting = _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    options = _for_its_period(type(system), table.options, table)
+    lasting = _systems.setdefault((type(system), repr(sorted(options.items()))), system)
     while len(_systems) > LASTING:
         _systems.pop(next(iter(_systems)))
     return lasting
@@ -310,9 +310,10 @@ def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], whe
 
 def _for_its_period(factory: type[HybridSystem], options: dict[str, Any], table: ComponentTable) -> dict[str, Any]:
     """The options, with the period that the parameters set: a filter of a plant takes as many steps as that needs."""
-    period, told = table.parameters.get("sample_period"), {"period", "substeps"}
-    given = isinstance(period, int | float) and not isinstance(period, bool) and period > 0.0
-    built = "period" in factory.option_choices and given and not told & set(options)
+    period = table.parameters.get("sample_period")
+    if isinstance(period, bool) or not isinstance(period, int | float) or not period > 0.0:
+        return options
+    built = "period" in factory.option_choices and not {"period", "substeps"} & set(options)
     return {**options, "period": float(period)} if built else options
 
 

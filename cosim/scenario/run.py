@@ -38,7 +38,7 @@ from cosim.process.sentinel import limited_calls
 from cosim.results.result import Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
 from cosim.results.stream import Stream
-from cosim.scenario.after_run import warnings_after
+from cosim.scenario.after_run import missed_samples, warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.balise_summary import all_telegrams, balise_summary
 from cosim.scenario.certificates import check_certificates
@@ -267,6 +267,7 @@ class _Setup:
         for warning in beyond:
             self._warn(warning)
         summary |= found
+        self.notes += missed_samples(self.components)
         summary |= {"certificates": self.certificates, "premises": premises} | {
             "warnings": self.warnings,
             "notes": self.notes,

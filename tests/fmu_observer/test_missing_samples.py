@@ -133,7 +133,7 @@ def model() -> FilterModel:
 
 
 def reference(readings: np.ndarray, drive: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Estimates and covariances by filterpy, whose updates take the rows that are there."""
+    """Estimates, covariances and likelihood by filterpy, whose updates take the rows that are there."""
     m = model()
     known = Known(0.0, np.zeros(1), np.zeros(0))
     F = np.asarray(m.transition_jacobians(m.start, known, PERIOD)[0])
@@ -141,14 +141,15 @@ def reference(readings: np.ndarray, drive: np.ndarray, Q: np.ndarray, R: np.ndar
     theirs = TheirFilter(3, 2)
     theirs.F, theirs.Q, theirs.x, theirs.P = F, Q, m.start.copy(), np.eye(3)
     B = np.asarray(m.moved(np.zeros(3), np.zeros(0), known._replace(u=np.ones(1)), PERIOD))
-    rows = []
+    rows, told = [], 0.0
     for k, y in enumerate(readings):
         if k:
             theirs.x, theirs.P = F @ theirs.x + B * drive[k - 1], F @ theirs.P @ F.T + Q
         there = np.flatnonzero(~np.isnan(y))
         if len(there):
             theirs.update(y[there], R=R[np.ix_(there, there)], H=H[there])
-        rows.append(np.hstack([theirs.x.ravel(), theirs.P.ravel()]))
+            told += theirs.log_likelihood
+        rows.append(np.hstack([theirs.x.ravel(), theirs.P.ravel(), told]))
     return np.array(rows)
 
 
@@ -165,15 +166,19 @@ def test_the_filters_are_that_of_another_package_with_updates_left_out(name: str
     readings[random.random((COUNT, 2)) < 0.4] = np.nan
     system: GaussianFilter = OBSERVERS[name](model(), form=form)
     runtime = Runtime(system)
+    places = [i for i, n in enumerate(scalar_names(system.parameter_signals)) if n.startswith("measurement_covariance")]
+    runtime.p[places] = [1e-2, 8e-3, 8e-3, 2e-2]  # what is missing takes its correlation along
     p = system.unpack_parameters(runtime.p)
     Q, R = p.process_covariance.reshape(3, 3), p.measurement_covariance.reshape(2, 2)
     expected = reference(readings, drive, Q, R)
+    likelihood_place = scalar_names(system.states).index("log_likelihood")
     for k in range(COUNT):
         runtime.u[:] = [drive[k - 1] if k else 0.0, *readings[k]]
         runtime.start(0.0) if k == 0 else runtime.advance(k * PERIOD)
         P = system.covariance_of(runtime.x[3:12].reshape(3, 3))
+        likelihood = runtime.x[likelihood_place]
         # 1e-9: sigma points of alpha = 1e-3 and square roots lose about half of the digits of a covariance of 1e-5
-        np.testing.assert_allclose(np.hstack([runtime.x[:3], P.ravel()]), expected[k], rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(np.hstack([runtime.x[:3], P.ravel(), likelihood]), expected[k], rtol=1e-7, atol=1e-9)
     assert runtime.x[MISSED_PLACE] == np.isnan(readings).sum()
 
 
@@ -184,10 +189,14 @@ def test_members_that_are_told_nothing_only_move(name: str) -> None:
     random = np.random.default_rng(5)
     names = scalar_names(system.input_signals)
     u = random.normal(size=len(names))
-    x = jumped(system, "sampling", system.start_state(), u, 0.0)
+    values, resampling = system.start_parameters(), "resampling_threshold" if name == "particle_filter" else "inflation"
+    place = scalar_names(system.parameter_signals).index(resampling)
+    values[place] = {"inflation": 1.0, "resampling_threshold": 0.0}[resampling]  # so that weights differ
+    x = np.asarray(system.jump_vector("sampling", 0.0, system.start_state(), u, values))
+    values[place] = {"inflation": 1.5, "resampling_threshold": 1.0}[resampling]  # what a correction would do first
     lacking = u.copy()
     lacking[[names.index("measured_y1"), names.index("measured_y2")]] = np.nan
-    after = jumped(system, "sampling", x, lacking, PERIOD)
+    after = np.asarray(system.jump_vector("sampling", PERIOD, x, lacking, values))
     before = np.reshape(x[7:37], (10, 3))
     p, given_u = system.unpack_parameters(system.start_parameters()), system.unpack_inputs(lacking)
     moved = system._moved(before, PERIOD, given_u, p)  # the one thing that is to happen
@@ -201,12 +210,16 @@ def test_members_take_the_measurements_that_are_there(name: str) -> None:
     both = model()
     one = replace(both, measurements=both.measurements[:1], measured=lambda x, v, known: both.measured(x, v, known)[:1])
     two, single = OBSERVERS[name](both, 10), OBSERVERS[name](one, 10)
+    parameters = two.start_parameters()
+    places = [i for i, n in enumerate(scalar_names(two.parameter_signals)) if n.startswith("measurement_covariance")]
+    parameters[places] = [1e-4, 9e-5, 9e-5, 2e-4]
     random = np.random.default_rng(7)
     given = {n: random.normal() for n in scalar_names(two.input_signals)}
     x, z = two.start_state(), single.start_state()
     for k in range(4):
         given["measured_y1"], given["measured_y2"] = random.normal(), np.nan
-        x = jumped(two, "sampling", x, np.array([given[n] for n in scalar_names(two.input_signals)]), k * PERIOD)
+        u = np.array([given[n] for n in scalar_names(two.input_signals)])
+        x = np.asarray(two.jump_vector("sampling", k * PERIOD, x, u, parameters))
         z = jumped(single, "sampling", z, np.array([given[n] for n in scalar_names(single.input_signals)]), k * PERIOD)
         np.testing.assert_allclose(x[:37], z[:37], rtol=1e-12, atol=1e-12)
 

@@ -439,7 +439,7 @@ def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Arra
     """The last innovations and their covariance, with those of `rows` replaced that are there."""
     q = e.shape[0]
     place = {row: i for i, row in enumerate(rows)}
-    new = [there[place[i]] > 0.5 if i in place else None for i in range(q)]
+    new: list[Any] = [there[place[i]] > 0.5 if i in place else None for i in range(q)]
     innovations = [e[i] if new[i] is None else np.where(new[i], error[place[i]], e[i]) for i in range(q)]
     entries = [
         S[i, j]

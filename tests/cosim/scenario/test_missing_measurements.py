@@ -10,13 +10,15 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import cosim
+import fmus
 from cosim.errors import CosimError, CouplingError
 from cosim.results.folder import write_results
 from fmu_observer.annotated_variable import can_be_missing
 from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
 from fmus import cached_fmu
 from fmus.fmi.description import read_description
-from plant_models.hybrid import HybridSystem, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, Runtime, output_signal, state, vector
+from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.signal import Signal
 
 TIMES = np.arange(0, 31) / 10.0
@@ -81,7 +83,8 @@ def test_the_same_numbers_come_from_blocks_and_fmus_by_both_steppers(backend: st
     assert outcome.result.summary["master"]["stepper"]["name"] == stepper
     for name in ("gauge.angle", "filter.angle", "filter.nis"):
         np.testing.assert_allclose(outcome[name], reference[name], rtol=1e-12, atol=1e-15)
-    assert missed(outcome) == np.isnan(outcome["gauge.angle"]).sum() > 5
+    assert (count := missed(outcome)) == np.isnan(outcome["gauge.angle"]).sum() > 5
+    assert f"filter: {count} measurements were missing at its samples, and left out." in outcome.result.summary["notes"]
     assert np.isfinite(outcome["filter.angle"]).all()
 
 
@@ -92,6 +95,39 @@ def test_the_mark_stands_in_the_description_of_an_fmu(version: Any) -> None:
         file = cached_fmu(system, version)
         assert not validate_fmu(str(file))
         assert [v.name for v in read_description(file).modelVariables if can_be_missing(v)] == marked
+
+
+@pytest.mark.parametrize(
+    "master",
+    [{"control": "doubling"}, {"inputs": "interpolate"}, {"inputs": "extrapolate"}, {"algorithm": "iterate"}],
+    ids=lambda master: " ".join(master.values()),
+)
+def test_it_is_held_whatever_follows_lines_and_errors(master: dict[str, Any]) -> None:
+    """No line leads to NaN, and no error is measured by it: the numbers are those of held inputs and fixed steps."""
+    reference, outcome = (filtered(**table).run(warn=lambda _: None) for table in ({}, master))
+    assert outcome.failure is None
+    assert missed(outcome) == missed(reference)
+    # step doubling moves the plant in halves of a communication step, which are multiples of its internal step
+    np.testing.assert_allclose(outcome["filter.angle"], reference["filter.angle"], rtol=1e-12)
+
+
+@pytest.mark.compiler
+def test_members_of_a_batch_leave_it_out_one_by_one() -> None:
+    """The member whose measurement is missing predicts; the others are as ever, and nobody stops."""
+    batch = fmus.Batch(KalmanFilter(), members=3)
+    batch.start()
+    values = np.tile([[0.2], [np.nan], [-0.1]], (1, 4))
+    values[1, 0] = 0.2
+    batch.run([0.1, 0.2, 0.3], ["angle"], {"measured_angle": values})
+    assert not batch.failures
+    assert batch.get(MISSED_SAMPLES).tolist() == [0.0, 2.0, 0.0]  # inputs are held over the step that they begin
+    alone = Runtime(KalmanFilter())
+    alone.start(0.0)
+    for value, until in ((0.2, 0.1), (np.nan, 0.3)):
+        alone.u[1] = value
+        alone.advance(until)
+    place = [s.name for s in alone.system.outputs].index("angle")
+    assert batch.get("angle")[1] == pytest.approx(float(alone.update_outputs()[place]), rel=1e-12)
 
 
 def test_what_is_not_declared_ends_the_run_and_says_how_to_declare_it() -> None:
@@ -122,6 +158,19 @@ def test_a_target_that_cannot_leave_it_out_is_refused_before_the_run() -> None:
     with pytest.raises(
         CouplingError, match=r"gauge\.angle can be missing .* observer\.measured_angle does not leave out"
     ):
+        scenario.run(warn=lambda _: None)
+
+
+@pytest.mark.parametrize("key", ["position", "odometer"])
+def test_balises_are_found_and_told_by_what_is_always_there(key: str) -> None:
+    scenario = cosim.Scenario(stop=1.0, step=0.1)
+    scenario.add(
+        "train", model="longitudinal_train", can_be_missing=["position" if key == "position" else "acceleration"]
+    )
+    scenario.add("observer", observer="takagi_sugeno_cdo")
+    sources = {"position": "train.position", "speed": "train.speed", "odometer": "train.acceleration"}
+    scenario.balises(layout="spacing", spacing=10.0, track_end=100.0, **sources)
+    with pytest.raises(CosimError, match=rf"balises\.{key}: train\.\w+ can be missing"):
         scenario.run(warn=lambda _: None)
 
 
