@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any, Literal
 
+from cosim.components.recording_data import Chosen
 from cosim.errors import BaselineError
 
 Kind = Literal["fmu", "scenario", "result"]
@@ -28,6 +29,7 @@ class Recipe:
         parameters: start values by name, of an FMU alone.
         record: variables recorded besides the outputs, of an FMU alone.
         overrides: of a scenario, as for `Scenario.set`.
+        interpolation: whether columns of the table are held or run on lines, of all or of some by name.
     """
 
     kind: Kind = "result"
@@ -39,6 +41,7 @@ class Recipe:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     record: Sequence[str] = ()
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    interpolation: Chosen = None
 
     def to_data(self, folder: Path) -> dict[str, Any]:
         """Plain data for a file in `folder`."""
@@ -50,6 +53,8 @@ class Recipe:
             value = getattr(self, key)
             if value:
                 data[key] = _relative(value, folder) if isinstance(value, str) else dict(value)
+        if self.interpolation is not None:
+            data["interpolation"] = self.interpolation
         return data | ({"record": list(self.record)} if self.record else {})
 
     @classmethod

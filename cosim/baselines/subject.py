@@ -10,6 +10,7 @@ from typing import Any
 
 from cosim.baselines.baseline import Baseline
 from cosim.baselines.recipe import Recipe
+from cosim.components.recording_data import Chosen
 from cosim.errors import BaselineError, ScenarioError
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
@@ -56,6 +57,7 @@ def run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[
             inputs=recipe.inputs,
             parameters=recipe.parameters,
             record=recipe.record,
+            interpolation=recipe.interpolation,
         )
         outcome = scenario.run(progress=progress, warn=_about_inputs(recipe, warn))
     else:
@@ -100,6 +102,7 @@ def make_subject(
     parameters: Mapping[str, Any] | None = None,
     record: Sequence[str] = (),
     overrides: Mapping[str, Any] | None = None,
+    interpolation: Chosen = None,
     progress: Progress | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> Subject:
@@ -113,6 +116,7 @@ def make_subject(
         parameters: start values of an FMU alone, by name.
         record: variables of an FMU alone to record besides its outputs.
         overrides: of a scenario, as for `Scenario.set`.
+        interpolation: of the columns of a table of inputs, as for `Scenario.fmu`.
         progress, warn: as for `Scenario.run`.
 
     Raises:
@@ -123,7 +127,10 @@ def make_subject(
     if isinstance(what, Outcome | Result):
         _refuse(
             "a result of a run made already",
-            times | _given(inputs=inputs, parameters=parameters, record=record, overrides=overrides),
+            times
+            | _given(
+                inputs=inputs, parameters=parameters, record=record, overrides=overrides, interpolation=interpolation
+            ),
         )
         outcome = what if isinstance(what, Outcome) else None
         return Subject(Recipe(), what if isinstance(what, Result) else what.result, outcome)
@@ -131,10 +138,18 @@ def make_subject(
         _refuse("an FMU alone", _given(overrides=overrides))
         table = str((folder / inputs).resolve()) if isinstance(inputs, str | Path) else dict(inputs or {})
         recipe = Recipe(
-            "fmu", str((folder / what).resolve()), start, stop, step, table, dict(parameters or {}), tuple(record)
+            "fmu",
+            str((folder / what).resolve()),
+            start,
+            stop,
+            step,
+            table,
+            dict(parameters or {}),
+            tuple(record),
+            interpolation=interpolation,
         )
         return run_recipe(recipe, progress, warn)
-    _refuse("a scenario", _given(inputs=inputs, parameters=parameters, record=record))
+    _refuse("a scenario", _given(inputs=inputs, parameters=parameters, record=record, interpolation=interpolation))
     changes = {**times, **(overrides or {})}
     if isinstance(what, Scenario):
         outcome = what.run(progress=progress, overrides=changes, warn=warn)

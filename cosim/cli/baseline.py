@@ -16,7 +16,7 @@ from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
 from cosim.cli.baseline_text import print_json, tell_change, tell_comparison, tell_header
-from cosim.cli.scenarios import OVERRIDES, parse_setting, simulated_time_bar
+from cosim.cli.scenarios import OVERRIDES, between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import Asked, add_tolerances, asked_tolerances, chosen_tolerances
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
@@ -67,6 +67,13 @@ def _register_make(actions: Any) -> None:
         help=f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input",
     )
     make.add_argument("--inputs", metavar="TABLE", help="of an FMU: a table with a column for each input")
+    make.add_argument(
+        "--between",
+        nargs="+",
+        default=[],
+        metavar="[NAME=]hold|linear",
+        help="what inputs of the table do between its rows (default: linear, held where discrete)",
+    )
     for key, what in (("start", "begin"), ("stop", "end"), ("step", "communication step")):
         make.add_argument(f"--{key}", type=float, metavar="SECONDS", help=f"{what} of the run [s]")
     make.add_argument(
@@ -146,6 +153,7 @@ def _subject(options: argparse.Namespace) -> Subject:
             stop=options.stop,
             step=options.step,
             record=options.record,
+            interpolation=between_samples(options.between),
             progress=bar,
             warn=_warn,
             **_values(options),

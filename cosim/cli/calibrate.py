@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,7 @@ from cosim import calibration
 from cosim.calibration.fitting import Calibration, calibrate
 from cosim.calibration.recorded_signals import CalibrationError, sort_columns
 from cosim.calibration.runs import FmuRuns, Runs, ScenarioRuns
-from cosim.cli.scenarios import parse_setting
-from cosim.components.recording_data import Chosen, Interpolation
+from cosim.cli.scenarios import between_samples, parse_setting
 from cosim.errors import OutputError, ScenarioError
 from cosim.results.load import load_result
 from cosim.results.summary_file import jsonable
@@ -137,26 +135,6 @@ def _runs(options: argparse.Namespace) -> Runs:
     for name, value in settings.items():
         scenario.set(name, value)
     return ScenarioRuns(scenario, names, guesses)
-
-
-def between_samples(texts: Sequence[str]) -> Chosen:
-    """What ``--between`` says: of all inputs, or of some.
-
-    Args:
-        texts: ``hold``, ``linear``, or ``name=hold``.
-
-    Raises:
-        ScenarioError: a text is none of these.
-    """
-    said: dict[str, Interpolation] = {}
-    for text in texts:
-        name, sign, kind = text.rpartition("=")
-        if kind not in ("hold", "linear") or (not sign and len(texts) > 1):
-            raise ScenarioError(f"--between {text}: expected hold or linear for all inputs, or NAME=hold for each.")
-        if not sign:
-            return kind  # type: ignore[return-value] # one of the two
-        said[name] = kind  # type: ignore[assignment] # one of the two
-    return said or None
 
 
 def _number(option: str, name: str, value: Any) -> float:

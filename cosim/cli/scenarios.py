@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import tomllib
+from collections.abc import Sequence
 from typing import Any
 
+from cosim.components.recording_data import Chosen, Interpolation
 from cosim.errors import ScenarioError
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
@@ -89,3 +91,23 @@ def positive(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
     return value
+
+
+def between_samples(texts: Sequence[str]) -> Chosen:
+    """What ``--between`` says: of all inputs, or of some.
+
+    Args:
+        texts: ``hold``, ``linear``, or ``name=hold``.
+
+    Raises:
+        ScenarioError: a text is none of these.
+    """
+    said: dict[str, Interpolation] = {}
+    for text in texts:
+        name, sign, kind = text.rpartition("=")
+        if kind not in ("hold", "linear") or (not sign and len(texts) > 1):
+            raise ScenarioError(f"--between {text}: expected hold or linear for all inputs, or NAME=hold for each.")
+        if not sign:
+            return kind  # type: ignore[return-value] # one of the two
+        said[name] = kind  # type: ignore[assignment] # one of the two
+    return said or None

@@ -50,6 +50,7 @@ class FmuRegression:
         parameters: Mapping[str, Any] | None = None,
         record: Sequence[str] = (),
         overrides: Mapping[str, Any] | None = None,
+        interpolation: str | Mapping[str, str] | None = None,
         signals: Sequence[str] | None = None,
         every: float | None = None,
         tolerance: Any = None,
@@ -65,6 +66,7 @@ class FmuRegression:
             start, stop, step: of the run [s]; of an FMU alone those of its default experiment where not given.
             inputs: of an FMU alone: constants by name, or a table (CSV) with a column for each.
             parameters: start values of an FMU alone. record: its variables to record besides the outputs.
+            interpolation: of the columns of a table of inputs: ``hold`` or ``linear``, for all or for some by name.
             overrides: of a scenario: ``{"locomotive.mass": 70e3}``.
             signals: names or patterns of the signals to keep and compare; None for all.
             every: least spacing of the rows kept [s]; None for at most about 2000 rows.
@@ -81,7 +83,7 @@ class FmuRegression:
         compared: dict[str, Any] = {"signals": signals, "every": every, "ignore": ignore}
         compared |= {"tolerance": tolerance, "tolerances": tolerances}
         run: dict[str, Any] = {"start": start, "stop": stop, "step": step, "overrides": overrides}
-        run |= {"inputs": inputs, "parameters": parameters, "record": record}
+        run |= {"inputs": inputs, "parameters": parameters, "record": record, "interpolation": interpolation}
         try:
             call = Call.run(what, self._file.parent, path, **compared, **run)
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)

@@ -14,6 +14,7 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.chain import COMPILED_STAGE_TEXT, plain_way
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
+from cosim.coupling.instants import followed
 from cosim.master.algorithms.choose import AlgorithmChoice
 from cosim.master.control.multirate import rate_stage_text
 from cosim.master.events.choose import taking_part
@@ -53,8 +54,10 @@ def movement_chains(
         if name in part
     )
     connected = {c.target[0] for c in connections}
-    interpolator = None if table.master.inputs == "hold" else AT_SET_UP
-    compiled = not part and interpolator is None and _may_compile(table, components, connections, choice)
+    ahead = followed(components, connections)
+    lines = {c.target[0] for c in connections if c.source_variable in ahead}
+    every_line = table.master.inputs != "hold"
+    compiled = not part and not every_line and not lines and _may_compile(table, components, connections, choice)
     chains = {}
     for name, component in components.items():
         every, whole = table.components[name].every, not component.can_vary_step
@@ -63,6 +66,7 @@ def movement_chains(
         told = _balise_stage(name, balises)
         stages += told or ([PACKET_STAGE_TEXT] if name in (listeners or ()) else [])
         stages += [COMPILED] if compiled else []
+        interpolator = AT_SET_UP if every_line or name in lines else None
         inputs, substeps = name in connected, table.components[name].substeps
         chains[name] = *stages, plain_way(interpolator, substeps, inputs=inputs, gated=name in part)
     return chains

@@ -13,7 +13,7 @@ from cosim.components.component import Component
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.coupling.feedthrough import AlgebraicLoop, declared_feedthrough, undeclared_outputs
-from cosim.coupling.instants import held_signals
+from cosim.coupling.instants import followed, held_signals
 from cosim.master.algorithms.choose import AlgorithmChoice
 from cosim.structure.structure import Link, Part, Port, Signal
 
@@ -43,19 +43,22 @@ def make_links(
     Args:
         components: by name. connections: checked. choice: of the algorithm. order: of execution. loops: algebraic ones.
     """
-    every = choice.algorithm == "jacobi"
+    every, ahead = choice.algorithm == "jacobi", followed(components, connections)
     kept = held_signals(components, connections, order, choice.iterated)
     in_loops = {pair for loop in loops for pair in pairwise(loop.path)}
     links: dict[tuple[Signal, Signal], Link] = {}
     for c in connections:
         whole = bool(c.source_array and c.target_array)
         source, target = (c.source_variable, c.target_variable) if whole else (c.source, c.target)
-        held = every or c.source_variable in kept
+        line = c.source_variable in ahead
+        held = (every and not line) or c.source_variable in kept
         iterated = not held and any(source[0] in loop and target[0] in loop for loop in choice.iterated)
         in_loop = (c.source, c.target) in in_loops or (c.source_variable, c.target_variable) in in_loops
         known = links.get((source, target))
         looped = in_loop or (known is not None and known.in_loop)
-        links[source, target] = Link(source, target, c.factor, c.offset, held, looped, iterated, mapped=bool(c.table))
+        links[source, target] = Link(
+            source, target, c.factor, c.offset, held, looped, iterated, mapped=bool(c.table), line=line
+        )
     return tuple(links.values())
 
 

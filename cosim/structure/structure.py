@@ -77,7 +77,7 @@ class Link:
         source, target: its ends. factor, offset: unit conversion ``target = factor * source + offset``.
         held: the target uses the value of the start of a step, as all targets of this signal do.
         in_loop: whether it is part of an algebraic loop. iterated: whether it is iterated until it settles.
-        mapped: whether values are mapped one by one.
+        mapped: whether values are mapped one by one. line: the target follows the line of a table within the step.
     """
 
     source: Signal
@@ -88,6 +88,7 @@ class Link:
     in_loop: bool = False
     iterated: bool = False
     mapped: bool = False
+    line: bool = False
 
     def __str__(self) -> str:
         return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"

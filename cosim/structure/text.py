@@ -140,6 +140,8 @@ def when(link: Link) -> str:
         if link.held
         else "iterated"
         if link.iterated
+        else "a line, its course within the step"
+        if link.line
         else "fresh, of the end of the step"
     )
     return f"{text}; in an algebraic loop" if link.in_loop else text

@@ -175,6 +175,14 @@ def _table(outcome: Outcome, observer: str) -> ScenarioTable:
     component = table.components[observer]
     if component.every != 1 or component.substeps != 1:
         raise ReplayError(f"{observer!r} has a rate of its own (every, substeps); only one step a point is replayed.")
+    played = outcome.result.summary["master"]["algorithm"].get("played", {})
+    links = parse_connections(table.connections, observer)
+    sources = [source for source, target, *_ in links if target.partition(".")[0] == observer]
+    if any(played.get(source) == "line" for source in sources):
+        raise ReplayError(
+            f"{observer!r} followed lines of a table; only held inputs are replayed. Record the run and play "
+            "that back, or set 'interpolation' of the table to 'hold'."
+        )
     if table.master.inputs != "hold":
         raise ReplayError(f"The inputs of {observer!r} followed lines (master.inputs); only held ones are replayed.")
     return table

@@ -4,6 +4,7 @@ algorithm: equal bits from a results folder, and from a table where all is held;
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,29 @@ from scipy.integrate import solve_ivp
 from test_fmus.events import integrator_fmu
 
 from cosim import Scenario
+from cosim.baselines.recipe import Recipe
+from cosim.baselines.subject import make_subject
+from cosim.calibration.fitting import calibrate
+from cosim.calibration.recorded_signals import sort_columns
+from cosim.calibration.runs import FmuRuns
+from cosim.cli import identify
 from cosim.errors import CosimError
+from cosim.results.load import load_result
 from cosim.scenario.outcome import Outcome
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, parameter, state, vector
+from cosim.structure.text import when
+from fmus import cached_fmu
+from plant_models import PLANTS
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    Runtime,
+    input_signal,
+    output_signal,
+    parameter,
+    scalar_names,
+    state,
+    vector,
+)
 from plant_models.hybrid.signal import memory
 
 ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
@@ -237,6 +258,8 @@ def test_a_command_acts_from_its_row_on(tmp_path: Path, algorithm: str, stepper:
     name = next(n for n in outcome.result.table.dtype.names or () if n.startswith("sum."))
     table = np.array(list(zip(t, command, strict=True)), dtype=[("time", float), ("u", float)])
     other = simulate_fmu(str(fmu), stop_time=4.0, step_size=0.5, output_interval=0.5, input=table)
+    again = make_subject(fmu, tmp_path, stop=4.0, step=0.5, inputs="log.csv", interpolation={"u": "hold"})
+    assert Recipe.from_data(again.recipe.to_data(tmp_path), tmp_path) == again.recipe
     rows = np.searchsorted(outcome.result.time, t, side="right") - 1
     np.testing.assert_allclose(outcome[name][rows], 10.0 * np.maximum(t - 1.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(other[name.partition(".")[2]], outcome[name][rows], atol=1e-12)
@@ -257,3 +280,96 @@ def test_what_cannot_be_said_of_columns_is_refused(tmp_path: Path, interpolation
     (tmp_path / "log.csv").write_text("time,u\n0,1\n1,2\n", encoding="utf-8")
     with pytest.raises(CosimError, match=words):
         Scenario(folder=tmp_path, stop=1.0, step=0.1).add("log", recording="log.csv", interpolation=interpolation).run()
+
+
+def test_what_was_said_of_columns_outlives_files_and_is_shown(tmp_path: Path) -> None:
+    """A saved scenario, `cosim show` with Jacobi, and a record of the run: the column is what it was."""
+    (tmp_path / "log.csv").write_text("time,u,v\n0,1,1\n0.5,2,3\n1,2,4\n", encoding="utf-8")
+    scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1, master={"algorithm": "jacobi"})
+    scenario.add("log", recording="log.csv", interpolation={"u": "hold"}).add("lag", model="lag_of_tests", **BLOCK)
+    PLANTS["lag_of_tests"] = Lag
+    try:
+        scenario.connect("log.u -> lag.a", "log.v -> lag.b")
+        told = [when(link) for link in scenario.structure().links]
+        assert sorted(told) == ["a line, its course within the step", "held, of the start of the step"]
+        first = quietly(scenario)
+        again = quietly(Scenario.load(scenario.save(tmp_path / "saved.toml")))
+        first.write(tmp_path / "run", report=False)
+        record = Scenario(folder=tmp_path, stop=1.0, step=0.1, master={"algorithm": "jacobi"})
+        record.add("log", recording="run").add("lag", model="lag_of_tests", **BLOCK)
+        played_again = quietly(record.connect("log.u -> lag.a", "log.v -> lag.b"))
+    finally:
+        del PLANTS["lag_of_tests"]
+    assert different(first, again) == []
+    assert first.result.summary["master"]["algorithm"]["played"] == {"log.u": "held", "log.v": "line"}
+    names = ["lag.y", "lag.z"]  # a line between rows of 0.1 s is the line between rows of 0.5 s, but for its rounding
+    for name in names:
+        np.testing.assert_allclose(played_again[name], first[name], rtol=1e-13, atol=1e-13)
+
+
+def test_a_line_goes_to_no_discrete_input(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,u\n0,1\n4,2\n", encoding="utf-8")
+    scenario = Scenario(folder=tmp_path, stop=4.0, step=0.5).add("log", recording="log.csv", interpolation="linear")
+    scenario.add("sum", fmu=str(integrator_fmu(tmp_path))).connect("log.u -> sum.u")
+    with pytest.raises(CosimError, match=r"log\.u is said to run on lines .*sum\.u is discrete.*'hold' for 'u'"):
+        scenario.run()
+
+
+# -- filters and identification
+# ----------------------------------------------------------------------------------------------------------------
+
+
+def test_an_exact_filter_over_an_fmu_is_consistent_on_a_log(tmp_path: Path) -> None:
+    """The plant's own equations as an FMU, noises as told, efforts held: the mean NIS of 400 samples is 1 within three
+    standard deviations of chi-square. With the effort of the end of the step it is 1.6.
+    """
+    system, h, count = PLANTS["longitudinal_train"](), 0.1, 400
+    speed = list(scalar_names(system.states)).index("train_speed")
+    rng, runtime = np.random.default_rng(0), Runtime(system)
+    runtime.x[speed] = 15.0
+    runtime.start(0.0)
+    u, y = 0.05 + 4.0 * rng.standard_normal(count + 1), [15.0]
+    for k in range(count):
+        runtime.u[0] = u[k]
+        runtime.advance((k + 1) * h)
+        runtime.x[speed] += 0.02 * np.sqrt(h) * rng.standard_normal()
+        y.append(runtime.x[speed] + 0.05 * rng.standard_normal())
+    rows = "".join(f"{k * h!r},{a!r},{float(b)!r}\n" for k, (a, b) in enumerate(zip(u.tolist(), y, strict=True)))
+    (tmp_path / "log.csv").write_text("time,u [N],y [m/s]\n" + rows, encoding="utf-8")
+    scenario = Scenario(folder=tmp_path, stop=count * h, step=h)
+    scenario.add("log", recording="log.csv", interpolation="hold")  # the measurement is a sample all the same
+    settings = {"kind": "ekf", "measurements": {"speed": 0.05}, "process_noise": {"train_speed": 0.02}}
+    settings["start_deviation"] = {"train_speed": 0.05, "train_position": 0.1}
+    path = cached_fmu(system, fmi_version=2)
+    scenario.add("filter", fmu=str(path), parameters={"train_speed": 15.0}, filter=settings)
+    outcome = quietly(scenario.connect("log.u -> filter.effort", "log.y -> filter.measured_speed"))
+    assert abs(np.mean(outcome["filter.nis"][1:]) - 1.0) < 3.0 * np.sqrt(2.0 / count)
+
+
+@pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
+def test_parameters_are_identified_as_the_effort_acted(tmp_path: Path, algorithm: str) -> None:
+    """Without noise a run tells its resistance, of whichever end of a step the effort was: to 1e-5."""
+    true = {"mass": 80e3, "davis_a": 1800.0, "davis_b": 80.0, "davis_c": 7.0}
+    more = {"traction_coefficient": 1.0, "brake_coefficient": 1.0, "train_speed": 8.0}
+    gains = {"proportional_gain": 2e4, "integral_gain": 500.0, "effort_lag": 1.0}
+    profile = {"profile_time": [0, 60, 90, 120, 121, 122, 123, 124], "profile_speed": [10, 30, 32, 20, 20, 20, 20, 20]}
+    scenario = Scenario(stop=100.0, step=0.5, master={"algorithm": algorithm})
+    scenario.add("train", model="longitudinal_train", parameters=true | more, **BLOCK)
+    scenario.add("driver", model="driver", parameters=gains | profile, **BLOCK)
+    quietly(scenario.connect("driver.effort -> train.effort", "train.speed -> driver.odometer")).write(
+        tmp_path / "run", report=False
+    )
+    words = ["identify", "davis", str(tmp_path / "run"), "--speed", "train.speed", "--effort", "driver.effort"]
+    parser = argparse.ArgumentParser()
+    identify.register(parser.add_subparsers())
+    found = identify._identified(parser.parse_args([*words, "--mass", "80e3"]))
+    values = {c.name: c.value for c in found.coefficients}
+    for name in ("davis_a", "davis_b", "davis_c"):
+        assert values[name] == pytest.approx(true[name], rel=1e-5)
+    fmu = cached_fmu(PLANTS["longitudinal_train"](), fmi_version=2)
+    fixed = more | {name: value for name, value in true.items() if name != "mass"}
+    runs = FmuRuns(fmu, ["mass"], fixed=fixed, guesses={"mass": 70e3})
+    recorded = sort_columns(load_result(tmp_path / "run"), "run", runs.outputs, runs.inputs, ["speed=train.speed"])
+    mass = calibrate(runs, recorded).values["mass"]
+    runs.close()
+    assert mass == pytest.approx(80e3, rel=1e-9)
