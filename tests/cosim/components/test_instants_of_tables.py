@@ -247,25 +247,36 @@ def test_continuous_columns_are_of_second_order_where_events_cut_steps(
 @pytest.mark.parametrize("stepper", ["python", "auto"])
 def test_a_command_acts_from_its_row_on(tmp_path: Path, algorithm: str, stepper: str) -> None:
     """0, then 10 from 1 s: an integral is 0 at 1 s and 30 at 4 s; fmpy, which sets inputs as a step starts, agrees."""
-    fmu, t = integrator_fmu(tmp_path), 0.5 * np.arange(9)
+    fmu, t = cached_fmu(PLANTS["odometer"](), fmi_version=2), 0.5 * np.arange(9)
     command = np.where(t >= 1.0, 10.0, 0.0)
-    (tmp_path / "log.csv").write_text(
-        "time,u\n" + "".join(f"{a},{b}\n" for a, b in zip(t, command, strict=True)), encoding="utf-8"
-    )
+    rows = "".join(f"{a},{b}\n" for a, b in zip(t, command, strict=True))
+    (tmp_path / "log.csv").write_text("time,wheel_speed\n" + rows, encoding="utf-8")
     scenario = Scenario(folder=tmp_path, stop=4.0, step=0.5, master={"algorithm": algorithm, "stepper": stepper})
-    scenario.add("log", recording="log.csv", interpolation={"u": "hold"}).add("sum", fmu=str(fmu))
-    outcome = quietly(scenario.connect("log.u -> sum.u"))
-    name = next(n for n in outcome.result.table.dtype.names or () if n.startswith("sum."))
-    table = np.array(list(zip(t, command, strict=True)), dtype=[("time", float), ("u", float)])
+    scenario.add("log", recording="log.csv", interpolation={"wheel_speed": "hold"}).add("sum", fmu=str(fmu))
+    outcome = quietly(scenario.connect("log.wheel_speed -> sum.wheel_speed"))
+    table = np.array(list(zip(t, command, strict=True)), dtype=[("time", float), ("wheel_speed", float)])
     other = simulate_fmu(str(fmu), stop_time=4.0, step_size=0.5, output_interval=0.5, input=table)
-    again = make_subject(fmu, tmp_path, stop=4.0, step=0.5, inputs="log.csv", interpolation={"u": "hold"})
-    assert Recipe.from_data(again.recipe.to_data(tmp_path), tmp_path) == again.recipe
-    rows = np.searchsorted(outcome.result.time, t, side="right") - 1
-    np.testing.assert_allclose(outcome[name][rows], 10.0 * np.maximum(t - 1.0, 0.0), atol=1e-12)
-    np.testing.assert_allclose(other[name.partition(".")[2]], outcome[name][rows], atol=1e-12)
-    alone = quietly(Scenario.fmu(fmu, stop=4.0, step=0.5, inputs=tmp_path / "log.csv"))  # the input is discrete
-    assert alone[f"fmu.{name.partition('.')[2]}"][-1] == pytest.approx(30.0, abs=1e-12)
-    assert any("held from row to row: u" in note for note in alone.result.summary["notes"])
+    np.testing.assert_allclose(outcome["sum.distance"], 10.0 * np.maximum(t - 1.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(other["distance"], outcome["sum.distance"], atol=1e-9)
+
+
+def test_inputs_of_one_fmu_are_told_for_what_they_are_taken(tmp_path: Path) -> None:
+    """Discrete inputs hold a command, 30 at 4 s; continuous ones follow lines, 32.5 as the rows say, unless told."""
+    t = 0.5 * np.arange(9)
+    rows = "".join(f"{a},{b},{b}\n" for a, b in zip(t, np.where(t >= 1.0, 10.0, 0.0), strict=True))
+    (tmp_path / "log.csv").write_text("time,u,wheel_speed\n" + rows, encoding="utf-8")
+    more: dict[str, Any] = {"stop": 4.0, "step": 0.5, "inputs": tmp_path / "log.csv"}
+    held = quietly(Scenario.fmu(integrator_fmu(tmp_path), **more))
+    name = next(n for n in held.result.table.dtype.names or () if n.startswith("fmu."))
+    assert held[name][-1] == pytest.approx(30.0, abs=1e-12)
+    assert any("held from row to row: u" in note for note in held.result.summary["notes"])
+    fmu = cached_fmu(PLANTS["odometer"](), fmi_version=2)
+    lines = quietly(Scenario.fmu(fmu, **more))
+    assert lines["fmu.distance"][-1] == pytest.approx(32.5, abs=1e-9)
+    assert any("on lines between rows: " in note for note in lines.result.summary["notes"])
+    subject = make_subject(fmu, tmp_path, stop=4.0, step=0.5, inputs="log.csv", interpolation={"wheel_speed": "hold"})
+    assert subject.result["fmu.distance"][-1] == pytest.approx(30.0, abs=1e-9)
+    assert Recipe.from_data(subject.recipe.to_data(tmp_path), tmp_path) == subject.recipe
 
 
 @pytest.mark.parametrize(
