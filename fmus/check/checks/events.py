@@ -54,7 +54,7 @@ def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
         rows = bench.steps((bench.h,) * WARM_UP_STEPS)
     finally:
         bench.put_away()
-    bad = not_finite(bench.output_names, np.sum(rows, axis=0))
+    bad = not_finite(bench.output_names, np.sum(rows, axis=0), bench.component.variables)
     if bad:
         return limited(f"not finite after a tick with the start values of its inputs: {listed(bad)}", PAYLOAD)
     return passed(f"its input clocks tick in event mode and the run goes on: {listed(clocks)}")
@@ -67,7 +67,7 @@ def _counted(context: Context, names: Sequence[str]) -> Outcome:
     for name in names:
         start = _warmed_up(bench)
         whole = _crossing(bench, name, (), (bench.h,))
-        bad = not_finite(bench.output_names, whole)
+        bad = not_finite(bench.output_names, whole, bench.component.variables)
         if bad:
             return limited(
                 f"not finite after event {name} with the start values of its payload: {listed(bad)}", PAYLOAD

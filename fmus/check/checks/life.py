@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median
 from time import perf_counter
 
 import numpy as np
 from fmpy.model_description import ModelVariable
 
+from fmu_observer.annotated_variable import can_be_missing
 from fmus.check.behaviour import difference, repeatable
 from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
 from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
@@ -92,7 +93,7 @@ def values_at_start(context: Context) -> Outcome:
         bench.begin(excited=False)
         slave = bench.component
         outputs, locals_ = slave.names("output"), slave.names("local")
-        bad_outputs = not_finite(outputs, slave.read(outputs))
+        bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
         bad_locals = not_finite(locals_, slave.read(locals_))
     finally:
         bench.put_away()
@@ -167,7 +168,7 @@ def _run(context: Context) -> Outcome:
         rows += row
     if not rows:
         raise bench.component.failure("asks for the end in its first step")
-    bad = not_finite(bench.output_names, np.sum(rows, axis=0))
+    bad = not_finite(bench.output_names, np.sum(rows, axis=0), bench.component.variables)
     if bad:
         raise SlaveError(f"not finite while stepping: {listed(bad)}")
     done = f"{len(rows)} steps of {bench.h:g} s"
@@ -267,9 +268,20 @@ def by(problem: str, good: str) -> Outcome:
     return failed(problem) if problem else passed(good)
 
 
-def not_finite(names: Sequence[str], values: np.ndarray) -> list[str]:
-    """The names whose values are NaN or infinite, with the values."""
-    return [f"{n} = {float(v):g}" for n, v in zip(names, values, strict=True) if not math.isfinite(v)]
+def not_finite(
+    names: Sequence[str], values: np.ndarray, variables: Mapping[str, ModelVariable] | None = None
+) -> list[str]:
+    """The names whose values are NaN or infinite, with the values; without those for which NaN is a value.
+
+    Args:
+        names: of the values. values: shape (len(names),). variables: by name; None where all must be numbers.
+    """
+
+    def wrong(name: str, value: float) -> bool:
+        missing = variables is not None and math.isnan(value) and can_be_missing(variables[name])
+        return not math.isfinite(value) and not missing
+
+    return [f"{n} = {float(v):g}" for n, v in zip(names, values, strict=True) if wrong(n, v)]
 
 
 def listed(names: Sequence[str]) -> str:

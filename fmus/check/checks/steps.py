@@ -113,7 +113,7 @@ def _odd(
         if said.refused:
             return _refusal(said)
         after = bench.outputs()
-        bad = not_finite(bench.output_names, after) if np.isfinite(before).all() else []
+        bad = not_finite(bench.output_names, after, slave.variables) if np.isfinite(before).all() else []
         moved = not np.array_equal(before, after, equal_nan=True)
         what = f"a step of {size(bench.h):g} s" + (f" from {shift(bench.h):g} s too late" if shift(bench.h) else "")
         return judge(what, moved, listed(bad))

@@ -16,6 +16,7 @@ from cosim.results.folder import write_results
 from fmu_observer.annotated_variable import can_be_missing
 from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
 from fmus import cached_fmu
+from fmus.check.run import check_fmu
 from fmus.fmi.description import read_description
 from plant_models.hybrid import HybridSystem, Runtime, output_signal, state, vector
 from plant_models.hybrid.missing import MISSED_SAMPLES
@@ -109,6 +110,16 @@ def test_it_is_held_whatever_follows_lines_and_errors(master: dict[str, Any]) ->
     assert missed(outcome) == missed(reference)
     # step doubling moves the plant in halves of a communication step, which are multiples of its internal step
     np.testing.assert_allclose(outcome["filter.angle"], reference["filter.angle"], rtol=1e-12)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("version", [2, 3])
+def test_the_check_of_an_fmu_takes_nan_for_a_value_where_it_is_declared(version: Any) -> None:
+    """Honest: a gauge with gaps. The same FMU without the declaration is found out."""
+    honest = check_fmu(cached_fmu(Gauge(), version))
+    assert not [f for f in honest.findings if "not finite" in f.detail]
+    silent = check_fmu(cached_fmu(Undeclared(), version))
+    assert [f for f in silent.findings if "not finite" in f.detail and "angle" in f.detail]
 
 
 @pytest.mark.compiler
