@@ -17,6 +17,7 @@ from fmu_observer.models.filter_model import FilterModel, Known
 from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.discrete.member_filter import MemberFilter
+from fmus import Batch
 from plant_models.hybrid import Runtime, TracedSystem, scalar_names
 from plant_models.hybrid.missing import MISSED_SAMPLES, is_there, or_else
 from plant_models.hybrid.signal import input_signal, state
@@ -234,3 +235,44 @@ def test_counts_and_degrees_are_told() -> None:
     assert y["nis_degrees"] == 1.0
     assert [s.name for s in system.states][-1] == MISSED_SAMPLES
     assert {s.name for s in system.inputs if s.can_be_missing} == {"measured_y1", "measured_y2"}
+
+
+# -- in C -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("name", SAMPLED)
+def test_compiled_it_leaves_out_the_same(name: str) -> None:
+    """C and Python to the last digits, through samples and events any of which bring NaN."""
+    system, random = OBSERVERS[name](), np.random.default_rng(11)
+    batch, runtime = Batch(system, members=2), Runtime(system)
+    names = scalar_names(system.input_signals)
+    read = [s.name for s in system.inputs if s.can_be_missing]
+    if system.noises:
+        batch.set("seed", 3)
+        runtime.p[scalar_names(system.parameter_signals).index("seed")] = 3.0
+    batch.start()
+    runtime.start(0.0)
+    for k in range(12):
+        for n in read:
+            runtime.u[names.index(n)] = np.nan if random.random() < 0.4 else 0.1 * random.normal()
+            batch.set(n, float(runtime.u[names.index(n)]))
+        stamp, until = 0.05 * k + 0.02, 0.05 * (k + 1)
+        for event in system.triggered_events:
+            if event.samples:
+                told = [s.name for s in event.payload if s.can_be_missing]
+                payload = {n: np.nan if random.random() < 0.4 else 0.1 * random.normal() for n in told}
+                runtime.advance(stamp)
+                for n, value in payload.items():
+                    runtime.u[names.index(n)] = value
+                runtime.trigger(event.name)
+                batch.notify(event.name, 0, stamp, **payload)
+                batch.notify(event.name, 1, stamp, **payload)
+        runtime.advance(until)
+        batch.advance(until)
+    assert not batch.failures
+    runtime.update_outputs()
+    expected = dict(zip(scalar_names(system.outputs), runtime.y, strict=True))
+    expected[MISSED_SAMPLES] = runtime.x[MISSED_PLACE]
+    for output, value in expected.items():
+        np.testing.assert_allclose(batch.get(output), value, rtol=1e-11, atol=1e-12)
