@@ -258,6 +258,11 @@ class Component(Described, Slave):
         place = "" if math.isnan(when) else f" at t = {when:g} s"
         return RunError(f"Component '{self.name}'{place}: {reason}", self.name, when)
 
+    @property
+    def said_why(self) -> bool:
+        """Whether it logged that something is wrong, which is part of a failure."""
+        return self.messages.said_fault
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def __init_subclass__(cls, **named: Any) -> None:

@@ -20,7 +20,8 @@ LONGEST_TEXT = 2000  # letters
 STATUSES = ("ok", "warning", "discard", "error", "fatal", "pending")
 OMITTED = "omitted"
 """Status of the line that stands for messages that were not kept."""
-BAD = frozenset({"warning", "discard", "error", "fatal"})
+FAULTS = frozenset({"discard", "error", "fatal"})
+BAD = FAULTS | {"warning"}
 
 LogChoice = Literal["all", "errors", "none"] | Sequence[str]
 """What a component shall log: everything, what is wrong, nothing, or these categories of its own."""
@@ -92,6 +93,11 @@ class MessageLog:
     def total(self) -> int:
         """How many messages there were."""
         return self.counts.total()
+
+    @property
+    def said_fault(self) -> bool:
+        """Whether the component said of itself that something is wrong; a warning is no fault."""
+        return any(self.counts[status] for status in FAULTS)
 
     @property
     def reason(self) -> str:

@@ -224,10 +224,12 @@ class Master:
         name, value = self.plan.signals[bad].name, values[bad]
         component, _, signal = name.partition(".")
         declare = f"can_be_missing = ['{signal}'] in [components.{component}], and filters leave it out"
+        text = f"output {name} is {value}; the run ends here."
+        for step in self.plan.steps:
+            if step.component.name == component and step.component.messages.said_fault:
+                raise step.component.failure(text, t)  # it said why itself
         hint = f" If NaN says that a measurement is missing, declare it: {declare}." if np.isnan(value) else ""
-        raise RunError(
-            f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.{hint}", component, t
-        )
+        raise RunError(f"Component '{component}' at t = {t:g} s: {text}{hint}", component, t)
 
 
 def close(plan: Plan) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 import numpy as np
 
 from cosim.components.component import Component
+from cosim.diagnostics.messages import FAULTS
 from cosim.results.result import BaliseRecord
 from fmu_observer.annotated_variable import declared_warnings
 from plant_models.hybrid.missing import MISSED_SAMPLES
@@ -16,7 +17,6 @@ from plant_models.hybrid.output_warning import OutputWarning
 
 DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
 NAMED_DOUBTS = 5
-LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
 
 
 def warnings_after(
@@ -42,7 +42,7 @@ def warnings_after(
     for name in components:
         yield from _doubted(name, telegrams)
     for name, component in components.items():
-        wrong = {status: count for status, count in component.messages.counts.items() if status in LOGGED_FAULTS}
+        wrong = {status: count for status, count in component.messages.counts.items() if status in FAULTS}
         if wrong:
             counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
             yield f"{name} logged {counts}; the last says: {component.messages.reason}"

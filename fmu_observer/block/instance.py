@@ -229,7 +229,8 @@ class Instance:
             self.events.undo(mark)
             self.discarded = True
             reason = error if isinstance(error, BlockError) else _model_failure(error)
-            raise StepDiscarded(f"{reason} The step is undone.") from reason.__cause__ or (
+            why = str(reason).rstrip(".")
+            raise StepDiscarded(f"{why}. The step is undone.") from reason.__cause__ or (
                 None if reason is error else error
             )
         self.discarded = False

@@ -86,7 +86,7 @@ class FMI2Slave(FMI2Instance, Slave):
         self._raise_unless_discarded(error, t)
         reached = answer(self.slave.getRealStatus, fmi2LastSuccessfulTime)
         if not answer(self.slave.getBooleanStatus, fmi2Terminated):  # one that cannot say why has not terminated
-            raise self._not_done(t, until, reached) from error
+            raise self._not_done(error, t, until, reached) from error
         self.time = t if reached is None else min(max(float(reached), t), until)
         if self.time <= t + TIME_TOLERANCE and self._says_why():
             raise self.explained("doStep", error, t) from error  # it did nothing

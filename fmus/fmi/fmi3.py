@@ -133,7 +133,7 @@ class FMI3Slave(FMI3Instance, Slave):
     def _step_failed(self, error: Exception, t: float, until: float) -> Exception:
         if getattr(error, "status", None) != DISCARD:
             return self.explained("doStep", error, t)
-        return self.failure(f"doStep was discarded: asked for {until:g} s; try a smaller communication step", t)
+        return self.discarded(error, f"asked for {until:g} s", t)
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
         if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens

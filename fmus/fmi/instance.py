@@ -339,6 +339,21 @@ class Instance(Described):
             self._alive = self._running = False
         return self.failure(f"{what} failed: {error or type(error).__name__}", t)
 
+    def discarded(self, error: Exception, asked: str, t: float) -> Exception:
+        """The error of a discarded step: in the slave's own words, and with advice only where it said nothing.
+
+        Args:
+            error: what the call threw. asked: how far it was to go, and how far it came, in words. t: begin of it [s].
+        """
+        words, text = getattr(error, "reason", ""), f"doStep was discarded: {asked}"
+        advice = "" if words or self.said_why else "; try a smaller communication step"
+        return self.failure(f"{text}{': ' if words else ''}{words}{advice}", t)
+
+    @property
+    def said_why(self) -> bool:
+        """Whether the slave itself said what is wrong, which `failure` then tells."""
+        return False
+
     # -- what versions and interface types add ----------------------------------------------------------------------
 
     _get_state: str

@@ -201,12 +201,10 @@ class Slave(Instance):
         if error.status != DISCARD:
             raise self.explained("doStep", error, t) from error
 
-    def _not_done(self, t: float, until: float, reached: float | None) -> Exception:
+    def _not_done(self, error: Exception, t: float, until: float, reached: float | None) -> Exception:
         """The error of a discarded step from `t` to `until`, of which it did the part to `reached` [s]."""
         known = "it does not say how far it came" if reached is None else f"it came to {reached:g} s"
-        return self.failure(
-            f"doStep was discarded: asked for {until:g} s, {known}; try a smaller communication step", t
-        )
+        return self.discarded(error, f"asked for {until:g} s, {known}", t)
 
 
 def answer(ask: Callable[[int], Any], kind: int) -> Any:

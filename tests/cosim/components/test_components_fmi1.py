@@ -120,7 +120,7 @@ def test_a_negated_start_value_and_a_negated_source(tmp_path: Path) -> None:
     [
         (
             "discard",
-            r"t = 0.2 s: doStep was discarded: asked for 0.3 s, it came to 0.25 s; try a smaller communication step",
+            r"t = 0.2 s: doStep was discarded: asked for 0.3 s, it came to 0.25 s. The FMU says: a step of 0.1 s over",
         ),
         ("discard-silently", r"t = 0.2 s: doStep was discarded: asked for 0.3 s, it does not say how far it came"),
         ("waits", r"t = 0.2 s: doStep returned before it was done \(status pending\), as canRunAsynchronuously allows"),
