@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -77,7 +78,8 @@ class Limit:
     Attributes:
         quantity: what is limited, in words. unit: of all values.
         printed: bounds of a thesis. exact: first value at which the error equations are unstable, None where no exact
-            test is known. exact_test: what that test looks at, in words.
+            test is known, inf where none was found. exact_test: what that test looks at, in words.
+        looked: how far that test looked, inf where what it says holds without end.
         trial: to find the practical limit by, None for none.
     """
 
@@ -86,4 +88,5 @@ class Limit:
     printed: tuple[PrintedBound, ...] = ()
     exact: float | None = None
     exact_test: str = ""
+    looked: float = inf
     trial: Trial | None = None

@@ -15,7 +15,8 @@ from cosim.results.summary_file import jsonable
 from fmu_observer.bounds import ErrorBounds, bound_data, bound_text
 
 KEPT, EXCEEDED = 0, 1
-KINDS = ("published", "carried", "exact")
+KINDS = ("carried", "exact")
+"""What a limit may rest on; what is printed in the thesis is no bound."""
 
 
 def register(commands: Any) -> None:
@@ -26,7 +27,8 @@ def register(commands: Any) -> None:
     """
     text = (
         "Bounds of the error of an observer whose measurement is held between samples: just before the next sample, "
-        "over missing samples, and the largest gap and period that keep a limit."
+        "over missing samples, and the largest gap and period that keep a limit. Beside them stands what the source "
+        "prints, which is no bound."
     )
     epilog = "Exit codes: 0 done, 1 the bound at the period of the observer exceeds the limit, 2 error."
     parser = commands.add_parser("bound", description=text, epilog=epilog)
@@ -44,9 +46,7 @@ def register(commands: Any) -> None:
     parser.add_argument(
         "--missing", type=int, default=6, metavar="N", help="most samples missing in a row (default: 6)"
     )
-    parser.add_argument(
-        "--by", choices=KINDS, default="carried", help="bound that decides the exit code (default: carried)"
-    )
+    parser.add_argument("--by", choices=KINDS, default="carried", help="what decides the exit code (default: carried)")
     parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
     parser.set_defaults(execute=execute)
 

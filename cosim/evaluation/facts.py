@@ -52,6 +52,15 @@ def number_entry(entries: Mapping[str, Any], key: str) -> float | None:
     return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value) else None
 
 
+def certified_gap(entry: Mapping[str, Any]) -> float | None:
+    """Longest gap that a certificate covers, as far as was looked [s]; None where it covers every gap.
+
+    Args:
+        entry: of one observer, under ``certificates``.
+    """
+    return number_entry(entry, "certified_up_to" if "certified_up_to" in entry else "aperiodic_limit")
+
+
 def localisation(result: Result) -> str:
     """How the crossings were found and why so: from the summary, or else from the telegrams; empty where neither
     says.

@@ -5,6 +5,7 @@ not fit. Imports NumPy only.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import inf
 
 import numpy as np
 
@@ -44,7 +45,7 @@ def _of_the_journey(result: Result, spec: ReportSpec) -> list[str]:
     if result.failure is None and spec.observers:
         found += _empty_phases(result, spec)
         found += _after_the_journey(result, spec, moving)
-    return found + list(_worse_than_none(result, spec, speed))
+    return found + list(_worse_than_none(result, spec))
 
 
 def all_warnings(result: Result, spec: ReportSpec) -> list[str]:
@@ -92,16 +93,28 @@ def _after_the_journey(result: Result, spec: ReportSpec, moving: np.ndarray) -> 
         yield f"The train stands from {_given(ended)} s on, so these phases show no journey: {_named(late, spec)}."
 
 
-def _worse_than_none(result: Result, spec: ReportSpec, speed: np.ndarray) -> Iterator[str]:
+def largest_tolerable(result: Result, spec: ReportSpec) -> float:
+    """Speed error beyond which an estimate says nothing of the train, for zero were the better one [m/s].
+
+    Args:
+        result: the run. spec: roles of its signals.
+    """
+    speed, settled = recorded(result, spec.true_speed), result.time >= spec.evaluate_after
+    if speed is None or not np.any(settled):
+        return inf
+    return max(judged_size(result.time[settled], speed[settled]).max_abs, STANDSTILL)
+
+
+def _worse_than_none(result: Result, spec: ReportSpec) -> Iterator[str]:
     """Observers beside which a zero were the better estimate."""
     settled = result.time >= spec.evaluate_after
-    fastest = judged_size(result.time[settled], speed[settled]).max_abs
+    fastest = largest_tolerable(result, spec)
     for observer in spec.observers:
         error = estimation_error(result, spec, observer, "speed")
         if error is None:
             continue
         largest = judged_size(result.time[settled], error[settled]).max_abs
-        if largest > max(fastest, STANDSTILL):
+        if largest > fastest:
             size = f"up to {number(largest)} m/s" if np.isfinite(largest) else "without bound"
             yield (
                 f"{label(spec, observer)}: its speed error is {size}, more than the speed of the train "

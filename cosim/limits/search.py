@@ -12,6 +12,8 @@ from fmus import Batch
 
 MEMBERS = 16
 LAST_PART = 0.8  # of a run; behind it the error counts
+LOWER = 32.0  # parts of the range's shortest value down to which is searched
+FEWEST_PERIODS = 10.0  # of a run, for a period to be judged
 COMMUNICATION_STEP = 0.01  # [s]; the inputs are held for so long
 
 
@@ -43,28 +45,52 @@ def survives(trial: Trial, values: Any) -> np.ndarray:
     return np.asarray(np.all(np.isfinite(errors), axis=1) & kept)
 
 
+def reach(trial: Trial) -> tuple[float, float]:
+    """The shortest and the longest value that a search tries where its range holds no end of what is kept [s].
+
+    Periods are tried up to a tenth of a run, but delays not beyond the range, which the memory of the observer sets.
+
+    Args:
+        trial: what is run.
+    """
+    longest = max(trial.high, trial.stop / FEWEST_PERIODS) if trial.varied == "period" else trial.high
+    return trial.low / LOWER, longest
+
+
 def practical_limit(trial: Trial, members: int = MEMBERS) -> float:
-    """First value at which the observer loses its plant [s]; inf where it keeps it over the whole range.
+    """First value at which the observer loses its plant [s].
 
     The range is tried at equally spaced values at once, then the step in which the first failure lies. So the limit is
     known to a fraction ``1 / (members - 1)^2`` of the range; an island of failures narrower than a step may be missed.
+    Where the range has no failure, or nothing else, the search goes on to the ends of `reach`, in equal ratios.
 
     Args:
         trial: what is run. members: values that are tried at once.
 
     Returns:
-        The limit; `low` of the trial where it fails there already.
+        The limit; 0 where it fails at the shortest value of `reach` too, inf where all up to the longest are kept.
     """
-    low, high = trial.low, trial.high
-    for _ in range(2):
-        values = np.linspace(low, high, members)
-        lost = np.flatnonzero(~survives(trial, values))
-        if not len(lost):
-            return inf if high == trial.high else high
-        if lost[0] == 0:
-            return float(values[0])
-        low, high = float(values[lost[0] - 1]), float(values[lost[0]])
-    return high
+    shortest, longest = reach(trial)
+    bracket = _first_lost(trial, np.linspace(trial.low, trial.high, members))
+    if bracket == (0.0, trial.low):
+        bracket = _first_lost(trial, np.geomspace(shortest, trial.low, members))
+    elif bracket is None and longest > trial.high:
+        bracket = _first_lost(trial, np.geomspace(trial.high, longest, members))
+    if bracket is None:
+        return inf
+    low, high = bracket
+    if low == 0.0:
+        return 0.0
+    finer = _first_lost(trial, np.linspace(low, high, members))
+    return high if finer is None else finer[1]
+
+
+def _first_lost(trial: Trial, values: np.ndarray) -> tuple[float, float] | None:
+    """The value before the first one at which the plant is lost, 0 for none, and that one; None where all are kept."""
+    lost = np.flatnonzero(~survives(trial, values))
+    if not len(lost):
+        return None
+    return (float(values[lost[0] - 1]) if lost[0] else 0.0), float(values[lost[0]])
 
 
 def _tell(batch: Batch, trial: Trial, periods: np.ndarray, delays: np.ndarray) -> None:

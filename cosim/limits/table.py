@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isinf
+from math import inf, isinf
 
-from cosim.limits.search import MEMBERS, practical_limit
+from cosim.limits.search import MEMBERS, practical_limit, reach
 from fmu_observer.limits import Limit, Trial
 from fmus.text_table import text_table
 
@@ -18,8 +18,10 @@ class LimitRow:
     Attributes:
         quantity: what is limited. unit: of the values. printed: bounds, each with its statement and source.
         exact: of the error equations, None where no test is known. exact_test: what it looks at.
-        practical: found by simulation, None where nothing was run; inf where the whole range was survived.
-        searched: range of the simulation, empty where nothing was run.
+        looked: how far the exact test looked; inf where it holds without end.
+        practical: found by simulation, None where nothing was run; inf where all that was tried was survived, 0 where
+            nothing was.
+        searched: shortest and longest value of the simulation, empty where nothing was run.
     """
 
     quantity: str
@@ -27,6 +29,7 @@ class LimitRow:
     printed: tuple[tuple[float, str, str], ...]
     exact: float | None
     exact_test: str
+    looked: float
     practical: float | None
     searched: tuple[float, ...]
 
@@ -50,7 +53,7 @@ def limit_text(observer: str, rows: Sequence[LimitRow]) -> str:
     notes = []
     for row in rows:
         bounds = [_number(value, row.unit) for value, _, _ in row.printed] or ["-"]
-        cells.append([row.quantity, bounds[0], _number(row.exact, row.unit), _practical(row)])
+        cells.append([row.quantity, bounds[0], _number(row.exact, row.unit, row.looked), _practical(row)])
         cells.extend(["", bound, "", ""] for bound in bounds[1:])
         notes += [f"{_number(value, row.unit)}: {statement} ({source})" for value, statement, source in row.printed]
         if row.exact is not None:
@@ -70,18 +73,22 @@ def _row(limit: Limit, trial: Trial | None, members: int) -> LimitRow:
         printed=tuple((bound.value, bound.statement, bound.source) for bound in limit.printed),
         exact=limit.exact,
         exact_test=limit.exact_test,
+        looked=limit.looked,
         practical=None if trial is None else practical_limit(trial, members),
-        searched=() if trial is None else (trial.low, trial.high),
+        searched=() if trial is None else reach(trial),
     )
 
 
-def _number(value: float | None, unit: str) -> str:
+def _number(value: float | None, unit: str, looked: float = inf) -> str:
+    """A limit; the end of a search is none, and is shown as what the limit lies beyond."""
     if value is None:
         return "-"
-    return "none" if isinf(value) else f"{value:.3g} {unit}"
+    if isinf(value):
+        return "none" if isinf(looked) else f"> {looked:.3g} {unit}"
+    return f"{value:.3g} {unit}"
 
 
 def _practical(row: LimitRow) -> str:
-    if row.practical is None or not isinf(row.practical):
-        return _number(row.practical, row.unit)
-    return f"> {row.searched[1]:.3g} {row.unit}"
+    if row.practical == 0.0:
+        return f"< {row.searched[0]:.3g} {row.unit}"
+    return _number(row.practical, row.unit, row.searched[1] if row.searched else inf)

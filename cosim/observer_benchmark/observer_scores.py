@@ -23,8 +23,6 @@ from cosim.results.result import BaliseRecord, Result
 from cosim.results.summary_file import jsonable
 
 WHOLE = "whole run"
-DIVERGED = 1000.0
-"""No train is as fast [m/s]: an estimate that is off by more has diverged."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,8 @@ class CertifiedGap:
     """What the gains are certified for, beside the gaps of the run.
 
     Args:
-        limit: gaps that vary are certified up to here [s], infinite where no limit was found; None where that is not
-            known.
+        limit: gaps that vary are certified up to here [s], or were found stable as far as was looked; infinite where
+            every gap is; None where that is not known.
         expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
             [s].
     """
@@ -177,16 +175,16 @@ def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quan
     return ErrorAtBalises(len(errors), float(np.mean(errors)), rms, largest)
 
 
-def divergence(whole: PhaseMetrics | None) -> str | None:
+def divergence(whole: PhaseMetrics | None, tolerable: float) -> str | None:
     """Why the numbers of an observer mean nothing although it ran to the end, in words, or None.
 
     Args:
-        whole: errors over the whole run; None without any.
+        whole: errors over the whole run; None without any. tolerable: speed error beyond which they do [m/s].
     """
     speed = None if whole is None else whole.speed
-    if speed is None or not speed.max_abs > DIVERGED:
+    if speed is None or not speed.max_abs > tolerable:
         return None
-    return f"diverged: its speed error reached {speed.max_abs:.3g} m/s"
+    return f"diverged: its speed error reached {speed.max_abs:.3g} m/s, the train no more than {tolerable:.3g} m/s"
 
 
 def false_alarms(result: Result, spec: ReportSpec, name: str) -> int | None:

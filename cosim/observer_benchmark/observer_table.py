@@ -41,7 +41,7 @@ def main_row(score: ObserverScore) -> dict[str, Any]:
 
 
 def certified_limit(certificate: CertifiedGap) -> float | str | None:
-    """Longest gap that is certified [s], ``any`` where no limit was found, None where it is not known.
+    """Longest gap that is certified [s], ``any`` where every gap is, None where it is not known.
 
     Args:
         certificate: of an observer.

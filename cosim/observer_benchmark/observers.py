@@ -14,6 +14,7 @@ from cosim.balises.recorded import read_layout
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.evaluation.error_table import error_text
 from cosim.evaluation.numbers import cell
+from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.candidates import Candidate, find_candidates
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
@@ -263,7 +264,7 @@ class _Judge:
         self.outcomes[name] = outcome
         kind = next(c["kind"] for c in outcome.result.summary["components"] if c["name"] == name)
         scores = measured(outcome.result, outcome.spec, name)
-        failure = outcome.failure or divergence(scores.get("whole"))
+        failure = outcome.failure or divergence(scores.get("whole"), largest_tolerable(outcome.result, outcome.spec))
         return ObserverScore(name, failure=failure, costs=tuple(costs), kind=kind, **known, **scores)
 
     def _gaps(self) -> tuple[Any, float | None]:
@@ -286,7 +287,7 @@ class _Judge:
             return None  # parameters that cannot be: the run of this observer says so
         if candidate.name not in found:
             return None
-        limit = found[candidate.name]["aperiodic_limit"]
+        limit = found[candidate.name]["certified_up_to"]
         # plain data have None for an infinite limit
         return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
 

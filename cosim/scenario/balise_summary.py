@@ -49,7 +49,7 @@ def balise_summary(
     for name, certificate in certificates.items():
         if name not in told:
             continue
-        limit = certificate["aperiodic_limit"]
+        limit = certificate["certified_up_to"]
         certificate["largest_gap_seen"] = gap
         if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:
             beyond.append(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")

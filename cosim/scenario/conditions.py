@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+from cosim.coupling.connection import Link
 from cosim.errors import CertificateError
-from cosim.scenario.models import given_parameters, make_system
+from cosim.scenario.balise_service import BALISE_EVENT
+from cosim.scenario.models import given_parameters, make_system, values_in_use
+from cosim.scenario.network import is_wired
 from cosim.scenario.tables import ComponentTable
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
@@ -37,6 +40,34 @@ def check_conditions(components: Mapping[str, ComponentTable], mode: str, where:
     if mode == "require" and warnings:
         raise CertificateError(f"{where}: certificates = 'require' and not all hold.\n" + "\n".join(warnings))
     return warnings
+
+
+def deaf_receivers(
+    components: Mapping[str, ComponentTable], receivers: Collection[str], links: Sequence[Link], where: str
+) -> list[str]:
+    """Observers that are told of balises and give them no weight, while nothing else tells them a position.
+
+    Args:
+        components: tables of all components by name. receivers: names of those that are told of balises. links: all
+            connections. where: name of the scenario, for messages.
+    """
+    doubts = []
+    for name in (name for name in receivers if components[name].observer is not None):
+        system: Any = make_system(components[name], where)
+        if not hasattr(system, "listens") or system.listens(values_in_use(components[name], system)) > 0.0:
+            continue
+        others = [event.name for event in system.triggered_events if event.name != BALISE_EVENT]
+        read = [signal.name for signal in system.inputs if signal.name.endswith("_position")]
+        told = [event for event in others if is_wired(links, name, event)]
+        told += [signal for signal in read if any(target == f"{name}.{signal}" for _, target, *_ in links)]
+        if not told:
+            waits = " or ".join([*(f"event {event!r}" for event in others), *(f"input {s!r}" for s in read)])
+            doubts.append(
+                f"{name}: balises do not act on it, for their gain is 0 with these parameters, and nothing tells its "
+                f"{waits or 'position'}: its position is what its model makes of the start. Take a preset that uses "
+                f"balises, or connect what it waits for."
+            )
+    return doubts
 
 
 def _known_doubts(name: str, table: ComponentTable, system: Any) -> list[str]:

@@ -8,10 +8,12 @@ from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
 from cosim.coupling.graph import undeclared
+from cosim.scenario.models import make_system, values_in_use
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
 from cosim.scenario.tables import BalisesTable, ComponentTable
 
+ROUNDING = 1e-9  # of a period over a step
 CARRIED = {
     "derivatives": "value and slope to",
     "intermediate": "set within the step of",
@@ -40,6 +42,7 @@ def coupling_warnings(
         doubts.append(
             f"FMI 1.0 co-simulation has no call that takes a tolerance; it does nothing for {', '.join(deaf)}."
         )
+    doubts += _counted_too_late(table, connections)
     notes = []
     hidden = [
         f"{name}.{signal}" for name, signals in local_sources(connections, components).items() for signal in signals
@@ -52,6 +55,29 @@ def coupling_warnings(
     if silent:
         notes.append(f"Declare no dependencies, algebraic loops through them assumed absent: {', '.join(silent)}.")
     return doubts, notes
+
+
+def _counted_too_late(table: ScenarioTable, connections: Sequence[Connection]) -> list[str]:
+    """Outputs that are the difference of an input over a period which ends between two communication points: there a
+    held input is that of the point before, and the reading is wrong by the way since.
+    """
+    targets, sources = {c.target for c in connections}, {c.source for c in connections}
+    doubts = []
+    for name, of in table.components.items():
+        system = make_system(of, name) if of.model is not None and table.master.inputs == "hold" else None
+        differences = getattr(system, "differences", {})
+        read = {output for output in differences if (name, output) in sources} or set([*differences][:1])
+        for output in (output for output in differences if output in read):
+            signal, period = differences[output]
+            seconds = float(getattr(values_in_use(of, system), period))
+            steps = seconds / table.step
+            if (name, signal) in targets and (abs(steps - round(steps)) > ROUNDING * steps or round(steps) < 1):
+                doubts.append(
+                    f"{name}: {output} counts {signal} every {seconds:g} s ({period}), no whole number of steps of "
+                    f"{table.step:g} s; between communication points its input is that of the point before, so it is "
+                    f"off by up to {100.0 / steps:.2g} % of the speed. Take a step that divides the period."
+                )
+    return doubts
 
 
 def interpolation_note(interpolators: Mapping[str, str], inputs: str) -> str:

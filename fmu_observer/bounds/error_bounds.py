@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.bounds.formulas import improved_dmo_bound
-from fmu_observer.bounds.gaps import FIRST, growth_over_missing_samples, largest_gap
+from fmu_observer.bounds.gaps import FIRST, HORIZON, growth_over_missing_samples, largest_gap
 from fmu_observer.bounds.worst_case import worst_case
 
+EXACT_HORIZON = 1e3  # [s] to which gaps of the worst case are looked for
 COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
 
 
@@ -25,12 +26,12 @@ class BoundRow:
 
     Attributes:
         missing: samples missing since the last one. gap: time since the last one [s].
-        published, carried, exact: see `ErrorBounds` [m/s].
+        as_printed, carried, exact: see `ErrorBounds` [m/s].
     """
 
     missing: int
     gap: float
-    published: float
+    as_printed: float
     carried: float
     exact: float
 
@@ -43,8 +44,8 @@ class ErrorBounds:
     Attributes:
         observer: name. preset: that the numbers come from.
         period: between samples of the odometer [s]. rate: xi, largest acceleration or deceleration [m/s2].
-        beta: overshoot [1]. m: decay rate [1/s]. gain: norm of the gain [1/s]; the three are of the published bound.
-        sample_error: norm of the error at a sample, as stated for the published bound.
+        beta: overshoot [1]. m: decay rate [1/s]. gain: norm of the gain [1/s]; the three are of the printed formula.
+        sample_error: norm of the error at a sample, as stated for the printed formula.
         noise: largest error of a reading [m/s].
         disturbances: largest unknown inputs to the three error equations, shape (3,) [m/s2, m/s3, m/s4].
         P: matrix of the carried bound, shape (3, 3). decay: its decay rate [1/s].
@@ -67,14 +68,17 @@ class ErrorBounds:
     drifts: Sequence[np.ndarray]
     gains: Sequence[np.ndarray]
 
-    def published(self, gap: float) -> float:
-        """The published improved bound, from the sample on with its stated error (Aguiar Cota 2019, (4.19), (4.40)).
+    def as_printed(self, gap: float) -> float:
+        """The printed formula, from the sample on with the error stated there (Aguiar Cota 2019, (4.19), (4.40)).
+
+        It is a bound only where the error at the sample really is as stated. Errors that many samples build up are
+        larger for some gains: for such it is exceeded, and nothing may rest on it.
 
         Args:
             gap: time since the sample [s].
 
         Returns:
-            Bound of the norm of the error [m/s]; noise and unknown inputs are not in it.
+            What is printed for the norm of the error [m/s]; noise and unknown inputs are not in it.
         """
         return float(improved_dmo_bound(gap, self.sample_error, self.beta, self.m, self.gain, self.rate))
 
@@ -113,7 +117,7 @@ class ErrorBounds:
         Returns:
             A row for each number of missing samples from 0.
         """
-        rows = growth_over_missing_samples(self.published, self.period, missing)
+        rows = growth_over_missing_samples(self.as_printed, self.period, missing)
         return tuple(BoundRow(k, gap, value, self.carried(gap), self.exact(gap)) for k, gap, value in rows)
 
     def largest_gaps(self, limit: float) -> dict[str, float]:
@@ -130,11 +134,11 @@ class ErrorBounds:
         """
         exact = cache(lambda gap: self.exact(max(gap, FIRST)))
         bounds: dict[str, Callable[[float], float]] = {
-            "published": self.published,
+            "as_printed": self.as_printed,
             "carried": self.carried,
         }
         found = {name: largest_gap(bound, limit) for name, bound in bounds.items()}
-        found["exact"] = largest_gap(exact, limit, 1e3, COARSE)
+        found["exact"] = largest_gap(exact, limit, EXACT_HORIZON, COARSE)
         return found
 
     def largest_periods(self, limit: float) -> dict[str, float]:
@@ -144,15 +148,17 @@ class ErrorBounds:
             limit: of the error [m/s].
 
         Returns:
-            By the name of the bound [s]; the published one knows no past, so that its gap is its period.
+            By the name of the bound [s]; the printed formula knows no past, so that its gap is its period.
 
         Raises:
             ValueError: the limit is not positive.
         """
         return {
-            "published": largest_gap(self.published, limit),
+            "as_printed": largest_gap(self.as_printed, limit),
             "carried": largest_gap(lambda period: self._at_period(period).carried(max(period, FIRST)), limit),
-            "exact": largest_gap(lambda period: self._at_period(period).exact(max(period, FIRST)), limit, 1e3, COARSE),
+            "exact": largest_gap(
+                lambda period: self._at_period(period).exact(max(period, FIRST)), limit, EXACT_HORIZON, COARSE
+            ),
         }
 
     def _at_period(self, period: float) -> ErrorBounds:
@@ -208,30 +214,29 @@ def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:
     lines = [
         f"{bounds.observer} ({bounds.preset}): odometer every {bounds.period:g} s, accelerations up to "
         f"{bounds.rate:g} m/s2",
-        "Bounds of the speed error [m/s] just before the next sample:",
-        f"{'missing':>8} {'gap [s]':>8} {'published':>10} {'carried':>10} {'exact':>10}",
+        "Speed error [m/s] just before the next sample:",
+        f"{'missing':>8} {'gap [s]':>8} {'as printed':>10} {'carried':>10} {'exact':>10}",
     ]
     lines += [
-        f"{row.missing:8d} {row.gap:8.3g} {row.published:10.4g} {row.carried:10.4g} {row.exact:10.4g}"
+        f"{row.missing:8d} {row.gap:8.3g} {row.as_printed:10.4g} {row.carried:10.4g} {row.exact:10.4g}"
         for row in bounds.growth(missing)
     ]
     if limit is not None:
         for what, found in (("gap", bounds.largest_gaps(limit)), ("period", bounds.largest_periods(limit))):
-            shown = ", ".join(f"{name} {_seconds(value)}" for name, value in found.items())
+            shown = ", ".join(f"{name.replace('_', ' ')} {_seconds(name, value)}" for name, value in found.items())
             lines.append(f"Largest {what} that keeps {limit:g} m/s: {shown}")
     lines.append(
-        f"published: from the sample on, error there {bounds.sample_error:g}, beta {bounds.beta:g}, m {bounds.m:g} "
-        "1/s; no noise, no unknown input"
+        f"as printed, no bound: from the sample on, error there stated as {bounds.sample_error:g}, beta "
+        f"{bounds.beta:g}, m {bounds.m:g} 1/s; no noise, no unknown input"
     )
     lines.append(
-        f"carried: over all samples before; noise up to {bounds.noise:g} m/s and unknown inputs up to "
+        f"carried, a bound: over all samples before; noise up to {bounds.noise:g} m/s and unknown inputs up to "
         f"{' '.join(f'{v:g}' for v in bounds.disturbances)} (m/s2, m/s3, m/s4) in it"
     )
     lines.append("exact: the worst acceleration there is; no noise, no unknown input")
     return "\n".join(lines)
 
 
-def _seconds(value: float) -> str:
-    if value == inf:
-        return "any"
-    return "none" if value <= 0.0 else f"{value:.4g} s"
+def _seconds(name: str, value: float) -> str:
+    looked = EXACT_HORIZON if name == "exact" else HORIZON
+    return f"> {looked:.4g} s" if value == inf else f"{value:.4g} s"

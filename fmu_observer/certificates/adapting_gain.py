@@ -134,12 +134,12 @@ def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_mode
     Returns:
         The certificate, without observer and preset. Its Lyapunov function is ``theta eps' P eps`` with theta in force.
     """
-    unstable_x = first_unstable_gap(adaptation.vertices, LONGEST_X)
-    constant = unstable_x / (adaptation.theta_min if unstable_x > adaptation.ratio else adaptation.theta_max)
     horizon = max(2.0 * max_gap, LONGEST_X / adaptation.theta_min)
+    unstable_x = first_unstable_gap(adaptation.vertices, horizon * adaptation.theta_min)
+    constant = unstable_x / (adaptation.theta_min if unstable_x > adaptation.ratio else adaptation.theta_max)
     margin, P = _common_decrease(adaptation, max_gap)
     holds = margin > MARGIN
-    limit = _aperiodic_limit(adaptation, min(constant, LONGEST_X / adaptation.theta_min))
+    limit = _aperiodic_limit(adaptation, min(constant, horizon))
     x = adaptation.constant_speed_x(max_gap)
     return Certificate(
         max_gap=max_gap,
@@ -156,7 +156,11 @@ def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_mode
 
 @lru_cache(maxsize=64)
 def _aperiodic_limit(adaptation: GainAdaptation, bound: float) -> float:
-    """Longest gap [s] covered, by bisection: what can occur up to a gap can occur up to every longer one."""
+    """Longest gap [s] covered, by bisection: what can occur up to a gap can occur up to every longer one; inf if all
+    are.
+    """
+    if _common_decrease(adaptation, bound)[0] > MARGIN:
+        return inf
     low, high = 0.0, bound
     while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_GAP:
         middle = 0.5 * (low + high)

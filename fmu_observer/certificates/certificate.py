@@ -13,7 +13,7 @@ class Certificate:
 
     Attributes:
         max_gap: longest gap asked for [s].
-        horizon: longest gap searched for the two limits [s].
+        horizon: longest gap searched for the two limits [s]; inf where what is found holds for every gap.
         constant_limit: first constant gap at which the error grows from balise to balise [s]; inf if none up to the
         horizon.
         aperiodic_limit: longest gap such that one common quadratic Lyapunov function covers every mixture of gaps up to
@@ -47,6 +47,11 @@ class Certificate:
     event: str = "balise"
     lyapunov_matrix: tuple[tuple[float, ...], ...] = ()
 
+    @property
+    def certified_up_to(self) -> float:
+        """Longest gap that is covered as far as was looked [s]: the end of a search is no limit, nor a proof."""
+        return min(self.aperiodic_limit, self.horizon)
+
     def explain(self) -> str:
         """One to three plain sentences for the user, the error model included."""
         who = f"{self.observer} ({self.preset})" if self.observer else "The observer"
@@ -55,8 +60,15 @@ class Certificate:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a result file: names to numbers, strings and lists; infinite ones as None."""
-        data = asdict(self)
-        for name in ("constant_limit", "aperiodic_limit", "spectral_radius", "quadratic_margin"):
+        data = asdict(self) | {"certified_up_to": self.certified_up_to}
+        for name in (
+            "certified_up_to",
+            "horizon",
+            "constant_limit",
+            "aperiodic_limit",
+            "spectral_radius",
+            "quadratic_margin",
+        ):
             data[name] = data[name] if isfinite(data[name]) else None
         data["parameters"] = dict(self.parameters)
         data["notes"] = list(self.notes)
@@ -86,4 +98,6 @@ class Certificate:
     def _limit(self, limit: float) -> str:
         if limit == 0.0:
             return "no gap at all"
-        return f"none found up to {self.horizon:.4g} s" if isinf(limit) else f"{limit:.4g} s"
+        if isinf(limit):
+            return "none" if isinf(self.horizon) else f"none found up to {self.horizon:.4g} s"
+        return f"{limit:.4g} s"

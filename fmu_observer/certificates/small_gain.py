@@ -60,7 +60,7 @@ def with_independent_samples(certificate: Certificate, limit: float) -> Certific
     return replace(
         certificate,
         holds=certificate.holds and certificate.max_gap < limit,
-        aperiodic_limit=min(certificate.aperiodic_limit, limit),
+        aperiodic_limit=min(certificate.aperiodic_limit, limit if limit < certificate.horizon else inf),
         notes=(*certificate.notes, note),
     )
 

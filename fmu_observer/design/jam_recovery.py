@@ -25,8 +25,10 @@ class RecoveryBounds:
         agrees: whether agreement is guaranteed: the error at the onset and the noise are within eps / M.
         agreement: from the instant at which the wheel rolls to the sample that believes it [s], where `agrees`, and the
             model's error grows by the disturbance bound at most, and the hold limit is not reached before.
-        settles: whether the residual of a followed odometer stays below eps / 2 for ever, after `settle_time`.
-        settle_time: from a restart to a residual below eps / 2 for ever [s]; infinite where it does not settle.
+        settles: whether the residual of a followed odometer stays below eps / 2 from `settle_time` on, until the next
+            stop.
+        settle_time: from a restart, or a departure, to a residual below eps / 2 until the next stop [s]; infinite where
+            it does not settle.
         any_state: from the instant at which the wheel rolls to trust for good, from whatever state and memory [s].
         steady_residual: bound of the residual of a settled estimate [m/s].
         contraction: factor by which the error falls in a period at the middle of the vertices, after long [1].
@@ -110,8 +112,8 @@ def recovery_bounds(
 
 
 def _settling(error: _PeriodError, p: Any, corners: np.ndarray, curvature: float) -> tuple[float, float, float]:
-    """Bound of the steady speed error [m/s], time until the residual of any start within the corners is small for ever
-    [s], and the spectral radius at the middle of the vertices.
+    """Bound of the steady speed error [m/s], time until the residual of any start within the corners is small from then
+    on [s], and the spectral radius at the middle of the vertices.
     """
     period, noise, half = float(p.odometer_period), float(p.odometer_noise), 0.5 * float(p.threshold / p.residual_gain)
     radius = float(np.abs(np.linalg.eigvals(error.middle)).max())

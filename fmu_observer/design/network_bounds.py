@@ -157,22 +157,3 @@ def cycle_radius(generator: np.ndarray, C: np.ndarray, order: Sequence[Sequence[
             reset[n + i] = 0.0  # an output just received has no error
         whole = reset @ flow @ whole
     return float(np.abs(np.linalg.eigvals(whole)).max())
-
-
-def exact_interval(
-    generator: np.ndarray, C: np.ndarray, order: Sequence[Sequence[int]], horizon: float, count: int = 400
-) -> float:
-    """First interval between transmissions at which the error grows from period to period [s]; inf for none.
-
-    Args:
-        generator, C, order: as for `cycle_radius`. horizon: longest interval looked at [s]. count: of intervals.
-    """
-    before = 0.0
-    for interval in np.linspace(horizon / count, horizon, count):
-        if cycle_radius(generator, C, order, interval) >= 1.0:
-            if before == 0.0:
-                return float(interval)
-            beyond = lambda tau: cycle_radius(generator, C, order, tau) - 1.0  # noqa: E731
-            return float(scipy.optimize.brentq(beyond, before, interval, xtol=1e-9))
-        before = float(interval)
-    return inf

@@ -19,6 +19,7 @@ odometer is followed again although nothing has confirmed it.
 """
 UNSETTLED = 1000.0  # faults since the residual was last small: so many that none is judged before it is
 REFUTATIONS = 2.0  # ways in a row that must be wrong before an odometer that is believed is held to lie
+VOUCHED = 0.25  # of the time for which an odometer has rolled that speaks against a jump before it is proven [ours]
 ROUNDING = 1e-9  # of times that are sums of periods
 
 PERIOD = parameter("odometer_period", "s", 0.2, "Time between two readings of the odometer", min=1e-3)
@@ -70,12 +71,15 @@ class Judgement(NamedTuple):
         restart: 1 where the estimated speed is to be set to the odometer.
         onset: 1 where a fault begins with this sample.
         shift: to be added to the estimated speed [m/s].
+        withdrawn: 1 where the fault that ends with this sample may have been the estimate's: the position is to be set
+            to what the odometer's way makes of that at its onset.
     """
 
     memory: tuple[Array, ...]
     restart: Array
     onset: Array
     shift: Array
+    withdrawn: Array = 0.0
 
 
 class Rules(Protocol):
@@ -151,10 +155,12 @@ class RuleMemory(NamedTuple):
     refutations: Array
     samples: Array
     effort_time: Array
+    against: Array
+    proven_time: Array
 
 
 class RepairedRules:
-    """Recovery by agreement within a widening threshold, by the sign of the effort, by balises, and in bounded time
+    """Recovery by agreement within a widening threshold, by balises, and in bounded time, for faults of both signs
     [ours].
 
     While the odometer is *held* to lie (mode 1) the model runs alone and its error grows by `disturbance_bound` at
@@ -162,23 +168,29 @@ class RepairedRules:
 
     1. where ``|r| <= eps + M delta T`` at `recover_samples` samples in a row, T the time held, and the wheel rolled
        between them: ``|y_k - y_{k-1}| <= a_max period + 2 noise``;
-    2. where a braked wheel is faster than the estimate by more than eps / M, or a driven one slower, and has been
-       braked, or driven, for `release_time`: neither a jam nor a skid can be the reason;
-    3. where, from one balise to the next, the way of the odometer is the distance.
+    2. where, from one balise to the next, the way of the odometer is the distance.
 
-    If none of them has happened within `hold_limit` the speed is set to the odometer, which is followed again but stays
+    If neither has happened within `hold_limit` the speed is set to the odometer, which is followed again but stays
     *unconfirmed* (mode 2): `odometer_fault` stays 1. That ends when the wheel has rolled with a small residual for
-    `trust_time`, or when a balise confirms the way.
+    `trust_time`, or when a balise confirms the way. An unconfirmed odometer that jumps is followed at once.
 
-    Where a braked wheel is faster than a settled estimate by more than eps / M, a driven one slower, again for
-    that time, the speed is set to the odometer while it is believed, too: it is the end of a jam that was too small to
-    be seen, and counts as a fault. A wheel that locked while braking may still be slow when it is driven: for
-    `release_time` after the sign of the effort has changed it counts as one that coasts.
+    In two cases the estimate may be what is wrong. Then the limit is `release_time` and a period, and what the position
+    has missed meanwhile is made up for (`Judgement.withdrawn`):
 
-    A fault begins where ``|r| > eps`` with the sign that the effort allows (a jam while braking, a skid while driving,
-    either while coasting), in time to keep the very sample out; or where balises refute the way of an odometer that was
-    believed twice in a row. None is judged before `arming_delay` has passed and the residual has been below eps / 2 for
-    `settle_samples`, nor after `fault_limit` faults between which it was not, nor below `least_speed`.
+    a. against the sign of the effort: a braked wheel has been faster than the estimate by more than eps / M, or a
+       driven one slower, at all samples of that time, rolling between them. Jams and skids of that sign are short; what
+       lasts is the end of a fault that was too small, or grew too slowly, to be seen. A wheel that locked while braking
+       may still be slow when it is driven: for `release_time` after the sign of the effort has changed it counts as one
+       that coasts;
+    b. an odometer that is not *proven*: since the last standstill, or a start with a speed that it contradicts, it has
+       neither rolled with a small residual for `trust_time` nor been confirmed by a balise. A jump may then be the end
+       of a fault that was there from the first turn of the wheel on. A quarter of the time for which it has rolled is
+       the limit where that is longer.
+
+    A fault begins where ``|r| > eps``, of either sign, in time to keep the very sample out; or where balises refute the
+    way of an odometer that was believed twice in a row. None is judged before `arming_delay` has passed and the
+    residual has been below eps / 2 for `settle_samples` (until then an odometer that is not proven is followed at once
+    where it jumps), nor after `fault_limit` faults between which it was not, nor below `least_speed`.
 
     Source: the three states of Aguiar Cota 2019, Algorithm 3-3; the rules are ours.
     """
@@ -194,6 +206,8 @@ class RepairedRules:
         memory("refutations", "1", 0.0, "Ways between balises in a row that the odometer had wrong"),
         memory("samples", "1", 0.0, "Readings since the start"),
         memory("effort_time", "s", 0.0, "Samples in a row with one sign of the effort, times period and sign"),
+        memory("against", "1", 0.0, "Samples in a row that no fault explains which the effort causes"),
+        memory("proven_time", "s", 0.0, "Time for which the wheel has rolled since the last standstill, up to trust"),
     )
     parameters: tuple[Signal, ...] = (
         parameter(
@@ -207,8 +221,8 @@ class RepairedRules:
         parameter("settle_samples", "1", 5.0, "Samples with a small residual before faults are judged", min=1.0),
         parameter("fault_limit", "1", 3.0, "Faults in a row without a small residual between them", min=1.0),
         parameter("least_speed", "m/s", 0.5, "Estimated speed below which no fault begins", min=0.0),
-        parameter("release_time", "s", 1.0, "Longest time of a jam or skid after its effort has ended", min=0.0),
-        parameter("sign_rule", "1", 1.0, "1: jams only while braking, skids only while driving", min=0.0, max=1.0),
+        parameter("release_time", "s", 1.0, "Longest time of a fault that the effort does not cause", min=0.0),
+        parameter("sign_rule", "1", 1.0, "1: jams while driving and skids while braking are short", min=0.0, max=1.0),
         parameter("way_share", "1", 0.01, "Error of the odometer's way that a balise allows, a share of it", min=0.0),
         parameter("way_floor", "m", 1.0, "Error of the odometer's way that a balise always allows", min=0.0),
         parameter("way_time", "s", 1.0, "Shortest time between balises for the odometer's way to be judged", min=1e-3),
@@ -228,46 +242,63 @@ class RepairedRules:
         sign = _is(told.effort > 0.0) - _is(told.effort < 0.0)
         effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
         # Of a period in which the sign changes a part is unknown, and a reading tells of the period before it.
-        lasting = sign * _is(np.abs(effort_time) + ROUNDING >= p.release_time + p.odometer_period)
-        impossible = _is(size > p.threshold) * _impossible(told, lasting, p)
+        brief = p.release_time + p.odometer_period
+        lasting = sign * _is(np.abs(effort_time) + ROUNDING >= brief)
+        large = _is(size > p.threshold)
+        against = large * _against(told, lasting, p) * (1.0 + rolls * m.against)
         # followed: when are faults judged, and does one begin
         settled = np.where(held > 0.0, 0.0, np.where(small > 0.0, m.settled + 1.0, 0.0))
         passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
         armed = _is(m.mode == TRUSTED) * _is(faults < p.fault_limit) * passed
-        # A jam too small to be held is over: the estimate takes the reading, and learns nothing from the jump. It
-        # counts as a fault, for an estimate that has not settled must learn in the end.
-        over = armed * impossible
         moves = _is(told.speed > p.least_speed)
-        onset = armed * moves * _is(size > p.threshold) * (1.0 - impossible)
+        onset = armed * moves * large
         # held: is the odometer believed again
         hold = np.where(held > 0.0, m.hold_time + p.odometer_period, 0.0)
         agrees = held * _is(size <= agreement_limit(hold, p))
         row = np.where(agrees > 0.0, np.where(rolls > 0.0, m.agreeing + 1.0, 1.0), 0.0)
-        believed = held * np.maximum(_is(row >= p.recover_samples), impossible)
-        expired = held * (1.0 - believed) * _is(hold + ROUNDING >= p.hold_limit)
+        believed = held * _is(row >= p.recover_samples)
+        proven = _is(m.proven_time + ROUNDING >= p.trust_time)
+        lasts = _is((against + ROUNDING) * p.odometer_period >= brief)
+        doubtful = np.maximum(1.0 - proven, lasts)
+        vouched = np.maximum(brief, (1.0 - lasts) * VOUCHED * m.proven_time)
+        limit = np.where(doubtful > 0.0, np.minimum(vouched, p.hold_limit), p.hold_limit)
+        expired = held * (1.0 - believed) * _is(hold + ROUNDING >= limit)
         # unconfirmed: has the wheel rolled for long
         quiet = np.where(open_ * rolls * small > 0.0, m.agreeing + 1.0, 0.0)
         trusted = open_ * _is((quiet + ROUNDING) * p.odometer_period >= p.trust_time) * _is(settled >= p.settle_samples)
-        jumped = open_ * (1.0 - rolls)
+        rolling = _is(np.maximum(told.speed, told.odometer) > p.least_speed) * _is(m.samples > 0.0)
+        unjudged = (1.0 - proven) * (1.0 - armed) * (1.0 - held) * rolling * large
+        jumped = np.maximum(open_, unjudged) * (1.0 - rolls)
         mode = np.where(
             onset > 0.0, HELD, np.where(expired > 0.0, UNCONFIRMED, np.where(believed + trusted > 0.0, TRUSTED, m.mode))
         )
-        changed = np.maximum(_is(mode != m.mode), jumped)
+        changed = np.maximum(_is(mode != m.mode), open_ * jumped)
         after = RuleMemory(
             mode,
             np.where(mode == HELD, hold, 0.0),
             np.where(changed > 0.0, 0.0, np.where(held > 0.0, row, quiet)),
             np.where(onset > 0.0, 0.0, settled),
-            np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset + over)),
+            np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
             told.odometer,
             np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
             m.refutations,
             m.samples + 1.0,
             effort_time,
+            against,
+            np.where(trusted > 0.0, p.trust_time, self._proven_time(m, told, np.maximum(held, onset), small, p)),
         )
-        restart = np.maximum(np.maximum(believed, expired), np.maximum(jumped, over))
-        return Judgement(tuple(after), restart, onset, 0.0 * size)
+        restart = np.maximum(np.maximum(believed, expired), jumped)
+        return Judgement(tuple(after), restart, onset, 0.0 * size, expired * doubtful)
+
+    @staticmethod
+    def _proven_time(m: RuleMemory, told: Reading, doubted: Array, small: Array, p: Any) -> Array:
+        """How long the odometer has rolled since the last standstill [s]; `trust_time` where it fits the start."""
+        rolled = np.where(m.proven_time >= p.trust_time, p.trust_time, small * (m.proven_time + p.odometer_period))
+        stands = _is(np.maximum(np.abs(told.speed), np.abs(told.odometer)) <= p.odometer_noise)
+        later = np.where(doubted > 0.0, m.proven_time, _is(m.mode == TRUSTED) * rolled)
+        first = _is(np.abs(told.residual) <= p.threshold) * p.trust_time
+        return np.where(stands > 0.0, 0.0, np.where(m.samples > 0.0, later, first))
 
     def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
         """Judge the way between two balises, where nothing changed on it.
@@ -300,6 +331,8 @@ class RepairedRules:
             row,
             m.samples,
             m.effort_time,
+            m.against,
+            np.where(confirmed > 0.0, p.trust_time, m.proven_time),
         )
         return Judgement(tuple(after), confirmed * held, begun, shift)
 
@@ -376,8 +409,8 @@ def way_limit(told: Passing, p: Any) -> Array:
     return p.way_floor + told.accuracy + p.way_share * np.abs(told.distance) + late
 
 
-def _impossible(told: Reading, sign: Array, p: Any) -> Array:
-    """1 where neither a jam nor a skid can be the reason: a braked wheel too fast, a driven one too slow.
+def _against(told: Reading, sign: Array, p: Any) -> Array:
+    """1 where the effort can cause neither the jam nor the skid: a braked wheel too fast, a driven one too slow.
 
     Args:
         told: the sample. sign: of the effort, 0 where it has changed of late. p: parameters.

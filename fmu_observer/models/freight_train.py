@@ -11,15 +11,15 @@ from plant_models.hybrid.system import Array
 MASS = 90e3  # [kg]
 DAVIS_A, DAVIS_B, DAVIS_C = 900.0, 32.4, 1.65287  # [N], [N.s/m], [N.s2/m2]
 TOP_SPEED = 50.0  # [m/s]
-REST = 0.1  # [m/s]; below it the constant resistance fades, so that it cannot push a train that stands
+REST = 0.1  # [m/s]; below it constant resistance and brake fade, so that they cannot push a train that stands
 
 
 def freight_train() -> ObserverModel:
     """``dp = v``, ``M dv = F - a - b v - c v |v|``, the position comes from balises: Bouchama 2024, (3.1)-(3.3),
     (3.24)-(3.25).
 
-    For a generic observer the constant resistance is a smooth function of the speed near rest, and no dry friction; the
-    observers of `observers.train` hold a standing train exactly.
+    For a generic observer constant resistance and brake are a smooth function of the speed near rest, and no dry
+    friction; the observers of `observers.train` hold a standing train exactly.
     """
     slopes = tuple(np.array([[0.0, 0.0], [0.0, -(DAVIS_B + 2.0 * DAVIS_C * v) / MASS]]) for v in (0.0, TOP_SPEED))
     return ObserverModel(
@@ -40,6 +40,8 @@ def freight_train() -> ObserverModel:
     )
 
 
-def _remainder(x: Array, _u: Array) -> Array:
-    resistance = DAVIS_A * np.clip(x[1] / REST, -1.0, 1.0) + DAVIS_B * x[1] + DAVIS_C * x[1] * np.abs(x[1])
-    return vector(0.0 * x[0], -resistance / MASS)
+def _remainder(x: Array, u: Array) -> Array:
+    """Resistance, and what a brake near rest is less than the effort that B lets act in full."""
+    forward = np.clip(x[1] / REST, -1.0, 1.0)
+    resistance = DAVIS_A * forward + DAVIS_B * x[1] + DAVIS_C * x[1] * np.abs(x[1])
+    return vector(0.0 * x[0], -(resistance + (1.0 - forward) * np.minimum(u[0], 0.0)) / MASS)

@@ -5,6 +5,8 @@ Its errors obey a linear equation that no measurement enters, so one run without
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,23 +31,34 @@ class Left(NamedTuple):
     constants: tuple[float, ...]
 
 
-def adaptation_limit(observer: Any, parameters: np.ndarray, high: float) -> float:
-    """Longest period [s] at which the adaptation leaves no more than `LEFT`, to 5 %, rounded down.
+def adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: float = LEFT) -> float:
+    """Longest period [s] at which the adaptation leaves no more than a share of the states, to 5 %, rounded down.
 
     By bisection, which takes what fails once for what fails from there on.
 
     Args:
-        observer, parameters: as `errors_left`. high: from which on it is not looked for [s].
+        observer, parameters: as `errors_left`. high: from which on it is not looked for [s]. left: share of the first
+            error.
+
+    Returns:
+        The period; 0 where more is left at every one down to `SHORTEST`, inf where no more is left at `high`.
     """
-    key = (observer.name, observer.model.name, observer.sizes, high, tuple(float(v) for v in parameters))
+    key = (observer.name, observer.model.name, observer.sizes, high, left, tuple(float(v) for v in parameters))
     if key not in _LIMITS:
-        low, top = SHORTEST, high
-        for _ in range(BISECTIONS):
-            middle = float(np.sqrt(low * top))
-            kept = errors_left(observer, parameters, middle).states < LEFT
-            low, top = (middle, top) if kept else (low, middle)
-        _LIMITS[key] = low
+        _LIMITS[key] = _longest_kept(lambda period: errors_left(observer, parameters, period).states < left, high)
     return _LIMITS[key]
+
+
+def _longest_kept(keeps: Callable[[float], bool], high: float) -> float:
+    if high <= SHORTEST or not keeps(SHORTEST):
+        return 0.0
+    if keeps(high):
+        return inf
+    low, top = SHORTEST, high
+    for _ in range(BISECTIONS):
+        middle = float(np.sqrt(low * top))
+        low, top = (middle, top) if keeps(middle) else (low, middle)
+    return low
 
 
 _LIMITS: dict[Any, float] = {}  # of this process; a run of 40 s takes a quarter of a second

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fmu_observer.design.network_bounds import NetworkBounds, exact_interval, exact_predictor_delay
+from fmu_observer.certificates import first_unstable_gap
+from fmu_observer.design.network_bounds import NetworkBounds, exact_predictor_delay
 from fmu_observer.limits import Limit, PrintedBound, Trial, Varied
 from fmu_observer.observers.model_trial import WRONG_START, model_trial
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from fmu_observer.observers.sampled.delayed_state_observer import DelayedStateObserver
 
 MOST_PLACES = 60  # of a trial
-LONGEST_INTERVAL = 2.0  # [s] to which limits are looked for, each predictor its own share
+LONGEST_INTERVAL = 100.0  # [s] to which the exact limit of the packets is looked for
+LONGEST_TRIAL = 2.0  # [s] of trials, each predictor its own share
 THEOREM = "Hann 2014, (2.17)"
 
 
@@ -31,8 +33,9 @@ def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any
     """
     text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
     interval = _interval(observer, p)
-    high = min(2.0 * interval, LONGEST_INTERVAL)
-    trial = _trial(observer, "period", high, named, delayed=True, delay=min(float(p.delay), 0.05))
+    high, trial = min(2.0 * interval, LONGEST_TRIAL), None
+    if interval > 0.0:
+        trial = _trial(observer, "period", high, named, delayed=True, delay=min(float(p.delay), 0.05))
     return Limit(
         "interval of the packets" + (", one node each" if _nodes(observer) else ""),
         printed=(
@@ -45,6 +48,7 @@ def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any
             ),
         ),
         exact=interval,
+        looked=LONGEST_INTERVAL,
         exact_test="spectral radius over a period of the protocol, model linearised at its start",
         trial=trial,
     )
@@ -58,7 +62,7 @@ def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any]
             2.1.
     """
     exact = exact_predictor_delay(observer.linearised_drift(), observer.predictors)
-    longest = min(1.5 * exact, LONGEST_INTERVAL * observer.predictors)
+    longest = min(1.5 * exact, LONGEST_TRIAL * observer.predictors)
     places = int(np.ceil(longest / (observer.predictors * float(p.memory_period)) - 1e-9))
     tried = observer.remembering(min(max(places, observer.memory_places), MOST_PLACES))
     stretched = {
@@ -80,13 +84,13 @@ def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any]
         ),
         exact=exact,
         exact_test="roots of s = l (1 - exp(-s tau)), l the eigenvalues of the model linearised at its start",
-        trial=_trial(tried, "delay", longest, stretched, period=period),
+        trial=_trial(tried, "delay", longest, stretched, period=period) if period > 0.0 else None,
     )
 
 
 def _interval(observer: DelayedStateObserver, p: Any) -> float:
-    generator = observer.error_generator(observer.linearised_drift(), p)
-    return exact_interval(generator, observer.model.C, observer.turns, LONGEST_INTERVAL)
+    """First interval between packets at which the error grows from round to round [s]."""
+    return first_unstable_gap([observer.turned_error(observer.linearised_drift(), p, observer.turns)], LONGEST_INTERVAL)
 
 
 def _trial(

@@ -137,4 +137,5 @@ def _certificate(system: Any, preset: str | None) -> CertificateRow:
 
 
 def _limit(limit: float, certificate: Any) -> str:
-    return f"none up to {certificate.horizon:g} s" if isinf(limit) else f"{limit:.3g} s"
+    reach = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
+    return reach if isinf(limit) else f"{limit:.3g} s"

@@ -10,7 +10,7 @@ from fmu_observer.detection.jam_rules import RuleMemory
 from fmu_observer.observers.train.quasi_lpv_uio import QuasiLpvUio
 
 PERIOD, PARTS = 0.2, 2
-FIRST_RULE = 14  # states of the observer before the memory of its rules
+FIRST_RULE = 15  # states of the observer before the memory of its rules
 
 
 class Members:
@@ -60,7 +60,9 @@ class Members:
 
     def _rate(self, x: np.ndarray, u: Any) -> np.ndarray:
         rates = np.array(self.system.flow(self.t, x, u, self.p))
-        rates[1] -= self.system.friction(self.t, x, u, self.p)[0] * (x[1] > 0.0)
+        friction = self.system.friction(self.t, x, u, self.p)[0]
+        held = np.clip(rates[1], -friction, friction)  # at rest
+        rates[1] -= np.where(x[1] > 0.0, friction, held * (x[1] == 0.0))
         return rates
 
     def _moved(self, by: np.ndarray) -> np.ndarray:

@@ -138,13 +138,13 @@ def test_both_are_one_observer_for_a_gain_that_follows_no_speed() -> None:
     np.testing.assert_array_equal(benches[0].runtime.x, benches[1].runtime.x)
 
 
-def test_the_published_bound_starts_anew_at_each_sample() -> None:
+def test_what_is_printed_starts_anew_at_each_sample() -> None:
     bench = Bench(DiscreteMeasurementObserver(), preset="as_published_set_d", published_sample_error=0.0)
     followed(bench, lambda _t: 20.0, 0.5, 1.0)
     found = []
     for k in range(2):
         bench.runtime.advance(0.999 + 0.2 * k)
-        found.append(bench.outputs()["published_bound"])
+        found.append(bench.outputs()["error_as_printed"])
     # 0.325 m/s of specs, of (4.19) with beta 1.9 for 1.90938, 1 ms before the sample; w1 (y_k) for w1
     assert found[0] == pytest.approx(0.325, rel=0.02)
     assert found[0] == pytest.approx(found[1], rel=1e-9)
@@ -355,16 +355,16 @@ def test_bounds_of_an_observer_are_ordered() -> None:
         rows = DiscreteMeasurementObserver().error_bounds(preset=preset).growth(4)
         for row in rows:
             assert 0.0 < row.exact < row.carried, (preset, row)
-        assert all(a.carried < b.carried and a.published < b.published for a, b in pairwise(rows))
+        assert all(a.carried < b.carried and a.as_printed < b.as_printed for a, b in pairwise(rows))
 
 
 def test_the_largest_gaps_keep_their_limit() -> None:
     bounds = DiscreteMeasurementObserver().error_bounds(preset="as_published_set_d")
     found = bounds.largest_gaps(1.2)
-    for name in ("published", "carried", "exact"):
+    for name in ("as_printed", "carried", "exact"):
         assert getattr(bounds, name)(found[name]) == pytest.approx(1.2, rel=1e-3)  # of the worst case's grid
     periods = bounds.largest_periods(1.2)
-    assert periods["published"] == found["published"]
+    assert periods["as_printed"] == found["as_printed"]
     assert periods["carried"] < found["carried"]
     with pytest.raises(ValueError, match="limit must be a positive number"):
         bounds.largest_gaps(-1.0)

@@ -169,3 +169,17 @@ def test_batches_are_their_members() -> None:
     together = SYSTEM.jump_vector("control", 0.5, x, u, np.repeat(p[:, None], 3, axis=1))
     for k in range(3):
         assert np.array_equal(together[:, k], SYSTEM.jump_vector("control", 0.5, x[:, k], u[:, k], p))
+
+
+@pytest.mark.parametrize(("short", "told"), [(0.81, 1.0), (0.2, 0.0), (-0.5, 0.0)])
+def test_a_stop_short_of_the_mark_is_told(short: float, told: float) -> None:
+    """Nothing pulls with a traction limit of zero; within the tolerance, or beyond the mark, it is no such stop."""
+    c = Controlled(stop_position=100.0)
+    c.start(estimated_position=50.0, estimated_speed=10.0)
+    found = c.step(estimated_position=100.0 - short, estimated_speed=0.0)
+    assert (found.stands_short, found.effort) == (told, -10.0)
+
+
+def test_a_train_that_passes_short_of_the_mark_does_not_stand_there() -> None:
+    c = Controlled(stop_position=100.0)
+    assert c.start(estimated_position=50.0, estimated_speed=10.0).stands_short == 0.0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 
+from cosim.errors import ScenarioError
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.judged import Judged, at, with_unit
 from cosim.expectations.run import Run, span
@@ -15,6 +16,10 @@ from cosim.expectations.sizes import bounded, difference
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
+
+
+AS_PRINTED = "_as_printed"
+"""How outputs end that show what a source prints, and bound nothing."""
 
 
 class BoundExpectation(WindowExpectation):
@@ -34,6 +39,11 @@ class BoundExpectation(WindowExpectation):
         super().prepare(before)
         before.demand_same_dimension(self.signal, self.reference)
         before.demand_same_dimension(self.signal, self.bound)
+        if self.bound.endswith(AS_PRINTED):
+            raise ScenarioError(
+                f"'bound': {self.bound} is what its source prints, which errors may exceed; take error_bound or "
+                "carried_bound of the same observer"
+            )
         return self
 
     def judge(self, run: Run) -> list[Judged]:

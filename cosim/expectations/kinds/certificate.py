@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from cosim.errors import ScenarioError, nearest
-from cosim.evaluation.facts import mapping_entry, number_entry
+from cosim.evaluation.facts import certified_gap, mapping_entry, number_entry
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.run import NotRecordedError, Run
@@ -54,7 +54,7 @@ def _certificate(observer: str, entry: Any, run: Run) -> Judged:
     name = f"certificate of {observer}"
     if not isinstance(entry, Mapping):
         return Judged(name, "certificate", passed=False, unit="s", text="nothing to judge: it has no certificate")
-    limit, seen = number_entry(entry, "aperiodic_limit"), number_entry(entry, SEEN)
+    limit, seen = certified_gap(entry), number_entry(entry, SEEN)
     expected, bound = number_entry(entry, "max_gap"), "any gap" if limit is None else f"gaps up to {limit:.4g} s"
     wanted = "longer gaps" if expected is None else f"gaps of {expected:.4g} s"
     values: dict[str, Any] = {"limit": float("inf") if limit is None else limit, "unit": "s"}

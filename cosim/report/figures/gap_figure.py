@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, envelope, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
-from cosim.evaluation.facts import mapping_entry, number_entry
+from cosim.evaluation.facts import certified_gap, mapping_entry
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
@@ -53,7 +53,7 @@ def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
     limits = {}
     for observer in spec.observers:
         entry = certificates.get(observer)
-        limit = number_entry(entry, "aperiodic_limit") if isinstance(entry, Mapping) else None
+        limit = certified_gap(entry) if isinstance(entry, Mapping) else None
         if limit is not None:
             limits[observer] = limit
     return limits

@@ -11,7 +11,7 @@ from cosim.evaluation.consistency_table import HEADINGS as CONSISTENCY_HEADINGS
 from cosim.evaluation.consistency_table import cells as consistency_cells
 from cosim.evaluation.cost import KINDS, cost_rows
 from cosim.evaluation.event_counts import outcome_columns
-from cosim.evaluation.facts import list_entry, mapping_entry
+from cosim.evaluation.facts import list_entry, mapping_entry, number_entry
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.fault_table import HEADINGS, cells, columns
 from cosim.evaluation.indicators import indicator_statistics
@@ -22,6 +22,7 @@ from cosim.expectations.judged import Judged
 from cosim.report.page.table import Table, simple_table
 from cosim.results.result import Result
 
+LIMITS = ("aperiodic_limit", "constant_limit")
 CERTIFICATE_COLUMNS = {
     "aperiodic_limit": "Limit, varying gaps [s]",
     "constant_limit": "Limit, constant gap [s]",
@@ -73,12 +74,20 @@ def certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str
     order = dict.fromkeys([*(o for o in spec.observers if o in known), *known])
     entries = {label(spec, o): entry for o in order if isinstance(entry := known[o], Mapping)}
     rows = [
-        [name, *(number(entry.get(key)) for key in CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")), DASH)]
+        [name, *(_limit(entry, key) for key in CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")), DASH)]
         for name, entry in entries.items()
     ]
     headings = ["Observer", *CERTIFICATE_COLUMNS.values(), "Certificate"]
     explained = {name: str(entry.get("explanation") or "") for name, entry in entries.items()}
     return simple_table(headings, rows, range(1, len(CERTIFICATE_COLUMNS) + 1)), explained
+
+
+def _limit(entry: Mapping[str, Any], key: str) -> str:
+    """One number of a certificate; where a search ended without a limit, how far it went."""
+    horizon = number_entry(entry, "horizon")
+    if key in LIMITS and entry.get(key) is None and horizon is not None:
+        return f"> {horizon:g}"
+    return number(entry.get(key))
 
 
 def telegrams_table(

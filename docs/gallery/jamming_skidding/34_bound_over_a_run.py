@@ -37,7 +37,7 @@ def main() -> None:
         sheet.add(f"rows that break error_bound, {missing}", "1", None, float(broken), RUNNING)
         axis.fill_between(time, -bound, bound, alpha=0.3, label="error_bound")
         axis.plot(time, result[f"{name}.carried_bound"], lw=0.8, label="carried_bound")
-        axis.plot(time, result[f"{name}.published_bound"], "--", lw=0.8, label="published_bound")
+        axis.plot(time, result[f"{name}.error_as_printed"], "--", lw=0.8, label="error_as_printed")
         axis.plot(time, error, "k", lw=1.0, label="speed error")
         axis.set(ylabel=f"{words} [m/s]", ylim=(-4.0, 6.0))
         axis.grid(alpha=0.3)

@@ -254,7 +254,7 @@ class AdaptiveObserver(GatedObserver, GapCertified):
     # -- limits -----------------------------------------------------------------------------------------------------
 
     def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """Between two samples: (4.63) beside the exact limit of the observer that knows the constants, and trials.
+        """Between two samples: (4.63) beside the exact limit of the linear error equations, and trials.
 
         Args:
             parameters: values by name that replace those of the preset. preset: to start from; None for the default.
@@ -265,6 +265,9 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         values = parameter_values(self, parameters, preset, "to judge")
         mu = float(self.unpack_parameters(values).mu)
         bounds = adaptive_bounds(self.model, mu)
+        trial = adaptive_trial(self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True)))
+        known = min(first_unstable_gap([self.known_error(mu)], LONGEST_PERIOD), LONGEST_PERIOD)
+        adapted = adaptation_limit(self, values, known, trial.left)
         return (
             Limit(
                 "period of the samples",
@@ -277,11 +280,11 @@ class AdaptiveObserver(GatedObserver, GapCertified):
                 )
                 if self.predicts
                 else (),
-                exact=first_unstable_gap([self.known_error(mu)], LONGEST_PERIOD),
-                exact_test="the observer that knows the constants, its gain settled: no adaptation",
-                trial=adaptive_trial(
-                    self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
-                ),
+                exact=adapted if known == LONGEST_PERIOD else min(adapted, known),
+                looked=LONGEST_PERIOD,
+                exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
+                f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",
+                trial=trial,
             ),
         )
 

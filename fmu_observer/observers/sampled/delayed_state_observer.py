@@ -276,16 +276,24 @@ class DelayedStateObserver(HighGainSampled):
     # -- certificate ------------------------------------------------------------------------------------------------
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
+        """`turned_error` as the certificate takes the turns."""
+        return self.turned_error(drift, p, self.certified_turns)
+
+    def turned_error(self, drift: np.ndarray, p: Any, turns: Sequence[Sequence[int]]) -> ImpulsiveError:
         """Error of the delayed state, and of the outputs since each was received, from packet to packet.
 
         Where nodes send in turn there is one copy of both for each turn of a round, and a packet moves the error from
         one copy to the next. A held output falls behind by what the plant does: a disturbance of the error, and no part
         of its equations.
+
+        Args:
+            drift: Jacobian of the model, shape (n, n). p: parameters, as in `HybridSystem.flow`.
+            turns: measurements in each packet of a round, from 0.
         """
         n, q = self.model.order, self.outputs_count
-        size, rounds = n + q, len(self.certified_turns)
+        size, rounds = n + q, len(turns)
         reset = np.zeros((rounds, size, rounds, size))
-        for turn, received in enumerate(self.certified_turns):
+        for turn, received in enumerate(turns):
             kept = [1.0] * n + [0.0 if i in received else 1.0 for i in range(q)]
             reset[(turn + 1) % rounds, :, turn, :] = np.diag(kept)
         generator = np.kron(np.eye(rounds), self.error_generator(drift, p))

@@ -42,6 +42,7 @@ from fmu_observer.observers.train.adaptive_davis_states import (
     parts_of,
     sensitivity_of,
 )
+from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE
 from plant_models.hybrid import PeriodicEvent, Signal, input_signal, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
@@ -83,8 +84,9 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     Only effort over mass is known, so a mass or an effort that is wrong by a share is told as resistance, and so are
     gradients: use it where the line is level or its gradient is part of the effort, with the effort that acts. One
     speed tells the resistance at that speed and no more: b and c are learnt where the speed varies.
-    `resistance_per_mass_deviation` is the standard deviation of the resistance at the speed now, always much surer
-    than its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held: from one
+    Constant resistance and brake are dry friction, which holds a train that stands.
+    `resistance_per_mass_deviation` is the standard deviation of the resistance at the speed now, always much surer than
+    its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held: from one
     sample to the next.
 
     Gains [ours]: mu 0.2 1/s; coefficients do not forget.
@@ -95,6 +97,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
     weighing = "itself"
+    frictions = ("estimated_speed",)
     states = STATES
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort that acts at the wheel rim: traction positive, brake negative"),
@@ -143,10 +146,11 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         slope = (p.davis_b + 2.0 * p.davis_c * x[V]) / p.mass
         drift = A - np.vstack([np.zeros((1, 2)), np.hstack([0.0, slope])])
         gain = inverse_s @ C.T
-        predicted = vector(x[V], self._acceleration(x, now, u, p))
+        predicted = vector(x[V], self._free_acceleration(x, now, u, p))
         moving = since_flow(since, gain, drift, C, p.unknown_acceleration * DISTURBED)
         d_sensitivity = drift @ sensitivity - gain @ (since.decay @ known.seen)
-        d_speed = [d_sensitivity[1, j] - r for j, r in enumerate(_regressor(x[V]))]
+        moves = 1.0 - stands(x[V])  # the speed of a train that its friction holds follows no coefficient
+        d_speed = [moves * (d_sensitivity[1, j] - r) for j, r in enumerate(_regressor(x[V]))]
         d_inverse = p.mu * inverse_s + drift @ inverse_s + inverse_s @ drift.T - gain @ gain.T
         return vector(
             *entries(predicted - gain @ now.innovation + sensitivity @ now.rates),
@@ -155,6 +159,11 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             *entries(packed(d_inverse, 2)),
             *moving_values(moving),
         )
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Constant resistance and brake [m/s2], shape (1,)."""
+        now = constants_now(*parts_of(x))
+        return vector(np.maximum(self._coefficients(now, p)[0], 0.0) + np.maximum(-u.effort, 0.0) / p.mass)
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """One component of the innovation is set to what is measured; the first measurement sets the estimate too."""
@@ -268,9 +277,14 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         a, b, c = self._coefficients(now, p)
         return a + b * x[V] + c * x[V] ** 2
 
+    def _free_acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
+        """Acceleration without dry friction [m/s2]."""
+        a, b, c = self._coefficients(now, p)
+        return np.maximum(u.effort, 0.0) / p.mass - np.minimum(a, 0.0) - (b + c * np.abs(x[V])) * x[V]
+
     def _acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
-        moves = np.where(x[V] > 0.0, 1.0, 0.0)
-        return u.effort / p.mass - moves * self._resistance(x, now, p)
+        """Acceleration of a train that moves, else 0 [m/s2]."""
+        return np.where(x[V] > 0.0, u.effort / p.mass - self._resistance(x, now, p), 0.0)
 
 
 DISTURBED = np.array([[0.0, 0.0], [0.0, 1.0]])

@@ -24,6 +24,7 @@ from fmu_observer.observers.adaptive_law import (
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
+from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.requirements import within_bounds
@@ -135,6 +136,9 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[SCALE]) ** 2
         plant = Plant(np.zeros((1, 1)), reading, np.reshape(reading, (1, 1)), C, noise * DISTURBED)
         gains = self._gains(adaptation, p)
+        moves = 1.0 - stands(0.0 * reading, reading, 3.0 * p.odometer_deviation)
+        # Time at standstill makes nothing older.
+        p = p._replace(forgetting=moves * p.forgetting, excitation_time=p.excitation_time / np.maximum(moves, 1e-9))
         c = x[P] - x[PREDICTED]
         drift = error_drift(plant, gains, SIZES, True)
         return np.hstack(

@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error, with_switching_noted
+from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import (
     PeriodicEvent,
@@ -152,9 +153,7 @@ class AugmentedTrainObserver(TrainObserver):
         continuous = self.continuous_correction(x, u, p)
         model = (x[1], acceleration, x[3], 0.0 * x[3])
         corrected = [model[i] - gains[i] * x[INNOVATION] - continuous[i] for i in range(ORDER)]
-        # held by friction: what the position tells now does not come from the unknown acceleration
-        at_rest = x[1] == 0.0
-        corrected[2:] = np.where(at_rest, 0.0, corrected[2]), np.where(at_rest, -decay * x[3], corrected[3])
+        corrected[2:] = held_disturbance(stands(x[1]), corrected[2], corrected[3], x[3], decay)
         return (*corrected, -decay * x[INNOVATION], *self.own_flow(x, u, p))
 
     def estimate(self, x: Array, u: Any, p: Any) -> Estimate:

@@ -39,6 +39,7 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     P,
     V,
     covariance_of,
+    moving_speed,
     transition,
 )
 from fmu_observer.observers.train.train_observer import BALISE
@@ -214,7 +215,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         )
         covariance = np.reshape(found.covariance, (ORDER, ORDER))
         upper = vector(*(covariance[i, j] for i, j in PAIRS))
-        return joined(found.estimate, upper, filtered[LAST_TIME:], vector(*refusals), found.remembered)
+        now = [found.estimate[i] for i in range(ORDER)]
+        now[V] = moving_speed(now[V], x, u, p)
+        return joined(vector(*now), upper, filtered[LAST_TIME:], vector(*refusals), found.remembered)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates now within their bounds, their deviations, how the last measurement fits, and the window."""

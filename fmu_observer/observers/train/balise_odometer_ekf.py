@@ -20,6 +20,7 @@ from fmu_observer.observers.discrete.covariance_requirements import positive_mat
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import place_deviation
+from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, parameter, state, vector
@@ -202,7 +203,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         told = log_likelihood(innovation, after.innovation_covariance)
         refused = 0.0 * nis if event == BALISE.name else np.where(nis > p.odometer_gate**2, 1.0, 0.0)
         kept = [np.where(refused > 0.0, estimate[i], after.estimate[i]) for i in range(ORDER)]
-        kept[V] = np.maximum(kept[V], 0.0)  # the odometer has no sign, and a train that stands is not pushed back
+        kept[V] = moving_speed(kept[V], x, u, p)
         covariance = [np.where(refused > 0.0, before[i, j], after.covariance[i, j]) for i, j in PAIRS]
         refused_time = x[REFUSED_TIME] if event == BALISE.name else refused * (x[REFUSED_TIME] + p.odometer_period)
         anew = refused * np.where(refused_time + ROUNDING >= p.odometer_recover, 1.0, 0.0)
@@ -378,6 +379,17 @@ def covariance_of(x: Array) -> Array:
     """
     place = {pair: COVARIANCE + k for k, pair in enumerate(PAIRS)}
     return np.vstack([np.hstack([x[place[min(i, j), max(i, j)]] for j in range(ORDER)]) for i in range(ORDER)])
+
+
+def moving_speed(speed: Array, x: Array, u: Any, p: Any) -> Array:
+    """A corrected speed, zero where the train stands before and after it [m/s].
+
+    A speed above zero, however small, would be friction's to stop, and would move the position on the way.
+
+    Args:
+        speed: after a correction [m/s]. x: state before it. u: inputs. p: parameters of `BaliseOdometerEkf`.
+    """
+    return np.where(stands(x[V], u.odometer, SIGMAS * p.odometer_deviation) > 0.0, 0.0, np.maximum(speed, 0.0))
 
 
 class Settled(NamedTuple):

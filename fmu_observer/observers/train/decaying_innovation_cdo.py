@@ -127,7 +127,8 @@ class DecayingInnovationCdo(HighGainTrainObserver):
                 "gap between balises",
                 printed=(PrintedBound(printed, premise, "Hann 2014, (3.109)"),),
                 exact=exact,
+                looked=LONGEST_HOLE,
                 exact_test="first gap at which the error grows from balise to balise, at the drag slope of one speed",
-                trial=trial,
+                trial=trial if high > 0.0 else None,
             ),
         )

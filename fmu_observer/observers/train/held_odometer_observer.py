@@ -33,6 +33,7 @@ from fmu_observer.observers.train.held_odometer_error import (
     unknown_level,
 )
 from fmu_observer.observers.train.held_odometer_presets import DRAG_SLOPES, HELD_ODOMETER_PRESETS
+from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
@@ -64,9 +65,10 @@ class HeldOdometerObserver(TrainObserver):
     observed train and never pushes it back. For a speed above zero that is the equation above.
 
     The error obeys ``de = (A - K C) e + K (v(t) - y_k) + w``: the motion since the sample drives it, so it does not
-    vanish while the train accelerates, and three bounds of it run as outputs.
+    vanish while the train accelerates, and bounds of it run as outputs.
 
-    1. `published_bound`: i-DMO or i-CDO, from each sample on, with the error there stated by `published_sample_error`.
+    1. `error_as_printed`: i-DMO or i-CDO, from each sample on, with the error there stated by `published_sample_error`.
+       No bound: what the samples before leave at a sample is larger than stated for some of the printed gains.
     2. `carried_bound` [ours]: the level ``W = sqrt(e' P e)``, carried over samples, no sample needs a statement of its
        own. It covers accelerations up to `acceleration_max`, readings wrong by `odometer_error`, unknown parts of the
        acceleration up to `unknown_acceleration`, of its rate and of the rate of that. What the observer itself does
@@ -80,7 +82,7 @@ class HeldOdometerObserver(TrainObserver):
     Args:
         missing: what becomes of the estimate after a sample that is not used, until the next one that is: ``predicted``
             by the model and the disturbance alone [ours], ``held`` to the last reading that was used, as in the thesis.
-            Held, the estimate is drawn to an old speed; predicted, it goes on, and `published_bound` does not apply.
+            Held, the estimate is drawn to an old speed; predicted, it goes on, and `error_as_printed` does not apply.
             To predict, d and d' are set back to the sample before, for the last reading that was used may have lied
             already, and limited to `disturbance_max` and `disturbance_rate_max`; from there on d' decays,
             ``d d' = -d' / rate_decay_time``, so that d goes on by ``d' rate_decay_time`` at most, however long.
@@ -109,7 +111,7 @@ class HeldOdometerObserver(TrainObserver):
         output_signal("residual", "m/s", "Odometer reading of the last sample minus estimated speed"),
         output_signal("error_bound", "m/s", "Bound of the speed error now: the lesser of carried bound and reading"),
         output_signal("carried_bound", "m/s", "Bound of the speed error carried over samples"),
-        output_signal("published_bound", "m/s", "Published bound, from the last sample on with its stated error"),
+        output_signal("error_as_printed", "m/s", "Printed formula of the error, with a stated one at the last sample"),
         output_signal("position_bound", "m", "Bound of the position error, from the last balise on"),
         output_signal("sample_age", "s", "Time since the last odometer sample that was used"),
     )
@@ -152,8 +154,8 @@ class HeldOdometerObserver(TrainObserver):
         parameter("bound_decay", "1/s", REPAIRED["bound_decay"], "Decay rate of the error that P proves", min=1e-6),
         parameter("speed_max", "m/s", 50.0, "Speed up to which the carried bound holds", min=1e-3),
         parameter("bound_min_speed", "m/s", 0.5, "Speed below which the train may stand still", min=0.0),
-        parameter("published_beta", "1", REPAIRED["published_beta"], "Overshoot beta of the published bound", min=1.0),
-        parameter("published_decay", "1/s", REPAIRED["published_decay"], "Decay m of the published bound", min=1e-6),
+        parameter("published_beta", "1", REPAIRED["published_beta"], "Overshoot beta of the printed formula", min=1.0),
+        parameter("published_decay", "1/s", REPAIRED["published_decay"], "Decay m of the printed formula", min=1e-6),
         parameter("published_sample_error", "m/s", 0.1, "Error norm stated for each sample", min=0.0),
     )
     estimator_events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
@@ -198,13 +200,15 @@ class HeldOdometerObserver(TrainObserver):
         decay = np.where(predicting, x[3] / p.rate_decay_time, 0.0)
         # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
         holding = np.maximum(self.friction(t, x, u, p)[0] - acceleration, 0.0)
+        # At standstill d and d' leave their equations, too: the carried bound is not told there, nor carried on.
+        standing = stands(speed, x[HELD_SPEED], x[HELD_ERROR])
+        drifts = x[3] + p.gain[1] * residual, p.gain[2] * residual - decay
         P = p.lyapunov_matrix
         own = np.sqrt(P[0]) * np.where(speed > 0.0, 0.0, holding) + np.sqrt(P[5]) * np.abs(decay)
         return (
             speed,
             acceleration,
-            x[3] + p.gain[1] * residual,
-            p.gain[2] * residual - decay,
+            *held_disturbance(standing, *drifts, x[3], 1.0 / p.rate_decay_time),
             reading + unknown_level(p) + own - p.bound_decay * x[LEVEL],
             told,
         )
@@ -233,7 +237,7 @@ class HeldOdometerObserver(TrainObserver):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimate with its slip, disturbance, residual and bounds."""
         age, norm = self._age(t, x), self.largest_gain_norm(x, p)
-        published = improved_dmo_bound(
+        printed = improved_dmo_bound(
             age, p.published_sample_error, p.published_beta, p.published_decay, norm, p.acceleration_max
         )
         return super().output(t, x, u, p) | {
@@ -241,7 +245,7 @@ class HeldOdometerObserver(TrainObserver):
             "residual": x[HELD_SPEED] - x[1],
             "error_bound": self.error_bound(t, x, p),
             "carried_bound": self.carried_bound(x, p),
-            "published_bound": published,
+            "error_as_printed": printed,
             "position_bound": x[POSITION_BOUND],
             "sample_age": age,
         }

@@ -24,14 +24,16 @@ from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import known_accuracy
+from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 
 P, V, D, RATE, WAY = range(5)  # continuous states
-HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 14)
+HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION = range(5, 10)
+BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES, LEAD = range(10, 15)
 SPEEDS = 21  # between the vertices, for the certificate
-HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
+HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
 HoldChoice = Literal["innovation", "reading"]
@@ -48,6 +50,7 @@ OWN_MEMORY = (
     memory("balise_place", "m", 0.0, "Where it was"),
     memory("balise_reading", "m/s", 0.0, "Odometer then"),
     memory("balises_used", "1", 0.0, "Balises used so far"),
+    memory("onset_lead", "m", 0.0, "Position minus way of the odometer when the last fault began"),
 )
 
 
@@ -176,7 +179,9 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         innovation = (1.0 - lies) * self._difference(x)
         acceleration = self._free_acceleration(x, u, p) + gain[0] * innovation
         runs_on = 1.0 - lies if self.repaired else 1.0
-        return vector(x[V], acceleration, runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation, x[HELD])
+        drifts = runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation
+        standing = stands(x[V], x[HELD], p.odometer_noise if self.repaired else 0.0)
+        return vector(x[V], acceleration, *held_disturbance(standing, *drifts, x[RATE]), x[HELD])
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
@@ -229,10 +234,11 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             stable, longest = sampled
             holds, margin, P = stable.holds, stable.margin, stable.lyapunov_matrix
             constant, radius = stable.spectral_radius < 1.0, stable.spectral_radius
-            note = f"the odometer's period may be up to {longest:.3g} s at a steady speed"
+            reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any looked at, up to {HORIZON:g} s,"
+            note = f"the odometer's period {reach} at a steady speed"
         return Certificate(
             max_gap=max_gap,
-            horizon=max(HORIZON, max_gap),
+            horizon=inf,
             constant_limit=inf if constant else 0.0,
             aperiodic_limit=inf if holds else 0.0,
             spectral_radius=radius,
@@ -251,7 +257,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(BALISES + 1)]
+        own = [x[i] for i in range(LEAD + 1)]
         acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
         now = np.maximum(u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0), 0.0)
         told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
@@ -261,10 +267,13 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
         own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
         own[HELD], own[LAST_D], own[LAST_RATE] = now, own[D], own[RATE]
+        # What may have been the estimate's mistake costs no more than the odometer would have.
+        own[P] = np.where(judged.withdrawn > 0.0, x[WAY] + x[LEAD], x[P])
+        own[LEAD] = np.where(judged.onset > 0.0, x[P] - x[WAY], x[LEAD])
         return vector(*own, *judged.memory)
 
     def _at_balise(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(BALISES + 1)]
+        own = [x[i] for i in range(LEAD + 1)]
         told = Passing(
             t - x[BALISE_TIME],
             u.balise_position - x[BALISE_PLACE],
@@ -280,7 +289,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         own[CORRECTION] = np.where(judged.restart > 0.0, 0.0, x[CORRECTION])
         own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
         own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
-        own[BALISES] = x[BALISES] + 1.0
+        own[BALISES], own[LEAD] = x[BALISES] + 1.0, u.balise_position
         return vector(*own, *judged.memory)
 
     def _difference(self, x: Array) -> Array:
@@ -299,7 +308,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         return (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D]
 
     def _rule_memory(self, x: Array) -> tuple[Array, ...]:
-        return tuple(x[BALISES + 1 + i] for i in range(len(self.rules.memory)))
+        return tuple(x[LEAD + 1 + i] for i in range(len(self.rules.memory)))
 
 
 def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:

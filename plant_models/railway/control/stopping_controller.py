@@ -64,9 +64,10 @@ class StoppingController(HybridSystem):
     is 1. Where the mark is too near for `effort_limit` the brake is planned at that limit, `limited_plan` is 1, and the
     train will pass the mark.
 
-    At `standstill_speed` the train is held by `holding_effort`. The estimates come from an observer; for a comparison
-    from the plant itself. `disturbance` acts forward; connect that of an observer whose disturbance resists with a
-    factor of -1.
+    At `standstill_speed` the train is held by `holding_effort`; where it stands short of the mark by more than
+    `stop_tolerance`, `stands_short` is 1: with `traction_limit` = 0 nothing pulls it on. The estimates come from an
+    observer; for a comparison from the plant itself. `disturbance` acts forward; connect that of an observer whose
+    disturbance resists with a factor of -1.
 
     Numbers are per unit mass with ``mass = 1``: newtons are then m/s2.
 
@@ -143,6 +144,17 @@ class StoppingController(HybridSystem):
                 ("speed_reference", "remaining_distance"),
             ),
         ),
+        output_signal(
+            "stands_short",
+            "1",
+            "1 where the train stands short of the mark by more than stop_tolerance",
+            variability="discrete",
+            warning=OutputWarning(
+                "the train stands short of the mark, and the controller may not pull it there: raise traction_limit "
+                "where it is 0, or look for what braked it beyond the plan",
+                ("remaining_distance",),
+            ),
+        ),
         output_signal("plans", "1", "Number of plans made so far", variability="discrete"),
         output_signal("remaining_distance", "m", "Way from the estimated position to the mark, now"),
     )
@@ -161,6 +173,7 @@ class StoppingController(HybridSystem):
         parameter("replans_after_faults", "1", 1.0, "1: a new plan after a fault", min=0.0, max=1.0),
         parameter("effort_limit", "N", 100.0, "Largest brake effort", min=1e-9),
         parameter("traction_limit", "N", 0.0, "Largest traction effort", min=0.0),
+        parameter("stop_tolerance", "m", 0.3, "Distance from the mark that counts as a stop at it", min=0.0),
         parameter("holding_effort", "N", 10.0, "Brake effort that holds the train at standstill", min=0.0),
         parameter("standstill_speed", "m/s", 0.01, "Speed at which the train is held", min=0.0, display_unit="km/h"),
     )
@@ -219,6 +232,7 @@ class StoppingController(HybridSystem):
             "brake_released": every(m.fault, 1.0 - m.standing),
             "no_braking_solution": m.drag_suffices,
             "limited_plan": m.limited,
+            "stands_short": every(m.standing, holds(p.stop_position - u.estimated_position > p.stop_tolerance)),
             "plans": m.plans,
             "remaining_distance": p.stop_position - u.estimated_position,
         }

@@ -43,8 +43,9 @@ class PulseOdometer(HybridSystem):
     Args:
         count_from: ``wheel_speed``: the odometer integrates that input, which is held between communication points;
             ``wheel_distance``: it counts that input, the distance of the rim from `wheel_fault`, in which faults within
-            a communication step are exact. `wheel_speed` then serves the first reading only, which has no window behind
-            it and is that of a wheel that had turned steadily.
+            a communication step are exact, where the period is a whole number of communication steps: between
+            communication points the input is that of the point before. `wheel_speed` then serves the first reading
+            only, which has no window behind it and is that of a wheel that had turned steadily.
 
     Raises:
         ValueError: `count_from` is unknown.
@@ -95,6 +96,9 @@ class PulseOdometer(HybridSystem):
             raise ValueError(f"Unknown count_from {count_from!r}; choose one of: wheel_speed, wheel_distance.")
         self.count_from = count_from
         self.inputs = (_SPEED,) if count_from == "wheel_speed" else (_FIRST_SPEED, _DISTANCE)
+        late = {"reading": "aggregation_period", "sampled_reading": "sample_period"}
+        distance = count_from == "wheel_distance"
+        self.differences = {output: (_DISTANCE.name, period) for output, period in late.items() if distance}
         self.states = (*((_INTEGRAL,) if count_from == "wheel_speed" else ()), *_MEMORY)
         super().__init__(count_from=count_from)
 

@@ -16,7 +16,7 @@ def test_the_table_and_the_largest_gaps(capsys: pytest.CaptureFixture[str]) -> N
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("discrete_measurement_observer (as_published_set_d): odometer every 0.2 s")
     assert [line.split()[0] for line in lines[3:7]] == ["0", "1", "2", "3"]
-    assert any(line.startswith("Largest gap that keeps 1.2 m/s: published 0.3") for line in lines)
+    assert any(line.startswith("Largest gap that keeps 1.2 m/s: as printed 0.3") for line in lines)
     assert any(line.startswith("Largest period that keeps 1.2 m/s: ") for line in lines)
 
 
@@ -26,8 +26,12 @@ def test_json_and_the_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     data = json.loads(capsys.readouterr().out)
     assert (data["period"], len(data["rows"])) == (0.1, 2)
     assert data["rows"][0]["carried"] < 0.7
-    assert set(data["largest_gaps"]) == {"published", "carried", "exact"}
-    assert main([*words, "--by", "published", "--missing", "0"]) == 1
+    assert set(data["largest_gaps"]) == {"as_printed", "carried", "exact"}
+    assert main([*words, "--set", "odometer_period=0.2", "--missing", "0"]) == 1  # 0.88 m/s carried
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as usage:  # what is printed is no bound
+        main([*words, "--by", "published"])
+    assert usage.value.code == 2
 
 
 MISTAKES = [

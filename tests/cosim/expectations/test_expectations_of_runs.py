@@ -84,6 +84,12 @@ def test_every_fault_is_named(check: Callable[..., ScenarioTable]) -> None:
     assert len(str(caught.value).splitlines()) == len(WRONG)
 
 
+def test_what_a_source_prints_is_taken_for_no_bound() -> None:
+    item = {"check": "bound", "signal": "dmo.speed", "reference": "train.speed", "bound": "dmo.error_as_printed"}
+    with pytest.raises(ScenarioError, match="take error_bound or carried_bound"):
+        Scenario.load("error_bounds").set("expect", [item]).run(warn=lambda _: None)
+
+
 @pytest.mark.parametrize("kind", ["telegrams", "certificate"])
 def test_without_balises_there_are_no_telegrams(kind: str, components: dict[str, Component]) -> None:
     more = {"used": 1} if kind == "telegrams" else {}

@@ -16,12 +16,13 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import RunError, ScenarioError
-from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.metrics import ErrorSize, PhaseMetrics, phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
 from cosim.observer_benchmark.candidates import find_candidates
 from cosim.observer_benchmark.observer_scores import (
     CertifiedGap,
+    divergence,
     error_at_balises,
     false_alarms,
     longest_gap,
@@ -259,10 +260,17 @@ def test_one_that_cannot_be_coupled_or_diverges_keeps_its_row_with_the_reason() 
     assert (
         reasons["luenberger"] == "cannot be coupled: nothing in this scenario gives its inputs torque, measured_angle"
     )
-    assert reasons["observer"].startswith("diverged: its speed error reached 1e+200 m/s")
+    assert reasons["observer"].startswith("diverged: its speed error reached 1e+200 m/s, the train no more than ")
     assert found.scores[2].failure is None
     assert found.scores[2].whole is not None
     assert "luenberger: cannot be coupled" in found.text()
+
+
+def test_an_estimate_that_is_worse_than_none_has_diverged() -> None:
+    """Not at 1000 m/s only: beyond the speed of the train itself a zero were the better estimate."""
+    speeds = PhaseMetrics("o", "whole run", speed=ErrorSize(25.1, 3.0), position=None)
+    assert divergence(speeds, 25.0) == "diverged: its speed error reached 25.1 m/s, the train no more than 25 m/s"
+    assert divergence(speeds, 25.2) is None
 
 
 def test_a_plant_that_fails_is_said() -> None:
