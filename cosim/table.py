@@ -14,15 +14,14 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 
 
 def _seed(value: Any) -> int:
-    if isinstance(value, Real) and not isinstance(value, bool) and is_seed(float(value)):
-        return int(value)
+    if not isinstance(value, bool) and isinstance(value, Real) and is_seed(float(value)):
+        return int(float(value))
     raise ValueError(f"expected {SEED_EXPECTED} (got {value!r})")
 
 
 def _own_seed(value: Any) -> int:
-    if isinstance(value, Real) and not isinstance(value, bool) and value == FROM_NAME:
-        return FROM_NAME
-    return _seed(value)
+    follows = not isinstance(value, bool) and isinstance(value, Real) and float(value) == FROM_NAME
+    return FROM_NAME if follows else _seed(value)
 
 
 Seed = Annotated[int, PlainValidator(_seed)]

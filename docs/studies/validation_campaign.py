@@ -69,7 +69,7 @@ def main() -> None:
 
 def measured(seeds: Iterable[int], cases: Iterable[str] = tuple(PUBLISHED)) -> dict[Any, dict[str, Spread]]:
     """Spreads of all measures by case, over drawings of the jams."""
-    sweep = Scenario.load("validation_campaign").vary({"case": list(cases), "wheel.seed": list(seeds)})
+    sweep = Scenario.load("validation_campaign").vary({"case": list(cases), "seed": list(seeds)})
     return grouped(sweep.run(keep=False), "case")
 
 
@@ -93,7 +93,7 @@ def threshold_shares(
     """Shares of missed faults and of false detections at `THRESHOLDS`, by case, each shape (thresholds,)."""
     missed, false = ({case: np.full(len(THRESHOLDS), np.nan) for case in cases} for _ in range(2))
     for k, threshold in enumerate(THRESHOLDS):
-        values = {"case": list(cases), f"{OBSERVER}.threshold": [threshold], "wheel.seed": list(seeds)}
+        values = {"case": list(cases), f"{OBSERVER}.threshold": [threshold], "seed": list(seeds)}
         found = grouped(Scenario.load("validation_campaign").vary(values).run(keep=False), "case")
         for case, spreads in found.items():
             missed[case][k] = spreads[f"{OBSERVER}.missed_share"].mean

@@ -83,7 +83,7 @@ def runs(cases: Iterable[str] = JAM_CASES, seeds: Iterable[int] = SEEDS) -> Iter
         values = shipped.cases[case]
         start = float(values.get("report.evaluate_after", 120.0))
         for seed in seeds:
-            outcome = shipped.copy().set("case", case).set("wheel.seed", seed).run(warn=lambda _: None)
+            outcome = shipped.copy().set("case", case).set("seed", seed).run(warn=lambda _: None)
             if outcome.failure is not None:
                 raise RuntimeError(f"{case}, drawing {seed}: {outcome.failure}")
             yield Run(case, seed, outcome.result, start, float(values[f"{OBSERVER}.threshold"]))
@@ -199,7 +199,7 @@ JAM_SEEDS = range(4)
 
 def changed_run(case: str, values: Mapping[str, Any], deceleration: float | None, seed: int | None) -> Run:
     """A braking of a variant, without jams or with those of a seed."""
-    scenario = Scenario.load("validation_campaign").set("case", case).set("wheel.seed", seed or 0)
+    scenario = Scenario.load("validation_campaign").set("case", case).set("seed", seed or 0)
     if seed is None:
         scenario.set("wheel.jam_rate", 0.0)
     speed, start = CRUISE[case[:2]]

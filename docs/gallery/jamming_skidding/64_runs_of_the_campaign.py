@@ -50,7 +50,7 @@ SENSOR = "error of the odometer: that of jams which are ours; of the print only 
 
 def braking(figure: Braking) -> Result:
     """Run the braking of a figure."""
-    s = Scenario.load("validation_campaign").set("case", figure.case).set("wheel.seed", figure.drawing)
+    s = Scenario.load("validation_campaign").set("case", figure.case).set("seed", figure.drawing)
     if figure.threshold is not None:
         s.set(f"{OBSERVER}.threshold", figure.threshold)
     if figure.micro_jams:  # a second fault of the same wheel, after the first

@@ -16,6 +16,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from cosim import Scenario
+from cosim.balises.telegram import Channel, Crossing
 from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
 from cosim.network.chance import Chance
@@ -168,6 +169,21 @@ def test_what_a_network_draws_is_independent_of_all_else_with_one_seed() -> None
     others = np.setdiff1d(np.arange(4, len(streams)), own)
     assert np.abs(correlation[:4][:, others]).max() < 5.0 / np.sqrt(count)
     assert np.abs(correlation[:4, :4][np.triu_indices(4, 1)]).max() < 5.0 / np.sqrt(count)
+
+
+def test_what_befalls_telegrams_is_independent_of_all_else_with_one_seed() -> None:
+    """Misses, latencies and position errors, where sensors, network, faults and filters have the seed too."""
+    channel, count = Channel(latency_jitter=1.0, missed_fraction=0.3, position_noise=1.0, seed=6), 2000
+    told = [channel.transmit(Crossing(0.0, 0.0, "B1", 1.0), k, 0.0) for k in range(count)]
+    read = np.array([e.kind == "true" for e in told])
+    late, error = np.array([e.delivered_at for e in told]), np.array([e.position for e in told])
+    for purpose in set(Purpose) - {Purpose.TELEGRAMS}:
+        for j in range(4):
+            noise = np.array([standard_normal(6, j, k, purpose) for k in range(count)])
+            for seen, drawn_so in ((read, noise), (late[read], noise[read]), (error, noise)):
+                assert abs(np.corrcoef(seen, drawn_so)[0, 1]) < 5.0 / np.sqrt(len(seen))
+    assert abs(np.corrcoef(late[read], error[read])[0, 1]) < 5.0 / np.sqrt(read.sum())
+    assert abs(np.corrcoef(read, error)[0, 1]) < 5.0 / np.sqrt(count)
 
 
 def test_the_shipped_odometers_of_the_diagnosis_are_independent() -> None:
