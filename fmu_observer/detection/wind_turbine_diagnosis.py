@@ -42,7 +42,16 @@ from fmu_observer.diagnosis.named_memory import NamedMemory
 from fmu_observer.diagnosis.redundancy import larger
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.benchmarks.wind_turbine.rotor import Rotor
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    OutputWarning,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -113,6 +122,7 @@ MEMORY = NamedMemory(
         *DRIVE_MEMORY,
         *EFFICIENCY_MEMORY,
         memory("undecided_pairs", "1", 0.0, "Pairs of sensors that disagree while no model tells which one is it"),
+        memory("undecided_alarm", "1", (0.0, 0.0, 0.0), "Alarm of such pairs: raised, contrary, since", size=3),
         memory("raised", "1", 0.0, "1 for each alarm that is raised", size=ALARMS),
         memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=ALARMS),
         memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
@@ -129,6 +139,8 @@ class WindTurbineDiagnosis(HybridSystem):
     (7.7.5). Where a pair agrees and both contradict the model, the actuator is at fault (7.6.14). The torque of the
     generator is compared with its reference (7.8.1). The efficiency of the drive train comes from a window of 30
     updates, 300 s (7.7.7): before it is full the efficiency is nominal. At most one fault at a time is assumed.
+    `fault` is 1 while any is detected: also where a pair disagrees and the model does not tell which sensor it is; such
+    pairs are counted by `undecided`.
 
     The torque of the wind is estimated from measured wind, rotor speed and pitch with the rotor's formula. Wind that is
     measured with a bias ruins the efficiency: `wind_bias` is subtracted.
@@ -169,8 +181,20 @@ class WindTurbineDiagnosis(HybridSystem):
             )
             for g in _GROUPS
         ),
-        output_signal("fault", "1", "1 while any alarm is raised", variability="discrete"),
-        output_signal("undecided", "1", "Pairs of sensors of which one is at fault, not known which"),
+        output_signal(
+            "fault", "1", "1 while a fault is detected, whether it is isolated or not", variability="discrete"
+        ),
+        output_signal(
+            "undecided",
+            "1",
+            "Pairs of sensors of which one is at fault, not known which",
+            variability="discrete",
+            warning=OutputWarning(
+                "detected a fault that it could not isolate: two sensors of one quantity disagree by more than their "
+                "limit, and neither contradicts the model by more than its own. Compare both with a third",
+                ("fault", "ratio_rotor_sensors", "ratio_generator_sensors"),
+            ),
+        ),
         *(
             output_signal(
                 f"{g.output}_time",
@@ -248,7 +272,9 @@ class WindTurbineDiagnosis(HybridSystem):
         exceeds, undecided = _judged(m, t, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
         new |= {name: [getattr(alarm, field) for alarm in alarms] for name, field in _ALARM_FIELDS}
-        return MEMORY.pack(m, **new, undecided_pairs=settled * undecided)
+        pairs = settled * undecided
+        found = judge(Alarm(*_three(m.undecided_alarm)), t, pairs, p.sensor_raise_after, p.sensor_clear_after)
+        return MEMORY.pack(m, **new, undecided_pairs=pairs, undecided_alarm=vector(*found))
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Alarms, when they changed, and what they rest on."""
@@ -259,8 +285,8 @@ class WindTurbineDiagnosis(HybridSystem):
             place = at if group.size == 1 else slice(at, at + group.size)
             found |= {group.output: m.raised[place], f"{group.output}_time": m.since[place]}
             at += group.size
-        any_raised = m.raised[0]
-        for i in range(1, ALARMS):
+        any_raised = m.undecided_alarm[0]  # detected is told although it is not isolated
+        for i in range(ALARMS):
             any_raised = np.maximum(any_raised, m.raised[i])
         residuals = {name: getattr(m, f"held_{name}") for name, *_ in _RESIDUALS}
         told = {"fault": any_raised, "undecided": m.undecided_pairs}
@@ -340,6 +366,10 @@ def _alarms(m: Any, exceeds: Sequence[Array], t: Array, p: Any) -> list[Alarm]:
         )
         for i, kind in enumerate(kinds)
     ]
+
+
+def _three(values: Array) -> tuple[Array, Array, Array]:
+    return values[0], values[1], values[2]
 
 
 def _pair(values: Array, first: int) -> tuple[Array, Array]:

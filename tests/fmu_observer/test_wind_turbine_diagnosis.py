@@ -111,6 +111,38 @@ def test_a_fault_is_found_at_once_and_no_other_is(name: str, sensor_faults: np.n
     assert not np.delete(alarms, ALARM_NAMES.index(name), axis=1).any()
 
 
+PAIRS = {
+    **{f"pitch[{i}]": ("pitch_difference_limit", f"ratio_pitch_sensors[{(i + 1) // 2}]") for i in range(1, 7)},
+    **{f"rotor_speed[{i}]": ("rotor_difference_limit", "ratio_rotor_sensors") for i in (1, 2)},
+    **{f"generator_speed[{i}]": ("generator_difference_limit", "ratio_generator_sensors") for i in (1, 2)},
+}
+
+
+@pytest.mark.parametrize("first", [0, 5])
+def test_a_sensor_that_is_off_by_more_than_its_limit_is_told_although_it_is_not_isolated(
+    batch: fmus.Batch, first: int
+) -> None:
+    """Detected is told: offsets of 1.2 to 12 times the limit, both signs, of each sensor that has a second one, without
+    noise; and while the ratio of any pair is above 1 in noise. A run without a fault stays silent."""
+    rng, limits = np.random.default_rng(first), WindTurbineDiagnosis().start_parameters()
+    names = scalar_names(WindTurbineDiagnosis().parameter_signals)
+    chosen = list(PAIRS)[first : first + 5]
+    for noise in (0.0, 1.0):
+        members = []
+        for seed, name in enumerate([*chosen, None]):
+            readings = steady(noise, 14.0, seed)
+            if name is not None:
+                limit = limits[names.index(PAIRS[name][0])]
+                readings[name][round(12.0 / PERIOD) :] += rng.choice([-1.0, 1.0]) * rng.uniform(1.2, 12.0) * limit
+            members.append(readings)
+        results = ["fault", *dict.fromkeys(ratio for _, ratio in PAIRS.values())]
+        found = diagnosed(batch, members, results)
+        assert not found[-1, :, 0].any()
+        above = found[:, :, 1:].max(axis=2) > 1.0
+        assert (found[:, :, 0] >= above).all()
+        assert noise > 0.0 or above[:-1, round(12.0 / PERIOD) + 2 :].all()
+
+
 def test_without_a_fault_there_is_no_alarm(sensor_faults: np.ndarray) -> None:
     assert not sensor_faults[-1].any()
 

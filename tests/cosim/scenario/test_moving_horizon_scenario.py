@@ -26,19 +26,21 @@ def test_a_false_balise_before_the_gate_is_open_pulls_the_filter_and_not_the_win
     outcome = _run(40.0)
     assert all(judged.passed for judged in outcome.expectations)
     assert _off(outcome, WINDOW) < 3.0
-    assert _off(outcome, SQUARES) > 20.0, "25 m, less what the readings hold against it"
+    assert _off(outcome, SQUARES) > 15.0, "25 m, less what the readings hold against it"
     assert _off(outcome, FILTER, end=39.9) < 3.0, "the skid from 12 s to 14 s does not pull it"
-    assert _off(outcome, FILTER, 40.0, 45.0) > 20.0, "the third telegram, before the gate judges"
+    assert _off(outcome, FILTER, 40.0, 45.0) > 15.0, "the third telegram, before the gate judges"
 
 
 def test_a_false_balise_after_that_pulls_neither() -> None:
     outcome = _run(60.0)
     assert _off(outcome, WINDOW) < 3.0
     assert _off(outcome, FILTER) < 3.0
-    assert _off(outcome, SQUARES) > 20.0
+    assert _off(outcome, SQUARES) > 10.0
 
 
-def test_a_false_balise_that_comes_first_pulls_both_and_the_window_for_long() -> None:
+def test_a_false_balise_that_comes_first_pulls_both_until_two_agree_against_it() -> None:
     outcome = _run(8.0)
     assert _off(outcome, FILTER) > 20.0
-    assert _off(outcome, WINDOW, 65.0) > 20.0 > _off(outcome, FILTER, 65.0)
+    assert _off(outcome, WINDOW) > 20.0
+    assert _off(outcome, WINDOW, 40.0) < 3.0
+    assert outcome[f"{WINDOW}.restarts"][-1] == 1.0
