@@ -12,9 +12,10 @@ import numpy as np
 
 from fmu_observer.detection.train_diagnosis_signals import EVENTS, INPUTS, OUTPUTS, PARAMETERS
 from fmu_observer.detection.train_efficiency import MotionWindow, Share, brake_share, traction_share
-from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, RESIDUALS, isolability
+from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, RESIDUALS, WHEEL, isolability
 from fmu_observer.detection.train_memory import CONTINUOUS, Memory, remembered
 from fmu_observer.detection.train_residuals import (
+    HUGE,
     Readings,
     SpeedWindows,
     readings,
@@ -39,6 +40,14 @@ from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.pneumatic_brake import filling, limited
 
 SPEED_PAIRS = 6  # residuals of speed stand first in `MOTION`
+PAIRS_OF_SOURCES = (
+    (0, 1),
+    (0, 2),
+    (1, 2),
+    (0, 3),
+    (1, 3),
+    (2, 3),
+)  # of odometers, radar and satellites, in their order
 
 
 class TrainDiagnosis(HybridSystem):
@@ -49,7 +58,8 @@ class TrainDiagnosis(HybridSystem):
     compared with the way of each source. Over a window of some seconds the train as one point is inverted for the share
     of traction and of brake force that arrives. Each residual is divided by its threshold and raises an alarm above 1;
     `MOTION`, `BRAKE` and `TRACTION` say which fault moves which, and the fault that explains the alarms and asks for
-    least is told. One fault at a time in each of the three groups; the second odometer must be on another axle.
+    least is told. One fault at a time in each of the three groups; the second odometer must be on another axle. While
+    any alarm is raised `fault` is 1, whether it is isolated, suspected or, as `several_faults` says, explained by none.
 
     An odometer that is off while an effort acts that can make its wheel slip or jam is put down to the wheel; where it
     is off for `contrary_time` without such an effort, or to the other side, to the sensor. A wheel that is locked and a
@@ -138,11 +148,13 @@ class TrainDiagnosis(HybridSystem):
         codes = dict(zip(FAULTS, m.each("code"), strict=True))
         enough = read.fitted[0] * read.fitted[1] * read.fitted[2] * read.has_pressure
         told = {f"{fault}_fault": code for fault, code in codes.items()}
+        isolated = [np.where(code > 0.0, 1.0, 0.0) for code in codes.values()]
         shares, unknown = m.each("share"), [1.0 - found for found in m.each("share_found")]
         return {
             **told,
+            "fault": largest([np.where(since >= 0.0, 1.0, 0.0) for since in m.each("group_since")] + isolated),
             "odometer_fault": np.where(codes["odometer_1"] > 0.0, 1.0, 0.0),
-            "fault_count": sum(np.where(code > 0.0, 1.0, 0.0) for code in codes.values()),
+            "fault_count": sum(isolated),
             "several_faults": m["several"],
             "detection_time": m["detected_at"],
             "confidence": m["trust"],
@@ -184,7 +196,7 @@ class TrainDiagnosis(HybridSystem):
         )
         since_mark = m["estimated_position"] - m["mark"]
         held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
-        off = np.abs(read.gps - m["estimated_position"])
+        off = np.minimum(np.abs(read.gps - m["estimated_position"]), _nearest_way(m, read))
         held["gps_position"] = off / (p.threshold_position + p.balise_share * np.abs(since_mark))
         held["pressure"] = np.abs(read.pressure - m["modelled_pressure"]) / p.threshold_pressure
         held |= dict(zip(MOTION.residuals[:SPEED_PAIRS], speeds, strict=True))
@@ -207,7 +219,9 @@ class TrainDiagnosis(HybridSystem):
         sums = [total + value for total, value in zip(m.each("coarse_sum"), now, strict=True)]
         count = m["coarse_samples"] + 1.0
         full = np.where(count * p.sample_period >= p.coarse_step - 1e-9, 1.0, 0.0)
-        loud = largest(m.each("raised")[:SPEED_PAIRS])
+        known = [np.where(code >= WHEEL, 1.0, 0.0) for code in m.each("code")[:3]]  # these are not believed
+        sound = [1.0 - np.maximum(known[i], known[j] if j < len(known) else 0.0) for i, j in PAIRS_OF_SOURCES]
+        loud = largest([on * both for on, both in zip(m.each("raised")[:SPEED_PAIRS], sound, strict=True)])
         quiet = np.where(loud > 0.0, 0.0, m["quiet_steps"] + full)
         names = ("mean_speed", "mean_drive", "mean_measured", "mean_demanded", "mean_other")
         rings = []
@@ -227,13 +241,13 @@ class TrainDiagnosis(HybridSystem):
         found[1] = Share(found[1].value, found[1].found * read.has_pressure, found[1].bracketed)
         told = [usable * one.found for one in found]
         shares = [np.where(on > 0.0, one.value, old) for on, one, old in zip(told, found, before, strict=True)]
-        known = zip(told, found, m.each("share_found"), strict=True)
+        sought = zip(told, found, m.each("share_found"), strict=True)
         m.put(
             coarse_sum=[(1.0 - full) * total for total in sums],
             coarse_samples=(1.0 - full) * count,
             quiet_steps=quiet,
             share=shares,
-            share_found=[np.where(on > 0.0, one.bracketed, old) for on, one, old in known],
+            share_found=[np.where(on > 0.0, one.bracketed, old) for on, one, old in sought],
             **dict(zip(names, rings, strict=True)),
         )
         pulls, measured, demanded = (np.abs(1.0 - share) for share in shares)
@@ -273,3 +287,13 @@ class TrainDiagnosis(HybridSystem):
             mark=np.where(used > 0.0, u.balise_position, m["mark"]),
             way_mark=marks,
         )
+
+
+def _nearest_way(m: Memory, read: Readings) -> Array:
+    """Distance of the satellite position from the nearest of the ways since the last balise [m].
+
+    Satellites are off where no source of speed agrees with them, not where one source is.
+    """
+    ways = zip(m.each("way"), m.each("way_mark"), read.fitted, strict=True)
+    gaps = [np.where(there > 0.0, np.abs(read.gps - m["mark"] - way + mark), HUGE) for way, mark, there in ways]
+    return -largest([-gap for gap in gaps])

@@ -47,9 +47,21 @@ _CODES = "0 none, 1 suspected, 2 wheel, 3 wrong, 4 stuck, 5 loss"
 
 OUTPUTS = (
     *(output_signal(f"{fault}_fault", "1", f"{_TITLES[fault]}: {_CODES}", variability="discrete") for fault in FAULTS),
+    output_signal("fault", "1", "1 while a fault is detected, whether it is isolated or not", variability="discrete"),
     output_signal("odometer_fault", "1", "1 while the first odometer is suspected or at fault", variability="discrete"),
     output_signal("fault_count", "1", "How many faults are suspected or isolated", variability="discrete"),
-    output_signal("several_faults", "1", "1 while no single fault explains the alarms", variability="discrete"),
+    output_signal(
+        "several_faults",
+        "1",
+        "1 while no single fault explains the alarms",
+        variability="discrete",
+        warning=OutputWarning(
+            "detected faults that it could not isolate: no single fault of its table moves all the residuals that are "
+            "above their thresholds. Look at the ratios: several sensors are at fault, or one in a way that the table "
+            "does not have",
+            ("fault", "fault_count"),
+        ),
+    ),
     output_signal("detection_time", "s", "Instant of the last detection; -1 none", variability="discrete"),
     output_signal(
         "confidence", "1", "1 less threshold over the weakest alarm of the verdict, 0..1", variability="discrete"

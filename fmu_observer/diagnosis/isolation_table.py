@@ -33,7 +33,8 @@ class IsolationTable:
 
     A residual that a fault *must* move is above its threshold if the fault is large enough and lasts; one that it *may*
     move is so at times. All others stay quiet. A fault explains alarms of which it must or may move each. Of several,
-    those explain them best that must move the fewest residuals which are quiet.
+    those explain them best that must move the fewest residuals which are quiet. One that explains them without any of
+    those that it must move is suspected only where another fault explains them too.
 
     Args:
         residuals: names. must: by fault, the residuals that it moves. may: by fault, those that it moves at times.
@@ -70,13 +71,15 @@ class IsolationTable:
         """
         counted = [alarm * there for alarm, there in zip(alarms, available, strict=True)]
         any_alarm = largest(counted)
-        covers, missing = [], []
+        covers, missing, seen_of_must = [], [], []
         for fault, there in zip(self.faults, possible, strict=True):
             moved = {*self.must[fault], *self.may.get(fault, ())}
             cover = any_alarm * there
             for name, alarm in zip(self.residuals, counted, strict=True):
                 cover = cover if name in moved else cover * (1.0 - alarm)
             covers.append(cover)
+            named = zip(self.residuals, counted, strict=True)
+            seen_of_must.append(largest([alarm for name, alarm in named if name in self.must[fault]]))
             every = zip(self.residuals, counted, available, strict=True)
             quiet = {name: seen - alarm for name, alarm, seen in every if name in self.must[fault]}
             groups = [[quiet.pop(name) for name in group if name in quiet] for group in self.together]
@@ -87,9 +90,11 @@ class IsolationTable:
             best = np.minimum(best, np.where(cover > 0.5, lacking, none))
         bests = [c * np.where(lacking < best + 0.5, 1.0, 0.0) for c, lacking in zip(covers, missing, strict=True)]
         alone = np.where(sum(bests) < 1.5, 1.0, 0.0)
+        only = np.where(sum(covers) < 1.5, 1.0, 0.0)
+        sure = [alone * np.maximum(only, seen) for seen in seen_of_must]
         return Verdict(
-            [one * alone for one in bests],
-            [one * (1.0 - alone) for one in bests],
+            [one * told for one, told in zip(bests, sure, strict=True)],
+            [one * (1.0 - told) for one, told in zip(bests, sure, strict=True)],
             any_alarm * (1.0 - largest(covers)),
         )
 

@@ -49,6 +49,9 @@ def test_alarms_say_what_they_can() -> None:
     assert judged(MOTION, "odometer_1_radar", "odometer_2_radar") == (set(), {"radar", "adhesion"}, 0.0)
     assert judged(MOTION, "odometers", "radar_gps") == (set(), set(), 1.0)
     assert judged(MOTION, "way_1") == ({"odometer_1"}, set(), 0.0)
+    # Satellites may move it; but while none of what they must move is raised the radar explains it as well.
+    assert judged(MOTION, "radar_gps") == (set(), {"gps"}, 0.0)
+    assert judged(MOTION, "odometer_1_gps", "odometer_2_gps", "radar_gps") == ({"gps"}, set(), 0.0)
     assert judged(BRAKE, "pressure") == (set(), {"pressure_sensor", "cylinder"}, 0.0)
 
 
@@ -119,6 +122,32 @@ def test_a_sensor_that_stands_still_is_stuck() -> None:
     moving: Signals = dict.fromkeys(("odometer_1", "odometer_2", "radar"), speed)
     moving |= {"gps_position": lambda t: 10.0 * t + 0.1 * t * t, "radar": lambda t: speed(min(t, 5.0))}
     assert told(16.0, moving)[-1]["radar_fault"] == STUCK
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_detected_is_told_although_it_is_not_isolated(seed: int) -> None:
+    """A law: while a residual is above its threshold for as long as it takes to raise an alarm `fault` is 1. Sensors
+    are off by random gains and offsets from a random instant on, one to all of them at once; without any it stays 0."""
+    rng = np.random.default_rng(seed)
+    names = ("odometer_1", "odometer_2", "radar", "gps_position", "cylinder_pressure")
+    begins = {name: rng.uniform(4.0, 8.0) for name in names if seed and rng.random() < 0.6}
+    gains, offsets = (
+        rng.choice([-1.0, 1.0], 5) * rng.uniform(0.0, 0.3, 5),
+        {"gps_position": 9.0, "cylinder_pressure": 4e4},
+    )
+
+    def off(name: str, gain: float, healthy: Callable[[float], float]) -> Callable[[float], float]:
+        return lambda t: healthy(t) * (1.0 + gain) + offsets.get(name, 0.0) if t > begins[name] else healthy(t)
+
+    right = cruise(12.0)
+    rows = told(16.0, right | {n: off(n, g, right[n]) for n, g in zip(names, gains, strict=True) if n in begins})
+    lasting = 0
+    for row in rows:
+        above = any(value > 1.0 for name, value in row.items() if name.startswith("ratio_"))
+        lasting = lasting + 1 if above else 0
+        assert lasting < 3 or row["fault"] == 1.0
+        assert row["fault"] >= min(row["fault_count"] + row["several_faults"], 1.0)
+    assert any(row["fault"] for row in rows) == bool(begins)
 
 
 def test_without_a_third_source_both_are_suspected() -> None:

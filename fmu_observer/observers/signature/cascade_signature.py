@@ -96,6 +96,12 @@ class CascadeSignature(SignatureObserver):
         window = np.stack([self.plant.measured(x)[0] for x in self.moved(states, self.window - 1, model)])
         return np.stack(self.points(window, ORDER, EPS[self.scaling]))
 
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Samples come at the period of the tables, which are part of the equations."""
+        text = f"sample_period must be {self._period:g} s: the tables are made of samples over that time"
+        same = np.where(np.abs(p.sample_period - self._period) <= 1e-9, 1.0, 0.0)
+        return super().requirements(p) | {text: same}
+
     def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
         """The printed constants."""
         return self._model(*self._constants, p.sample_period)
@@ -110,8 +116,9 @@ class CascadeSignature(SignatureObserver):
         to_lines = curve_distances(lines, point)
         first_state = nearest_two([to_lines[i] + 1e-12 for i in range(len(nodes))], nodes)
         third = place_on_curve(nodes, np.stack([interpolated(nodes, chords[k], first_state) for k in range(2)]), chord)
-        nearest = np.min(distances)
-        return Inverted(np.stack([first_state, second, third]), np.where(nearest > 1.0, 1.0, 0.0))
+        ends = np.where(np.abs(third) > SIZE - LEAST, 1.0, 0.0)  # the chord lies at or beyond an end of its curve
+        outside = np.maximum(ends, np.where(np.min(distances) > 1.0, 1.0, 0.0))
+        return Inverted(np.stack([first_state, second, third]), outside)
 
     # -- internals --------------------------------------------------------------------------------------------------
 

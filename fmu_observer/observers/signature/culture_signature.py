@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
 from fmu_observer.signatures.inversion import Found, network_inverse, polynomial_refinement, weighted_inverse
 from fmu_observer.signatures.pencil import NextScaling
@@ -20,9 +21,13 @@ from plant_models.hybrid.system import Array
 ORDER, POINTS = 6, 2  # printed N; N_O = 8
 NOMINAL = 32
 """Places of the nominal run that are kept."""
+HOURS, LEAST_GLYCEROL = 7.5, 0.09  # of the nominal run [h], [kg/m3]
 LEAST_ENZYME = 1e-4  # [kg/m3]
 FINE = 13  # values an axis of the network as refined for the weights
 SHARPNESS = 20.0  # where `look_up_errors` is smallest under noise of 1 %
+
+RUN_ERROR = 5e-3
+"""Of its range, that the end of the nominal run may be off; trapezoids between its places leave 2.8e-3 [ours]."""
 
 LookUp = Literal["weighted", "cell"]
 
@@ -35,8 +40,9 @@ class CultureSignature(SignatureObserver):
     Properties are the mean abscissa and the mean ordinate of the points (4.7.8).
 
     The network changes steeply with X. The thesis tabulates it over a grid of X whose half-width it does not print;
-    here the signatures of the nodes are computed for the X that is measured, so that no table is interpolated and the
-    parameters may be changed at will [ours]. S0(X) and P0(X) are a table. ``literal`` scaling: with ``norm`` both
+    here the signatures of the nodes are computed for the X that is measured, so that no table of them is interpolated
+    [ours]. S0(X) and P0(X) are a table, which belongs to the parameters of the plant: one of another run than theirs is
+    refused, `tabulated` makes it. ``literal`` scaling: with ``norm`` both
     quantities move the properties in nearly one direction.
 
     How a point is looked up is not printed in full ("curvilinear"). ``cell`` takes the place in the quadrilateral
@@ -89,6 +95,41 @@ class CultureSignature(SignatureObserver):
             ),
         )
         super().__init__(nodes=nodes, next_scaling=next_scaling, look_up=look_up)
+
+    def tabulated(
+        self, parameters: Mapping[str, Value] | None = None, preset: str | None = None
+    ) -> dict[str, np.ndarray]:
+        """The nominal run for other parameters, to be set together with them: while there is as much glycerol as at the
+        end of the printed one, 7.5 h at most.
+
+        Args:
+            parameters: values by name; those of the plant matter. preset: to start from.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size; or the run has no rising biomass.
+        """
+        p, hours = self.model_values(parameters, preset), HOURS
+        run = nominal_run(p=p)
+        while run[1][-1] < LEAST_GLYCEROL and hours > 1.0:
+            hours *= 0.95
+            run = nominal_run(hours=hours, p=p)
+        biomass, glycerol, enzyme = run
+        if not np.all(np.diff(biomass) > 0.0):
+            raise ValueError(f"{self.name}: with these parameters biomass does not rise along the nominal run.")
+        return {"nominal_biomass": biomass, "nominal_glycerol": glycerol, "nominal_enzyme": enzyme}
+
+    def table_errors(self, p: Any) -> dict[str, Array]:
+        """How far glycerol and enzyme end beside the nominal run where they follow the model's slopes over biomass."""
+        places = np.stack([p.nominal_biomass, p.nominal_glycerol, p.nominal_enzyme])
+        rates = self.plant.flow(0.0, places, None, self.model_parameters((), p))
+        grown = p.nominal_biomass[1:] - p.nominal_biomass[:-1]
+        offs = []
+        for i in (1, 2):
+            slope = rates[i] / np.where(np.abs(rates[0]) > 0.0, rates[0], 1e-300)
+            lacks = places[i][1:] - places[i][:-1] - 0.5 * (slope[1:] + slope[:-1]) * grown
+            size = np.max(places[i]) - np.min(places[i])
+            offs.append(np.abs(np.sum(lacks)) / (RUN_ERROR * np.maximum(size, 1e-300)))
+        return {"nominal run": np.max(np.stack(offs))}
 
     def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
         """Glycerol and enzyme at the oldest sample, of its biomass and the light of the window."""
@@ -229,15 +270,15 @@ def course(X: Array, biomass: Array, values: Array) -> tuple[Array]:
     return (np.stack([values[0] + np.sum(shares * (values[1:] - values[:-1]))]),)
 
 
-def nominal_run(start: Sequence[float] = (0.05, 2.0, 0.01), hours: float = 7.5) -> np.ndarray:
+def nominal_run(start: Sequence[float] = (0.05, 2.0, 0.01), hours: float = HOURS, p: Any = None) -> np.ndarray:
     """Biomass, glycerol and enzyme of a nominal run at places evenly spread in time, shape (3, NOMINAL).
 
     Args:
         start: biomass, glycerol and enzyme [kg/m3], the printed ones. hours: its length; after 7.6 h there is no
-            glycerol left.
+            glycerol left. p: parameters of the plant; None for its own.
     """
     plant = EcoliCulture()
-    p = plant.unpack_parameters(plant.start_parameters())
+    p = plant.unpack_parameters(plant.start_parameters()) if p is None else p
     per, step = 4, hours * HOUR / (4 * (NOMINAL - 1))
     states = [np.array(start)]
     for _ in range(per * (NOMINAL - 1)):

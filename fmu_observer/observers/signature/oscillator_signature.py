@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
+from fmu_observer.observers.signature.signature_observer import TABLE_ERROR, Inverted, SignatureObserver
 from fmu_observer.signatures.inversion import soft_inverse
 from fmu_observer.signatures.pencil import NextScaling
 from plant_models.benchmarks.braked_oscillator import BrakedOscillator, Variant
@@ -93,11 +93,27 @@ class OscillatorSignature(SignatureObserver):
         Raises:
             ValueError: a parameter is unknown, not finite or of another size.
         """
-        p = self.model_values(parameters, preset)
         grid = np.stack(np.meshgrid(*self.nodes, indexing="ij"))
-        window = np.stack([self.plant.measured(x)[0] for x in self.moved(grid, ORDER + POINTS - 1, p)])
+        return {"table": np.stack(self._points_of(grid, self.model_values(parameters, preset))).ravel()}
+
+    def table_errors(self, p: Any) -> dict[str, Array]:
+        """At nine nodes: corners, middles of sides, and the middle."""
+        count = len(self.nodes[0])
+        some = np.array([0, count // 2, count - 1])
+        grid = np.stack(np.meshgrid(*(nodes[some] for nodes in self.nodes), indexing="ij"))
+        places = [int(i) * count + int(j) for i in some for j in some]
+        offs: list[Array] = []
+        for k, made in enumerate(self._points_of(np.reshape(grid, (2, len(places))), p)):
+            given = p.table[k * count**2 : (k + 1) * count**2]
+            size = TABLE_ERROR * np.maximum(np.max(given) - np.min(given), 1e-300)
+            offs += [np.abs(given[i] - made[n]) / size for n, i in enumerate(places)]
+        return {"table": np.max(np.stack(offs))}
+
+    def _points_of(self, states: np.ndarray, p: Any) -> tuple[Array, Array]:
+        """Both coordinates of the signatures of windows that begin with these states, shape (...) each."""
+        window = np.stack([self.plant.measured(x)[0] for x in self.moved(states, ORDER + POINTS - 1, p)])
         points = self.points(window, ORDER, p.regularisation)
-        return {"table": np.stack([points[0][0], points[1][0]]).ravel()}
+        return points[0][0], points[1][0]
 
     def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
         """Both states by (4.6.5)."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
+from fmu_observer.observers.signature.signature_observer import TABLE_ERROR, Inverted, SignatureObserver
 from fmu_observer.signatures.inversion import (
     Found,
     best_candidate,
@@ -127,6 +127,17 @@ class ReactionSignature(SignatureObserver):
         """
         p = self.model_values(parameters, preset)
         return {"table": self._built(float(p.sample_period), float(p.regularisation))}
+
+    def table_errors(self, p: Any) -> dict[str, Array]:
+        """At the largest x1, with all x2."""
+        count, rate = len(self.nodes), float(np.mean(RATES))
+        states = np.stack([np.full(count, LARGEST), self.nodes])
+        made = self.properties(states, rate, p.sample_period, p.regularisation)[0]
+        first, second = p.table[:count], p.table[count:]
+        sizes = [TABLE_ERROR * np.maximum(np.max(part) - np.min(part), 1e-300) for part in (first, second)]
+        offs = [np.abs(second[count * (count - 1) + j] - made[1][j]) / sizes[1] for j in range(count)]
+        offs.append(np.abs(first[count - 1] - np.sum(made[0]) / count) / sizes[0])
+        return {"table": np.max(np.stack(offs))}
 
     def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
         """The state for each candidate of the rate, and the candidate that fits the window best."""

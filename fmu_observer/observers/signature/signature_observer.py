@@ -35,6 +35,9 @@ from plant_models.hybrid.system import Array
 OUTSIDE_CELLS = 0.5
 """Cells beyond its table from which a window counts as outside: less comes of rounding and of mild noise."""
 
+TABLE_ERROR = 1e-6
+"""Of its range, that a table may be off its parameters: they are written with so many digits at least [ours]."""
+
 MOSTLY = OutputWarning(
     "found more than half of its windows beyond its table: the state is not in the set the table was built for, its "
     "parameters are not those of the table, or the noise is too large. Widen the set, build the table anew "
@@ -124,6 +127,15 @@ class SignatureObserver(HybridSystem):
         Args:
             past: samples of each measurement, the oldest first, shape (N_O,) each. x: memory before. p: parameters.
         """
+
+    def table_errors(self, p: Any) -> dict[str, Array]:
+        """Largest difference of each table from what the parameters make of it, by its name, over what it may be off: 1
+        and less is legal. At some of its places: a parameter that matters moves nearly all.
+
+        Args:
+            p: parameters.
+        """
+        return {}
 
     def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
         """Parameters of the plant's equations.
@@ -236,8 +248,13 @@ class SignatureObserver(HybridSystem):
         return values | dict(zip(self._own_outputs, own, strict=True))
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters are finite and within their bounds."""
-        return super().requirements(p) | within_bounds([s for s in self.parameters if s.name != "table"], p)
+        """Parameters are finite and within their bounds, and tables are those of the other parameters."""
+        tables = {
+            f"{name} must belong to the other parameters: build it anew with tabulated(parameters), and set both": off
+            for name, off in self.table_errors(p).items()
+        }
+        kept = {text: np.where(off <= 1.0, 1.0, 0.0) for text, off in tables.items()}
+        return super().requirements(p) | within_bounds([s for s in self.parameters if s.name != "table"], p) | kept
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 
 Reading = Literal["repaired", "as_published"]
+LONG, SHORT = 100, 50  # orders of the properties that ship
 
 
 class SignatureTrack(HybridSystem):
@@ -82,8 +83,8 @@ class SignatureTrack(HybridSystem):
 
     def __init__(
         self,
-        long_order: int = 100,
-        short_order: int = 50,
+        long_order: int = LONG,
+        short_order: int = SHORT,
         next_scaling: NextScaling = "norm",
         reading: Reading = "repaired",
     ) -> None:
@@ -106,6 +107,20 @@ class SignatureTrack(HybridSystem):
             next_scaling=next_scaling,
             reading=reading,
         )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Nominal properties are measured with the period, the regularisation and the orders in use."""
+        named = ("nominal_length", "nominal_short_tip", "nominal_gap", "sample_period", "eps")
+        start = {s.name: float(s.start_values[0]) for s in self.parameters if s.name in named}
+        own = np.stack([np.abs(getattr(p, name) - start[name]) for name in named[:3]])
+        same = np.abs(p.sample_period - start["sample_period"]) + np.abs(p.eps - start["eps"])
+        shipped = np.where(np.max(own) > 0.0, 0.0, 1.0)
+        other = np.where(same > 0.0, 1.0, 0.0) if self.orders == (LONG, SHORT) else 1.0
+        text = (
+            f"nominal_length, nominal_short_tip and nominal_gap belong to samples each {start['sample_period']:g} s, "
+            f"eps = {start['eps']:g} and orders {LONG} and {SHORT}: measure them with yours on a run without a change"
+        )
+        return super().requirements(p) | {text: 1.0 - shipped * other}
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A sample gives one point to each signature."""
