@@ -249,6 +249,21 @@ def test_a_third_state_beyond_the_tables_of_the_cascade_is_told() -> None:
     assert shares[1] > 0.6
 
 
+@pytest.mark.parametrize(("preset", "period", "told"), [("as_published", 0.01, 1.0), ("wide_samples", 0.1, 0.0)])
+def test_a_rate_that_goes_astray_after_long_is_told(preset: str, period: float, told: float) -> None:
+    """By the exact solution, without noise; at 8 s less than a third of the windows lay beyond the table."""
+    observer = ReactionSignature()
+    p, x = observer.unpack_parameters(observer.start_parameters(preset)), observer.start_state()
+    x[:2] = 2.5, 0.5
+    for k in range(round(6.5 / period)):
+        a = 2.5 / (1.0 + 0.3 * 2.5 * k * period)
+        u = observer.unpack_inputs(np.array([0.5 * (a + 3.5)]))
+        x = observer.jump("sampling", k * period, x, u, p)
+    values = observer.output(6.5, x, u, p)
+    assert values["outside_count"] < 0.35 * values["window_count"]
+    assert values["mostly_outside"] == told
+
+
 SIGNATURES = sorted(name for name in OBSERVERS if "signature" in name)
 
 

@@ -38,10 +38,13 @@ OUTSIDE_CELLS = 0.5
 TABLE_ERROR = 1e-6
 """Of its range, that a table may be off its parameters: they are written with so many digits at least [ours]."""
 
+RECENT = 50.0
+"""Windows of which more than half beyond the table are told, although there were many within it before [ours]."""
+
 MOSTLY = OutputWarning(
-    "found more than half of its windows beyond its table: the state is not in the set the table was built for, its "
-    "parameters are not those of the table, or the noise is too large. Widen the set, build the table anew "
-    "(`tabulated`), or lower the gain",
+    "found more than half of its windows beyond its table, of all or of some fifty: the state is not in the set the "
+    "table was built for, its parameters are not those of the table, or the noise is too large. Widen the set, build the "
+    "table anew (`tabulated`), or lower the gain",
     shows=("outside_count", "window_count"),
     at_end=True,
 )
@@ -213,7 +216,7 @@ class SignatureObserver(HybridSystem):
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Move the window on, invert its signature, blend; shape of the state."""
         n, width = len(self.state_names), self.window
-        held, windows, outsides, own = self._counts(x)
+        held, windows, outsides, share, long, own = self._counts(x)
         past = []
         for i, name in enumerate(self.measured_names):
             first = 2 * n + i * width
@@ -226,6 +229,8 @@ class SignatureObserver(HybridSystem):
         estimate = blended(ahead, now, p.gain, full)
         shown = np.where(full > 0.5, now, ahead)
         beyond = full * np.where(told.outside > OUTSIDE_CELLS, 1.0, 0.0)
+        share = share + full * (beyond - share) / np.minimum(windows + 1.0, RECENT)  # of all, then of the last
+        long = np.where(windows > RECENT, np.where(share > 0.5, 1.0, long), long)
         kept = [np.where(full > 0.5, new, old) for new, old in zip(told.own, own, strict=True)]
         return vector(
             *(estimate[i] for i in range(n)),
@@ -234,17 +239,19 @@ class SignatureObserver(HybridSystem):
             count,
             windows + full,
             outsides + beyond,
+            share,
+            long,
             *kept,
         )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, what the signature alone gives, and how often it lay beyond the table."""
         n = len(self.state_names)
-        held, windows, outsides, own = self._counts(x)
+        held, windows, outsides, _, long, own = self._counts(x)
         values = {name: x[i] for i, name in enumerate(self.state_names)}
         values |= {f"{name}_look_up": x[n + i] for i, name in enumerate(self.state_names)}
         values |= {"window_full": np.where(held > self.window - 0.5, 1.0, 0.0), "window_count": windows}
-        values |= {"outside_count": outsides, "mostly_outside": np.where(outsides > 0.5 * windows, 1.0, 0.0)}
+        values |= {"outside_count": outsides, "mostly_outside": np.where(outsides > 0.5 * windows, 1.0, long)}
         return values | dict(zip(self._own_outputs, own, strict=True))
 
     def requirements(self, p: Any) -> dict[str, Array]:
@@ -270,9 +277,11 @@ class SignatureObserver(HybridSystem):
         self.parameters = tuple(replace(s, start=start) if s.name == "table" else s for s in self.parameters)
         self.__dict__.pop("parameter_signals", None)
 
-    def _counts(self, x: Array) -> tuple[Array, Array, Array, list[Array]]:
+    def _counts(self, x: Array) -> tuple[Array, Array, Array, Array, Array, list[Array]]:
+        """Samples held, windows, those outside, the recent share of these, whether it was large, and the own memory."""
         first = self._places["samples_held"]
-        return x[first], x[first + 1], x[first + 2], [x[i] for i in range(first + 3, len(scalar_names(self.states)))]
+        held, windows, outsides, share, long = (x[first + i] for i in range(5))
+        return held, windows, outsides, share, long, [x[i] for i in range(first + 5, len(scalar_names(self.states)))]
 
 
 def _settings(plant: NoisyPlant, known: Sequence[str], gain: float, eps: float) -> tuple[Signal, ...]:
@@ -295,6 +304,8 @@ def _remembered(pairs: Sequence[tuple[Signal, Signal]], measured: Sequence[Signa
         memory("samples_held", "1", 0.0, "Samples in the window"),
         memory("windows_inverted", "1", 0.0, "Full windows so far"),
         memory("windows_outside", "1", 0.0, "Full windows beyond the table so far"),
+        memory("share_outside", "1", 0.0, "Share of the last windows beyond the table, the newest weighing most"),
+        memory("long_outside", "1", 0.0, "1 once this share was above a half"),
     )
 
 
