@@ -43,8 +43,8 @@ RECENT = 50.0
 
 MOSTLY = OutputWarning(
     "found more than half of its windows beyond its table, of all or of some fifty: the state is not in the set the "
-    "table was built for, its parameters are not those of the table, or the noise is too large. Widen the set, build the "
-    "table anew (`tabulated`), or lower the gain",
+    "table was built for, its parameters are not those of the table, or the noise is too large. Widen the set, build "
+    "the table anew (`tabulated`), or lower the gain",
     shows=("outside_count", "window_count"),
     at_end=True,
 )
