@@ -35,7 +35,8 @@ class FaultDetection:
     Args:
         observer: component name.
         duration: time judged [s].
-        faults: number of true faults in it. detected: of those, how many it told.
+        faults: number of true faults in it. detected: of those, how many it told in time, by a detection that began in
+            them.
         detections: how many intervals it told. false: of those, how many belong to no fault.
         start_delays: from the start of each detected fault to the detection [s], in their order.
         end_delays: from its end to the end of the detection [s]; infinite where that was still on when the run ended.
@@ -115,7 +116,7 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
 
     Args:
         result: the run.
-        spec: the role `true_fault`, the output `detection`, observers, start of the evaluation.
+        spec: the role `true_fault`, the output `detection`, `delay_limit`, observers, start of the evaluation.
 
     Returns:
         One entry an observer, in their order; none where no true fault was recorded.
@@ -131,16 +132,22 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
 
 
 def judged_detections(
-    faults: Sequence[Interval], detections: Sequence[Interval], end: float, grace: float = GRACE
+    faults: Sequence[Interval],
+    detections: Sequence[Interval],
+    end: float,
+    grace: float = GRACE,
+    delay_limit: float | None = None,
 ) -> tuple[list[float], list[float], int]:
     """Which detections belong to which faults.
 
-    A detection belongs to a fault that it overlaps, the fault taken to last `grace` longer, though not beyond the begin
-    of the next. A fault is detected where one does; its detection begins with the first of them and ends with the last.
+    A detection belongs to the fault in which it *begins*, the fault taken to last `grace` longer, though not beyond the
+    begin of the next; one that was on before is none of it, however long it lasts. A fault is detected where one of its
+    detections begins within the delay limit; it begins with the first of them and ends with the last. A detection in a
+    fault that begins later than that is late, and not false.
 
     Args:
         faults: true intervals [s], in order. detections: told intervals [s], in order. end: of the run [s].
-        grace: see above [s].
+        grace: see above [s]. delay_limit: longest delay [s]; None for none.
 
     Returns:
         Delays of the detected faults at their start and at their end [s], and the number of false detections.
@@ -148,9 +155,10 @@ def judged_detections(
     starts, ends, matched = [], [], set()
     for number, (a, b) in enumerate(faults, 1):
         next_begin = faults[number][0] if number < len(faults) else inf
-        own = [k for k, (c, d) in enumerate(detections) if c <= min(b + grace, next_begin) and d > a]
+        last_begin = min(b + grace, next_begin - SEPARATE)
+        own = [k for k, (c, _) in enumerate(detections) if a - SEPARATE <= c <= last_begin]
         matched |= set(own)
-        if own:
+        if own and (delay_limit is None or detections[own[0]][0] <= a + delay_limit + SEPARATE):
             starts.append(max(detections[own[0]][0] - a, 0.0))
             last = detections[own[-1]][1]
             ends.append(inf if last >= end - SEPARATE and last > b + grace else last - b)
@@ -234,7 +242,7 @@ def _judged(
     end = float(result.time[-1])
     detections = [] if told is None else [d for d in intervals(result.time, told) if d[1] > start]
     begun = [d for d in detections if d[0] >= start or any(d[1] > a for a, _ in faults)]
-    starts, ends, false = judged_detections(faults, begun, end)
+    starts, ends, false = judged_detections(faults, begun, end, delay_limit=spec.delay_limit)
     inside = sum(max(0.0, min(b, d) - max(a, c)) for a, b in faults for c, d in begun)
     outside = sum(d - max(c, start) for c, d in begun) - inside
     return FaultDetection(

@@ -195,11 +195,11 @@ def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0) -> V
     fault = (told > 0.5) & moving
     start, end = jams.onset, jams.onset + jams.length
     near = (t >= start[:, None] - 1e-9) & (t <= end[:, None] + GRACE)
-    found = (fault & near).any(axis=1)
-    first = np.argmax(fault & near, axis=1)
+    rises = np.diff(fault.astype(int), axis=1, prepend=0) > 0
+    found = (rises & near).any(axis=1)  # a detection is of the fault in which it begins
+    first = np.argmax(rises & near, axis=1)
     over = ~fault & (t >= end[:, None])
     ended = over.any(axis=1) & moving[np.arange(len(t_over := np.argmax(over, axis=1))), t_over]
-    rises = np.diff(fault.astype(int), axis=1) > 0
     last = np.argmax(~moving, axis=1) - 1
     rest = np.where((~moving).any(axis=1), last, len(t) - 1)
     judged = found & (end + ROOM < t[rest])
@@ -207,7 +207,7 @@ def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0) -> V
         found,
         np.where(found, t[first] - start, np.nan),
         np.where(judged, np.where(ended, t[t_over] - end, np.inf), np.nan),
-        (rises & ~near[:, 1:]).sum(axis=1),
+        (rises & ~near).sum(axis=1),
         fault[np.arange(len(rest)), rest],
         np.maximum(moving.sum(axis=1) * PERIOD - after, 0.0),
     )

@@ -71,7 +71,7 @@ def test_faults_misses_false_alarms_and_delays() -> None:
     assert dict(zip(HEADINGS, cells(found, 1.0), strict=True))["Delay at start [s]"] == "0.450 (not within 1.00)"
     assert "(within 0.500)" in cells(replace(found, faults=2), 0.5)[5]  # none missed, none later
     assert "(not within 0.499)" in cells(replace(found, faults=2), 0.499)[5]
-    assert fault_detection(result, replace(SPEC, detection="position"))[0].detected == 3  # never zero then
+    assert fault_detection(result, replace(SPEC, detection="position"))[0].detected == 0  # on before all of them
     text = fault_text([found, alone], SPEC)
     assert len(text.splitlines()) == 4
     nowhere = [replace(one, position_errors=()) for one in (found, alone)]
@@ -87,14 +87,24 @@ def test_a_detection_that_never_ends_is_told_so() -> None:
     assert "not ended" in cells(found)
 
 
-def test_one_detection_may_cover_two_faults_and_two_one_fault() -> None:
-    assert judged_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5, 0.0], [2.5, 0.5], 0)
+def test_a_detection_is_of_the_fault_in_which_it_begins() -> None:
+    """What was on before a fault says nothing of it; two detections may be of one fault."""
+    assert judged_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5], [2.5], 0)
+    assert judged_detections([(3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([], [], 1)
     assert judged_detections([(1.0, 5.0)], [(1.2, 2.0), (3.0, 5.1)], 10.0) == (
         [pytest.approx(0.2)],
         [pytest.approx(0.1)],
         0,
     )
     assert judged_detections([], [(1.0, 2.0)], 10.0) == ([], [], 1)
+
+
+@pytest.mark.parametrize(("limit", "told"), [(None, 1), (0.7, 1), (0.3, 0)])
+def test_a_detection_that_is_late_is_a_miss_and_no_false_alarm(limit: float | None, told: int) -> None:
+    starts, ends, false = judged_detections([(1.0, 5.0)], [(1.6, 5.0)], 10.0, delay_limit=limit)
+    assert (len(starts), len(ends), false) == (told, told, 0)
+    (found, _) = fault_detection(made([(1.0, 5.0)], [(1.6, 5.0)]), replace(SPEC, delay_limit=limit))
+    assert (found.detected, found.missed, found.false) == (told, 1 - told, 0)
 
 
 def test_what_is_before_the_evaluation_does_not_count() -> None:
