@@ -251,7 +251,7 @@ class RepairedRules:
         passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
         armed = _is(m.mode == TRUSTED) * _is(faults < p.fault_limit) * passed
-        moves = _is(told.speed > p.least_speed)
+        moves = _is(np.abs(told.speed) > p.least_speed)
         onset = armed * moves * large
         # held: is the odometer believed again
         hold = np.where(held > 0.0, m.hold_time + p.odometer_period, 0.0)

@@ -34,6 +34,7 @@ def test_the_shared_signals_are_declared(make: Make) -> None:
         "adhesion_force": "N",
         "slip_indicator": "1",
         "innovation": "m",
+        "rolls_back": "1",
     }
     shared = {"mass", "wheel_inertia", "n_axles", "wheel_radius", "davis_a", "davis_b", "davis_c", "slip_floor"}
     assert shared <= {s.name for s in observer.parameters}

@@ -150,6 +150,14 @@ def test_a_train_at_standstill_is_held_until_it_is_let_go() -> None:
     assert c.step(estimated_speed=0.0, enabled=1.0, odometer_fault=1.0).brake_released == 0.0  # nothing to release
 
 
+@pytest.mark.parametrize(("speed", "told"), [(0.0, 0.0), (-0.09, 0.0), (-0.11, 1.0), (-0.5, 1.0)])
+def test_a_train_that_rolls_back_is_told(speed: float, told: float) -> None:
+    """Ten times the speed of standstill: what is faster does not stand, in either direction."""
+    controlled = Controlled()
+    controlled.start(estimated_speed=0.0, estimated_position=100.0)
+    assert controlled.step(estimated_speed=speed, estimated_position=99.0).rolls_back == told
+
+
 def test_a_train_that_is_let_go_is_planned_for_anew() -> None:
     c = Controlled()
     c.start(estimated_position=0.0, estimated_speed=30.0, enabled=0.0)

@@ -42,7 +42,7 @@ from fmu_observer.observers.train.adaptive_davis_states import (
     parts_of,
     sensitivity_of,
 )
-from fmu_observer.observers.train.standstill import stands
+from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
 from fmu_observer.observers.train.train_observer import BALISE
 from plant_models.hybrid import PeriodicEvent, Signal, input_signal, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
@@ -120,6 +120,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         output_signal("resistance_per_mass", "m/s2", "Running resistance at the estimated speed"),
         output_signal("resistance_per_mass_deviation", "m/s2", "Standard deviation of its error"),
         output_signal("smallest_excitation", "s2", "Smallest eigenvalue of the mean Gramian of the excitation"),
+        ROLLS_BACK,
     )
     parameters = (
         parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
@@ -234,6 +235,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             **{f"{n}_learnt": known.learnt[i] for i, n in enumerate(NAMES)},
             "resistance_per_mass": self._resistance(x, now, p),
             "resistance_per_mass_deviation": _root(of_resistance),
+            "rolls_back": rolls_back(u.odometer),
             "smallest_excitation": smallest_eigenvalue(excitation_now(known, since, p.excitation_time), 3),
         }
 

@@ -53,7 +53,7 @@ LAYOUT = RowLayout(inputs=ORDER + 5, measurements=1)
 OFFSETS, SPEED, EFFORT = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
 IS_BALISE, ANEW, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
 WINDOW_PARAMETERS = (
-    parameter("speed_limit", "m/s", 100.0, "Highest speed; the lowest is zero", min=0.1),
+    parameter("speed_limit", "m/s", 100.0, "Highest speed, either way", min=0.1),
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
     parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
 )
@@ -124,7 +124,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     the effort as it is; a row keeps what the flow made of the estimate before, so that the window knows every change
     of the effort.
 
-    Speed is never below zero nor above `speed_limit`, the unknown acceleration within `disturbance_limit`. The loss
+    Speed is within `speed_limit` either way, the unknown acceleration within `disturbance_limit`. The loss
     ``geman_mcclure`` doubts a false balise, and readings of a wheel that slides, by what the other rows of the window
     say before and after, and takes its doubt back where later rows agree with it: no gate has to decide at once. So the
     gate of balises is off unless it is set. `odometer_fault` and likelihood are those of the filter's step. So is the
@@ -280,4 +280,4 @@ def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
 
 def _limits(shared: Array) -> Limits:
     p = _shared(shared)
-    return Limits(vector(0.0 * p.mass, -p.disturbance_limit), vector(p.speed_limit, p.disturbance_limit))
+    return Limits(vector(-p.speed_limit, -p.disturbance_limit), vector(p.speed_limit, p.disturbance_limit))

@@ -327,7 +327,7 @@ def _moves(speed: Array, p: Any) -> Array:
     Args:
         speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
     """
-    return np.where(speed > p.odometer_deviation, 1.0, 0.0)
+    return np.where(np.abs(speed) > p.odometer_deviation, 1.0, 0.0)
 
 
 def _fading(speed: Array, p: Any) -> Array:
@@ -382,14 +382,17 @@ def covariance_of(x: Array) -> Array:
 
 
 def moving_speed(speed: Array, x: Array, u: Any, p: Any) -> Array:
-    """A corrected speed, zero where the train stands before and after it [m/s].
+    """A corrected speed, zero where the train stands before and after it, and below zero only where the wheel turns
+    backwards by more than its noise [m/s].
 
     A speed above zero, however small, would be friction's to stop, and would move the position on the way.
 
     Args:
         speed: after a correction [m/s]. x: state before it. u: inputs. p: parameters of `BaliseOdometerEkf`.
     """
-    return np.where(stands(x[V], u.odometer, SIGMAS * p.odometer_deviation) > 0.0, 0.0, np.maximum(speed, 0.0))
+    noise = SIGMAS * p.odometer_deviation
+    forward = np.where(u.odometer < -noise, speed, np.maximum(speed, 0.0))
+    return np.where(stands(x[V], u.odometer, noise) > 0.0, 0.0, forward)
 
 
 class Settled(NamedTuple):

@@ -62,7 +62,8 @@ class HeldOdometerObserver(TrainObserver):
     z the speed that a subclass gives. The position is the integral of the speed; at a balise it is set to that of the
     balise. A sample at which the input `odometer_fault` is 1 is not used, and the option `missing` says what then.
     A disturbance that brakes is dry friction on the speed, as the Davis constant and the brake are: it stops the
-    observed train and never pushes it back. For a speed above zero that is the equation above.
+    observed train and never pushes it back, unless the wheel turns backwards by more than its readings err: then it
+    drives the train. For a speed above zero that is the equation above.
 
     The error obeys ``de = (A - K C) e + K (v(t) - y_k) + w``: the motion since the sample drives it, so it does not
     vanish while the train accelerates, and bounds of it run as outputs.
@@ -191,7 +192,7 @@ class HeldOdometerObserver(TrainObserver):
         speed, predicting = x[1], x[PREDICTING] > 0.0
         residual = np.where(predicting, 0.0, x[HELD_SPEED] - speed)
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
-        free = (traction - rolling_drag(speed, p)) / p.mass - np.minimum(x[2], 0.0)  # what brakes: see friction
+        free = (traction - rolling_drag(speed, p)) / p.mass - x[2] + self._braking(x)  # what brakes: see friction
         acceleration = free + first_gain(self.scheduling_speed(x), p) * residual
         told = self.error_bound(t, x, p)
         # Without a reading it is the error itself that K is missing: (A) e = (A - K C) e + K C e.
@@ -215,7 +216,7 @@ class HeldOdometerObserver(TrainObserver):
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Davis constant, brake, and a disturbance that brakes [m/s2], shape (1,)."""
-        return super().friction(t, x, u, p) + np.maximum(x[2], 0.0)
+        return super().friction(t, x, u, p) + self._braking(x)
 
     def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
         """Position, speed, the effort in place of the adhesion force, and the innovation of the last balise."""
@@ -344,6 +345,11 @@ class HeldOdometerObserver(TrainObserver):
         )
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _braking(x: Array) -> Array:
+        """The disturbance as far as it is dry friction [m/s2]: not where the wheel turns backwards, which it drives."""
+        return np.where(x[HELD_SPEED] < -x[HELD_ERROR], 0.0, np.maximum(x[2], 0.0))
 
     @staticmethod
     def _age(t: Array, x: Array) -> Array:

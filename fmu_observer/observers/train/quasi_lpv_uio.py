@@ -92,7 +92,8 @@ class QuasiLpvUio(GatedObserver, GapCertified):
       odometer is believed again the speed is set to it, and d is kept. From one balise to the next the ways of odometer
       and estimate are compared with the distance.
 
-    The resistance and a brake are dry friction on the estimated speed: they stop the train and never push it back.
+    The resistance and a brake are dry friction on the estimated speed: they stop the train and never push it back. A
+    disturbance does: where it is larger the estimate rolls back with the odometer, whose reading has a sign.
 
     Args:
         rules: ``repaired`` or ``printed``.
@@ -259,10 +260,10 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
         own = [x[i] for i in range(LEAD + 1)]
         acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
-        now = np.maximum(u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0), 0.0)
+        now = u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0)
         told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
         judged = self.rules.at_sample(self._rule_memory(x), told, p)
-        own[V] = np.maximum(np.where(judged.restart > 0.0, now, x[V]), 0.0)
+        own[V] = np.where(judged.restart > 0.0, now, x[V])
         own[CORRECTION] = now - own[V]
         own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
         own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
@@ -285,7 +286,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             np.where(x[BALISES] > 0.0, np.where(x[P] == u.balise_position, 0.0, 1.0), 0.0),
         )
         judged = self.rules.at_balise(self._rule_memory(x), told, p)
-        own[V] = np.maximum(np.where(judged.restart > 0.0, x[HELD], x[V]) + judged.shift, 0.0)
+        own[V] = np.where(judged.restart > 0.0, x[HELD], x[V]) + judged.shift
         own[CORRECTION] = np.where(judged.restart > 0.0, 0.0, x[CORRECTION])
         own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
         own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
@@ -304,7 +305,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def _free_acceleration(self, x: Array, u: Any, p: Any) -> Array:
         """Acceleration without innovation and dry friction [m/s2]."""
-        drag = (p.davis_b + p.davis_c * self._scheduling(x)) * x[V]
+        drag = (p.davis_b + p.davis_c * np.abs(self._scheduling(x))) * x[V]
         return (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D]
 
     def _rule_memory(self, x: Array) -> tuple[Array, ...]:

@@ -9,9 +9,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from plant_models.hybrid import output_signal
+from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 
+ROLL_BACK = 0.3  # [m/s] [ours]: what a wheel must turn backwards for to be no noise: six deviations of 0.05 m/s
 FADING = 1.0  # [1/s] [ours]: of a disturbance's rate at standstill, where an observer has no rate of its own for it
+
+ROLLS_BACK = output_signal(
+    "rolls_back",
+    "1",
+    "1 while the odometer says that the train rolls back",
+    warning=OutputWarning(
+        "the train rolls back: an observer whose speed follows its model alone does not, for nothing that it is told "
+        "drives a train backwards; compare position and speed with the odometer's",
+        ("position", "speed"),
+    ),
+)
+
+
+def rolls_back(reading: Array) -> Array:
+    """Value of `ROLLS_BACK`.
+
+    Args:
+        reading: of the odometer, negative where its wheel turns backwards [m/s].
+    """
+    return np.where(reading < -ROLL_BACK, 1.0, 0.0)
 
 
 def stands(speed: Array, reading: Array = 0.0, tolerance: Array = 0.0) -> Array:

@@ -23,6 +23,7 @@ from fmu_observer.detection.slip_ratio import odometer_slip
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back
 from plant_models.hybrid import (
     PeriodicEvent,
     Signal,
@@ -90,6 +91,7 @@ class TrainObserver(GatedObserver, GapCertified):
         *SLIP_OUTPUTS,
         output_signal("adhesion_force", "N", "Estimated adhesion force between wheels and rails"),
         output_signal("innovation", "m", "Estimated minus true position at the last balise, as it acts now"),
+        ROLLS_BACK,
     )
     train_parameters: tuple[Signal, ...] = (
         parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
@@ -132,6 +134,7 @@ class TrainObserver(GatedObserver, GapCertified):
         estimate = self.estimate(x, u, p)
         filtered = x[self.continuous_count - 1]
         return estimate._asdict() | {
+            "rolls_back": rolls_back(u.odometer),
             "slip": odometer_slip(u.odometer, estimate.speed, p.slip_floor),
             "slip_indicator": indicator_level(filtered, u.odometer, estimate.speed, p.slip_threshold, p.slip_min_speed),
         }

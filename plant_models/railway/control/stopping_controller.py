@@ -64,10 +64,10 @@ class StoppingController(HybridSystem):
     is 1. Where the mark is too near for `effort_limit` the brake is planned at that limit, `limited_plan` is 1, and the
     train will pass the mark.
 
-    At `standstill_speed` the train is held by `holding_effort`; where it stands short of the mark by more than
-    `stop_tolerance`, `stands_short` is 1: with `traction_limit` = 0 nothing pulls it on. The estimates come from an
-    observer; for a comparison from the plant itself. `disturbance` acts forward; connect that of an observer whose
-    disturbance resists with a factor of -1.
+    At `standstill_speed` the train is held by `holding_effort`; where it rolls back all the same `rolls_back`
+    is 1, and where it stands short of the mark by more than `stop_tolerance` `stands_short` is: with `traction_limit` =
+    0 nothing pulls it on. The estimates come from an observer; for a comparison from the plant itself. `disturbance`
+    acts forward; connect that of an observer whose disturbance resists with a factor of -1.
 
     Numbers are per unit mass with ``mass = 1``: newtons are then m/s2.
 
@@ -155,6 +155,17 @@ class StoppingController(HybridSystem):
                 ("remaining_distance",),
             ),
         ),
+        output_signal(
+            "rolls_back",
+            "1",
+            "1 where the train rolls backwards although it is to stand",
+            variability="discrete",
+            warning=OutputWarning(
+                "the train rolls back from where it is to stand: holding_effort is too weak for the slope, or acts too "
+                "late; raise it",
+                ("effort", "remaining_distance"),
+            ),
+        ),
         output_signal("plans", "1", "Number of plans made so far", variability="discrete"),
         output_signal("remaining_distance", "m", "Way from the estimated position to the mark, now"),
     )
@@ -233,6 +244,7 @@ class StoppingController(HybridSystem):
             "no_braking_solution": m.drag_suffices,
             "limited_plan": m.limited,
             "stands_short": every(m.standing, holds(p.stop_position - u.estimated_position > p.stop_tolerance)),
+            "rolls_back": every(m.standing, holds(u.estimated_speed < -ROLLS_AWAY * p.standstill_speed)),
             "plans": m.plans,
             "remaining_distance": p.stop_position - u.estimated_position,
         }
