@@ -70,6 +70,28 @@ def deaf_receivers(
     return doubts
 
 
+def other_plants(components: Mapping[str, ComponentTable], where: str) -> list[str]:
+    """Observers with a preset that was made for another plant than the one that their parameters tell of.
+
+    Args:
+        components: tables of all components by name. where: name of the scenario, for messages.
+    """
+    doubts = []
+    for name, table in components.items():
+        system: Any = make_system(table, where) if table.observer is not None else None
+        made_for = getattr(system, "made_for", {}).get(table.preset)
+        if made_for is None:
+            continue
+        values = values_in_use(table, system)._asdict()
+        doubts += [
+            f"{name}: preset {table.preset!r} is made for {made_for.what}, {parameter} from {low:g} to {high:g}, and "
+            f"here {parameter} = {float(values[parameter]):g}; {made_for.instead}."
+            for parameter, (low, high) in made_for.ranges.items()
+            if not low <= float(values[parameter]) <= high
+        ]
+    return doubts
+
+
 def _known_doubts(name: str, table: ComponentTable, system: Any) -> list[str]:
     """What `_doubts` says, from the cache where it was asked before."""
     asked = name, system, table.preset, given_parameters(table, system)

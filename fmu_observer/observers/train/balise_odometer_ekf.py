@@ -20,6 +20,7 @@ from fmu_observer.observers.discrete.covariance_requirements import positive_mat
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import place_deviation
+from fmu_observer.observers.made_for import MadeFor
 from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import rolling_drag
@@ -149,6 +150,14 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "creep_time": 12.4,
             "odometer_deviation": 0.387,
         },
+    }
+
+    made_for: Mapping[str, MadeFor] = {
+        "tuned": MadeFor(
+            "the 900 t train of the line Amsterdam - Utrecht, whose wheels creep by up to a tenth of the speed",
+            {"mass": (600e3, 1200e3)},
+            "take the defaults, or search for your own train",
+        )
     }
 
     def __init__(self) -> None:

@@ -71,3 +71,14 @@ def test_a_deaf_observer_is_told_before_the_run(name: str, preset: str | None) -
     assert bool(told) == (not moved(name, preset)), told
     if told:
         assert "nothing tells its event 'gps'" in told[0]
+
+
+@pytest.mark.parametrize(("mass", "told"), [(873e3, 0), (120e3, 1), (2000e3, 1)])
+def test_a_preset_of_another_train_is_told_before_the_run(mass: float, told: int) -> None:
+    scenario = cosim.Scenario(stop=0.2, step=0.1)
+    scenario.add("observer", observer="balise_odometer_ekf", preset="tuned", parameters={"mass": mass})
+    texts: list[str] = []
+    scenario.run(warn=texts.append)
+    found = [text for text in texts if "is made for" in text]
+    assert len(found) == told
+    assert all(f"and here mass = {mass:g}" in text for text in found)
