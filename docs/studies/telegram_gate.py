@@ -22,7 +22,7 @@ import numpy as np
 from cosim import Scenario
 from fmu_observer import OBSERVERS
 from fmu_observer.design.certified_gains import certified_gains
-from fmu_observer.observers.innovation_gate import GATE_MEMORY, GateMemory, Told, judge
+from fmu_observer.observers.innovation_gate import GATE_MEMORY, VERDICT, GateMemory, Told, judge
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train import TrainObserver
 from plant_models.hybrid import Runtime, scalar_names
@@ -154,7 +154,8 @@ def follow(
 
 
 def _told(observer: TrainObserver, runtime: Runtime, place: float, p: Any, odometer: float) -> Telegram:
-    memory = GateMemory(*runtime.x[len(runtime.x) - len(GATE_MEMORY) :].tolist())
+    first = scalar_names(observer.states).index(VERDICT)
+    memory = GateMemory(*runtime.x[first : first + len(GATE_MEMORY)].tolist())
     estimate = float(runtime.x[observer.position_state])
     offsets = np.concatenate([[0.0], OFFSETS, -OFFSETS])
     bound = float(observer.own_bound(runtime.x, p))
@@ -192,19 +193,24 @@ def study(observers: Sequence[str], spacings: Mapping[float, Sequence[float]] = 
 
 
 def tables(results: Mapping[Any, list[Telegram]]) -> str:
-    """Ignored true and used false telegrams as markdown: dry / wet rails, by observer, model and spacing [%]."""
-    head = "| observer | model | spacing | telegrams | true ignored | " + " | ".join(f"+-{o:g} m" for o in TOLD_OFFSETS)
-    lines = [head + " |", "|" + "---|" * (5 + len(TOLD_OFFSETS))]
-    for rails, model, name, spacing in results:
-        if rails != RAILS[0]:
-            continue
-        both = [results[r, model, name, spacing] for r in RAILS]
-        missed = " / ".join(f"{100.0 * ignored_true(t):.2g}" for t in both)
-        false = [np.interp(TOLD_OFFSETS, OFFSETS, accepted_false(t)) for t in both]
-        shares = " | ".join(f"{100.0 * a:.2g} / {100.0 * b:.2g}" for a, b in zip(*false, strict=True))
-        count = " / ".join(str(sum(t.settled for t in one)) for one in both)
-        lines.append(f"| `{name}` | {model} | {spacing:g} m | {count} | {missed} | {shares} |")
+    """Ignored true and used false telegrams as markdown, by observer and spacing [%]: least and most of both rails and
+    both models.
+    """
+    head = "| observer | spacing | telegrams | true ignored | " + " | ".join(f"+-{o:g} m" for o in TOLD_OFFSETS)
+    lines = [head + " |", "|" + "---|" * (4 + len(TOLD_OFFSETS))]
+    for name, spacing in dict.fromkeys(key[2:] for key in results):
+        each = [telegrams for key, telegrams in results.items() if key[2:] == (name, spacing)]
+        count = sum(t.settled for telegrams in each for t in telegrams)
+        false = np.transpose([np.interp(TOLD_OFFSETS, OFFSETS, accepted_false(telegrams)) for telegrams in each])
+        cells = " | ".join(_span(shares) for shares in ([ignored_true(t) for t in each], *false))
+        lines.append(f"| `{name}` | {spacing:g} m | {count} | {cells} |")
     return "\n".join(lines)
+
+
+def _span(shares: Sequence[float]) -> str:
+    """Least and most of shares, in per cent."""
+    least, most = (f"{100.0 * share:.2g}".replace("1e+02", "100") for share in (min(shares), max(shares)))
+    return least if least == most else f"{least} to {most}"
 
 
 def draw(results: Mapping[Any, list[Telegram]], path: Path = PICTURE) -> None:

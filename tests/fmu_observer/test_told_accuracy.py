@@ -20,6 +20,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import OFF, place_deviation
 from fmu_observer.observers.train import BaliseMovingHorizon
+from fmu_observer.observers.train.adaptive_wheel_radius import PRIOR
 
 ROBUST = BaliseMovingHorizon.name
 """A loss that doubts outliers doubts those the more that tell an accuracy which they do not keep."""
@@ -95,3 +96,43 @@ def test_a_robust_loss_makes_no_balise_weigh_more() -> None:
     robust, squares = MAKERS[ROBUST], LAWFUL[f"{ROBUST} with squares"]
     for accuracy in TOLD:
         assert caused(robust, accuracy) <= caused(squares, accuracy)
+
+
+def test_what_a_told_accuracy_leaves_is_told_honestly() -> None:
+    """150 wheels with a radius of their own, balises anywhere within the accuracy that each tells."""
+    system, rng, v = OBSERVERS["adaptive_wheel_radius"](), np.random.default_rng(3), 20.0
+    ratios = []
+    for _ in range(150):
+        bench = Bench(system, gate=OFF, odometer_deviation=0.0, internal_step=0.1)
+        scale = float(rng.normal()) * PRIOR
+        bench.set("u", {"odometer": v / (1.0 + scale)})
+        bench.runtime.start(0.0)
+        for k in range(1, 25):
+            bench.runtime.advance(15.0 * k)
+            accuracy = (0.0, 20.0, 5.0)[k % 3]
+            off = float(rng.uniform(-accuracy, accuracy) if accuracy > 0.0 else 0.5 * rng.normal())
+            bench.set("u", {"balise_location_accuracy": accuracy})
+            bench.balise(v * 15.0 * k + off)
+        told = bench.outputs()
+        wrong = told["position"] - v * 15.0 * 24, told["wheel_radius_error"] - (1.0 / (1.0 + scale) - 1.0)
+        ratios.append((wrong[0] / told["position_deviation"], wrong[1] / told["wheel_radius_error_deviation"]))
+    rms = np.sqrt(np.mean(np.square(ratios), axis=0))
+    assert np.abs(rms - 1.0).max() < 3.0 / np.sqrt(2.0 * 150.0)  # three deviations of the rms of so many
+
+
+@pytest.mark.parametrize("name", ["discrete_measurement_observer", "continuous_discrete_observer"])
+def test_the_position_bound_holds_with_balises_anywhere_in_their_accuracy(name: str) -> None:
+    rng, system = np.random.default_rng(7), OBSERVERS[name]()
+    widths = []
+    for accuracy in (0.0, 2.0, 12.0, 63.0) * 3:
+        bench = Bench(system, gate=OFF)
+        bench.set("u", {"odometer": MOTION.speed, "effort": MOTION.effort(0.0), "balise_location_accuracy": accuracy})
+        bench.set("x", {"estimated_speed": MOTION.speed, "held_speed": MOTION.speed})
+        bench.runtime.start(0.0)
+        for k in range(1, 8):
+            bench.runtime.advance(4.0 * k)
+            bench.balise(MOTION.position(4.0 * k) + float(rng.uniform(-accuracy, accuracy)))
+            told = bench.outputs()
+            assert abs(told["position"] - MOTION.position(4.0 * k)) <= told["position_bound"] + 1e-6  # of integration
+        widths.append(told["position_bound"])
+    assert widths[:4] == sorted(widths[:4])

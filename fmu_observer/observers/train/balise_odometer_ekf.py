@@ -103,7 +103,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     A reading whose innovation is beyond `odometer_gate` of its own standard deviations is not used: a wheel that locks
     or spins. After `odometer_recover` without a reading that was used the next one is believed: the speed is set to
     it, and the position may be off by what that makes. A balise passes the common gate, which is granted three standard
-    deviations of the position.
+    deviations of the position, and has the variance of its told location accuracy, at least that of `balise_deviation`.
 
     It knows wheels that creep for about `creep_time`. A creep that lasts the whole gap between two balises, or a jam
     that holds a wheel for long, it follows more than the observers with rules for jams.
