@@ -38,6 +38,7 @@ class Recording:
         held_over_steps: columns of which the others take the value at the start of a step: held ones of a table, and of
             a run of this package those that were held in it.
         of_run: whether it is a run of this package.
+        held_links, fresh_links: of a run, all its connections that were held, and those that were fresh, as text.
         before_start: of a run, columns that jumped when it was initialised, and what they were before.
         chosen: names of the columns of which it was said whether they are held.
         lines: columns that the others follow on lines within their steps: those of a table that are not held, and of a
@@ -56,6 +57,8 @@ class Recording:
     chosen: frozenset[str] = frozenset()
     of_run: bool = False
     before_start: Mapping[str, float] = field(default_factory=dict)
+    held_links: frozenset[str] = frozenset()
+    fresh_links: frozenset[str] = frozenset()
 
     @cached_property
     def digest(self) -> str:
@@ -177,6 +180,7 @@ def make_recording(
         frozenset(said),
         _is_run(result),
         before,
+        *(frozenset(map(str, _algorithm(result).get(key, ()))) for key in ("held", "fresh")),
     )
 
 

@@ -13,6 +13,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
+from cosim.components.recording_data import Recording
 from cosim.coupling.connection import Connection
 from fmus.fmi.types import FLOATING_TYPES
 
@@ -29,7 +30,7 @@ def held_signals(
     """The signals that are held; all others are fresh.
 
     Besides those with a target that is stepped no later than the source these are: what a target takes at events only,
-    what was held in the run that a recording plays back, and held columns of tables.
+    what was held in the run that a recording plays back, also between others, and held columns of tables.
 
     Args:
         components: by name. connections: checked. order: of execution.
@@ -38,6 +39,7 @@ def held_signals(
     """
     place = {name: i for i, name in enumerate(order)}
     loop_of = {name: i for i, loop in enumerate(iterated) for name in loop}
+    told = {link for recording in _played(components) for link in recording.held_links}
 
     def holds(c: Connection) -> bool:
         source, target = c.source[0], c.target[0]
@@ -45,6 +47,8 @@ def held_signals(
             return False
         if source not in place:
             return True  # it is not stepped: its values change between steps only
+        if str(c) in told:
+            return True
         together = source in loop_of and loop_of[source] == loop_of.get(target)
         if place[target] <= place[source] and not together:
             return True
@@ -70,6 +74,21 @@ def settle_recordings(components: Mapping[str, Component], connections: Sequence
             target = components[c.target[0]].variables[c.target[1]]
             flows = is_continuous(target) and not c.table
             source.connected(c.source[1], flows=flows, target=".".join(c.target))
+
+
+def recorded_order(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[tuple[str, str]]:
+    """Pairs (source, target) of connections that were fresh in a run a part of which is played back: without that part
+    there are fewer loops, and another order would make other signals held.
+
+    Args:
+        components: by name. connections: checked.
+    """
+    fresh = {link for recording in _played(components) for link in recording.fresh_links}
+    return sorted({(c.source[0], c.target[0]) for c in connections if str(c) in fresh and c.source[0] != c.target[0]})
+
+
+def _played(components: Mapping[str, Component]) -> list[Recording]:
+    return [c.recording for c in components.values() if isinstance(c, RecordingComponent)]
 
 
 def followed(components: Mapping[str, Component], connections: Sequence[Connection]) -> frozenset[Signal]:

@@ -10,7 +10,9 @@ from cosim.compiled.choice import choose_stepper
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
 from cosim.coupling.graph import Group, execution_groups
+from cosim.coupling.instants import recorded_order
 from cosim.coupling.plan import Plan
+from cosim.coupling.strong import topological
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
 from cosim.master.algorithms.choose import AlgorithmChoice
@@ -116,7 +118,8 @@ def stepping_groups(
 ) -> list[Group]:
     """The components in the groups and the order in which a scenario steps them.
 
-    Before the receivers of telegrams must come the plant, and the odometer whose reading the telegrams carry. First
+    Before the receivers of telegrams must come the plant, and the odometer whose reading the telegrams carry; what was
+    fresh in a run of which a part is played back stays so. First
     where that is free comes the train: the watched plant, else what the report holds observers against; last come those
     with `every`, so that they find the newest inputs.
 
@@ -130,6 +133,9 @@ def stepping_groups(
     odometer = None if table.balises is None else table.balises.odometer
     sources = {plant} | (set() if odometer is None else {odometer.partition(".")[0]})
     before = [(source, name) for source in sorted(sources) for name in receivers if source != name]
+    recorded = recorded_order(components, connections)
+    if topological(list(components), {*before, *recorded}) is not None:
+        before += recorded  # else it contradicts what must be: this is not the run that was recorded
     truth = (table.report.true_position or table.report.true_speed or "").partition(".")[0]
     train = [name for name in (plant or truth,) if name in components]
     slow = [name for name, component in table.components.items() if component.every > 1]
