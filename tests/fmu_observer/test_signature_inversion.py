@@ -264,6 +264,20 @@ def test_a_rate_that_goes_astray_after_long_is_told(preset: str, period: float, 
     assert values["mostly_outside"] == told
 
 
+@pytest.mark.parametrize("deviation", [0.0, 0.001, 0.02])
+def test_the_noise_of_a_signal_is_told(deviation: float) -> None:
+    """Of a sine of 0.5 Hz at 100 Hz; 97 differences tell the deviation to 30 %."""
+    system = OBSERVERS["signature_track"]()
+    p, x = system.unpack_parameters(system.start_parameters()), system.start_state()
+    rng = np.random.default_rng(2)
+    for k in range(900):
+        u = system.unpack_inputs(np.array([np.sin(0.01 * np.pi * k) + deviation * rng.standard_normal()]))
+        x = system.jump("sampling", 0.01 * k, x, u, p)
+    told = system.output(9.0, x, u, p)
+    assert abs(told["noise"] - deviation) < 0.3 * deviation + 1e-5
+    assert told["noisy"] == (told["ready"] if deviation > 0.003 else 0.0)
+
+
 SIGNATURES = sorted(name for name in OBSERVERS if "signature" in name)
 
 
@@ -274,7 +288,16 @@ def test_a_parameter_that_a_table_does_not_have_is_refused_or_takes_effect(name:
     what a window tells differs. Gain, waits and thresholds, which no table depends on, are named."""
     system, free = (
         OBSERVERS[name](),
-        {"gain", "patience", "hold_limit", "length_change", "strong_change", "short_tip_change", "gap_change"},
+        {
+            "gain",
+            "patience",
+            "hold_limit",
+            "noise_limit",
+            "length_change",
+            "strong_change",
+            "short_tip_change",
+            "gap_change",
+        },
     )
     start = system.unpack_parameters(system.start_parameters())
     assert all(float(value) > 0.5 for value in system.requirements(start).values())

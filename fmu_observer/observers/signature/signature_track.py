@@ -12,7 +12,16 @@ import numpy as np
 from fmu_observer.observers.signature.printed_recursion import PRINTED_MEMORY, Printed, next_printed
 from fmu_observer.observers.signature.tip_recursion import CYCLES, TIP_MEMORY, Tips, next_tips
 from fmu_observer.signatures.pencil import NextScaling, pencil_point
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    OutputWarning,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 
@@ -32,7 +41,8 @@ class SignatureTrack(HybridSystem):
     - r1 is off, and r2 not: p1; r1 is off by more than `strong_change`, and r2 too: both. A small change of p1 beside
       one of p2 cannot be told.
 
-    The signal has to oscillate: properties are taken over the last two ways from tip to tip, and held until the next
+    Nominal properties are those of the shipped orders: with others measure them, or read the properties alone. The
+    signal has to oscillate: properties are taken over the last two ways from tip to tip, and held until the next
     tip. `ready` is 0 until four tips are found, and where none has come for `patience`.
 
     Args:
@@ -57,6 +67,18 @@ class SignatureTrack(HybridSystem):
         output_signal("gap", "1", "r3, gap between the right-hand branches of S1", variability="discrete"),
         output_signal("abscissa", "1", "Abscissa of the newest point of S1", variability="discrete"),
         output_signal("ready", "1", "1 while the properties count, else 0", variability="discrete"),
+        output_signal("noise", "1", "Deviation of the signal's noise, by third differences", variability="discrete"),
+        output_signal(
+            "noisy",
+            "1",
+            "1 while the noise is above noise_limit",
+            variability="discrete",
+            warning=OutputWarning(
+                "found more noise than its verdict bears: with three times noise_limit most verdicts are wrong. "
+                "Filter the signal, or widen the changes that count",
+                ("noise",),
+            ),
+        ),
         output_signal("p1_changed", "1", "1 while the first parameter is judged to have changed"),
         output_signal("p2_changed", "1", "1 while the second parameter is judged to have changed"),
         output_signal("p3_changed", "1", "1 while the third parameter is judged to have changed"),
@@ -72,6 +94,7 @@ class SignatureTrack(HybridSystem):
         parameter("strong_change", "1", 0.02, "Change of r1 that counts although r2 has changed", min=0.0),
         parameter("short_tip_change", "1", 0.002, "Change of r2 that counts", min=0.0),
         parameter("gap_change", "1", 0.006, "Change of r3 that counts", min=0.0),
+        parameter("noise_limit", "1", 0.003, "Noise up to which verdicts are right, unit of the signal", min=0.0),
     )
     events = (PeriodicEvent("sampling", "sample_period", description="The signal is read"),)
     presets: Mapping[str, Mapping[str, Any]] = {"van_der_pol": {}}
@@ -109,13 +132,13 @@ class SignatureTrack(HybridSystem):
         )
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Nominal properties are measured with the period, the regularisation and the orders in use."""
+        """Nominal properties are measured with the period and the regularisation in use."""
         named = ("nominal_length", "nominal_short_tip", "nominal_gap", "sample_period", "eps")
         start = {s.name: float(s.start_values[0]) for s in self.parameters if s.name in named}
         own = np.stack([np.abs(getattr(p, name) - start[name]) for name in named[:3]])
         same = np.abs(p.sample_period - start["sample_period"]) + np.abs(p.eps - start["eps"])
         shipped = np.where(np.max(own) > 0.0, 0.0, 1.0)
-        other = np.where(same > 0.0, 1.0, 0.0) if self.orders == (LONG, SHORT) else 1.0
+        other = np.where(same > 0.0, 1.0, 0.0)
         text = (
             f"nominal_length, nominal_short_tip and nominal_gap belong to samples each {start['sample_period']:g} s, "
             f"eps = {start['eps']:g} and orders {LONG} and {SHORT}: measure them with yours on a run without a change"
@@ -145,12 +168,17 @@ class SignatureTrack(HybridSystem):
         """Properties and verdict."""
         m = self._tips(x)
         ready = np.where(m.tips > CYCLES - 0.5, 1.0, 0.0)
+        past = x[: self.orders[0]]
+        third = past[3:] - 3.0 * past[2:-1] + 3.0 * past[1:-2] - past[:-3]  # white noise: 20 times its variance
+        noise = np.sqrt(np.sum(third * third) / (20.0 * max(self.orders[0] - 3, 1)))
         return {
             "length": m.length,
             "short_tip": m.short_tip,
             "gap": m.gap,
             "abscissa": m.before,
             "ready": ready,
+            "noise": noise,
+            "noisy": np.where(noise > p.noise_limit, ready, 0.0),
             **self._verdict(m, ready, p),
         }
 
