@@ -214,8 +214,8 @@ def _exchanged(active: Array, wanted: Array, wrong: Array, fewest: Array) -> tup
         active: held in this pass, shape (N, b). wanted: by the signs that it found. wrong: force by which each is on
             the wrong side, zero where it is right, shape (N, b). fewest: wrong ones in any pass before, shape (1,).
     """
-    count = np.reshape(np.sum(np.where(wrong > 0.0, 1.0, 0.0)), (1,))
-    from_on = np.where(count < fewest, 0.0 * count, np.max(wrong))
+    count, largest = np.reshape(np.sum(np.where(wrong > 0.0, 1.0, 0.0)), (1,)), np.max(wrong)
+    from_on = np.where(count < fewest, 0.0 * count, largest)
     return np.where(wrong >= from_on, wanted, active), np.minimum(fewest, count)
 
 
@@ -225,7 +225,7 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     n, q, states = problem.order, problem.layout.measurements, len(problem.bounded)
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (before, mean, flat, own), (row_flat, point, active, fresh), (shared,) = carry, given, known
+        (before, mean, flat, free), (row_flat, point, active, fresh), (shared,) = carry, given, known
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         moved = problem.moved(before, row, shared)
@@ -236,7 +236,7 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         mean = np.where(goes, moved.state + moved.F @ (mean - before) + push, mean)
         P = np.where(goes, predicted_covariance(P, moved.F, noise), P)
         spread = vector(*(P[i, i] for i in range(n)))
-        own = np.where(spread > COLLAPSED * own, spread, own)
+        own: Array = np.where(spread > COLLAPSED * free, spread, free)
         pushed = (np.where(goes, push, 0.0 * push), np.where(goes, noise, 0.0 * noise))
         seen = problem.seen(point, row, shared)
         scale = vector(*_scales(problem, row, seen, P, fresh[0], shared))

@@ -155,8 +155,8 @@ def _iteration(problem: WindowProblem, passes: int) -> Callable[..., tuple[Array
         found = solve(problem, before, rows, estimates, known, passes)
         against = contradicted(found.bounds, found.far, found.broken)
         moving = found.step if passes > 1 else 0.0 * found.step  # the first pass moves by what the row has brought
-        last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds, against)
-        last = (*last, found.broken, unsettled(moving, found.broken))
+        ended = (found.broken, unsettled(moving, found.broken))
+        last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds, against, *ended)
         kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
         return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
 

@@ -530,7 +530,9 @@ def test_bounds_that_no_course_keeps_are_told(seed: int, size: float) -> None:
 def inequalities(rows: np.ndarray, bounded: tuple[int, ...], disturbed: bool) -> tuple[str, np.ndarray]:
     """States at the optimum by the interior-point solver Clarabel over the start and the noises, and its status."""
     S, s = np.hstack([np.linalg.cholesky(P0), np.zeros((N, 2 * len(rows)))]), START
-    A, b, G, h, states = [np.eye(S.shape[1])], [np.zeros(S.shape[1])], [], [], []
+    A, b, states = [np.eye(S.shape[1])], [np.zeros(S.shape[1])], []
+    G: list[np.ndarray] = []
+    h: list[float] = []
     for k, row in enumerate(rows):
         if row[0]:
             F, Q = transition(row[1])

@@ -129,7 +129,7 @@ def test_the_traced_distance_to_an_envelope_is_that_of_its_rectangles() -> None:
 # -- what the thesis prints, and the specification gives ------------------------------------------------------------
 
 
-def parameters(system: HybridSystem, **values: float) -> object:
+def parameters(system: HybridSystem, **values: float) -> Any:
     return system.unpack_parameters(system.start_parameters())._replace(**values)
 
 
@@ -224,7 +224,7 @@ def test_a_table_follows_its_parameters_and_tells_a_node_from_its_window() -> No
     observer = OscillatorSignature(7)
     grid = observer.tabulated({"braking": 0.3})["table"]
     assert np.abs(grid - observer.tabulated()["table"]).max() > 1e-6
-    p = parameters(observer, braking=0.3)._replace(table=grid, sharpness=1e4)  # type: ignore[attr-defined]
+    p = parameters(observer, braking=0.3)._replace(table=grid, sharpness=1e4)
     node = np.array([observer.nodes[0][4], observer.nodes[1][5]])
     window = np.stack([observer.plant.measured(x)[0] for x in observer.moved(node, 2, p)])
     np.testing.assert_allclose(observer.inverted([window], observer.start_state(), p).state, node, atol=1e-6)
