@@ -53,10 +53,9 @@ class TakagiSugenoCdo(TrainObserver):
 
     Presets: `as_published` with decay 3 1/s, unstable beyond constant gaps of 0.286 s although designed for 0.5 s;
     `repaired` (default) with decay 9.9 1/s, the value consistent with the printed K_i1, certified to 0.779 s;
-    `long_gaps`, which is ours:
-    the speed follows the odometer and each balise takes the share (2.4 / 3) (1 - exp(-3 gap)) of the position error
-    away, between 0 and 1 for every gap, so no gap makes the error grow. Its price: slip of the wheels is taken for
-    speed.
+    `long_gaps`, which is ours: the speed follows the odometer and each balise takes the share
+    (2.4 / 3) (1 - exp(-3 gap)) of the position error away, between 0 and 1 for every gap, so a constant gap of any
+    length is stable. Gaps that change are certified up to 100.6 s. Its price: slip of the wheels is taken for speed.
     """
 
     name = "takagi_sugeno_cdo"
