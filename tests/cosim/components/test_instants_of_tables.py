@@ -173,7 +173,10 @@ def log(path: Path, outcome: Outcome) -> Path:
 def test_a_table_of_held_columns_in_the_place_of_any_part_gives_equal_bits(
     wiring: Wiring, algorithm: str, parts: set[int]
 ) -> None:
-    """Where all that the others took of the part was held; nothing jumps at the start, as no row shows that."""
+    """Where all that the others took of the part was held; nothing jumps at the start, as no row shows that.
+
+    With fewer loops Gauss-Seidel may hold other signals between the others; a table cannot say what was held there.
+    """
     parts = {part % len(wiring) for part in parts}
     first = quietly(whole(wiring, algorithm, 0.1))
     held = set(first.result.summary["master"]["algorithm"]["held"])
@@ -184,7 +187,8 @@ def test_a_table_of_held_columns_in_the_place_of_any_part_gives_equal_bits(
         second = quietly(played(wiring, algorithm, parts, table, 0.1, interpolation="hold"))
     inside = {f"c{i}." for i in range(len(wiring))} - {f"c{i}." for i in parts}
     found = [name for name in different(first, second) if name[:3] in inside]
-    if out_held:
+    kept = set(links(wiring)) - {k for k in links(wiring) if int(k[1]) in parts}
+    if out_held and held & kept == set(second.result.summary["master"]["algorithm"]["held"]) & kept:
         assert found == []
 
 
