@@ -58,7 +58,7 @@ class Trains(NamedTuple):
 
 @dataclass(frozen=True)
 class Jams:
-    """One jam a member, each field of shape (members,): onset [s], length [s], depth [1]."""
+    """One fault a member, each field of shape (members,): onset [s], length [s], depth [1], below zero for a skid."""
 
     onset: np.ndarray
     length: np.ndarray
@@ -86,6 +86,28 @@ def trains(case: Case, members: int, rng: np.random.Generator | None = None) -> 
         v[:, k + 1] = np.where((v[:, k] <= 0.0) | (after <= 0.0), 0.0, after)
     way = np.cumsum(0.5 * STEP * (v[:, 1:] + v[:, :-1]), axis=1)
     return Trains(STEP * np.arange(count), v, np.concatenate([np.zeros((members, 1)), way], axis=1))
+
+
+def station_stop(stand: float, members: int, rng: np.random.Generator) -> tuple[Trains, np.ndarray]:
+    """Trains that run at 20 m/s, brake at 30 s, stand, depart and cruise for 60 s, and the known effort at the readings
+    [m/s2]: 0.7 m/s2 of braking and pulling, of which the brake's last 0.2 m/s2 are unknown; resistance of set B.
+    """
+    a, b, c = SET_B
+    count = round((62.0 + stand + 100.0) / STEP) + 1
+    t, phase = STEP * np.arange(count), rng.uniform(0.0, 2.0 * np.pi, members)
+    v, effort = np.full((members, count), 20.0), np.zeros((members, count))
+    cruise, leaves = a + b * 20.0 + c * 400.0, 62.0 + stand
+    for k in range(count - 1):
+        pulls = t[k] >= leaves
+        wanted = np.where(v[:, k] < 20.0, 0.7, cruise) if pulls else cruise if t[k] < 30.0 else -0.7
+        effort[:, k] = wanted
+        unknown = 0.03 * np.sin(0.1 * t[k] + phase) + (0.2 if 30.0 <= t[k] < leaves else 0.0)
+        rolls = v[:, k] > 0.0
+        push = wanted - rolls * (a + b * v[:, k] + c * v[:, k] ** 2 + unknown)
+        v[:, k + 1] = np.maximum(v[:, k] + STEP * np.where(rolls | (wanted > 0.0), push, 0.0), 0.0)
+    effort[:, -1] = effort[:, -2]
+    way = np.cumsum(0.5 * STEP * (v[:, 1:] + v[:, :-1]), axis=1)
+    return Trains(t, v, np.concatenate([np.zeros((members, 1)), way], axis=1)), at_samples(effort)
 
 
 def random_jams(rng: np.random.Generator, members: int, case: Case, lengths: Any, depths: Any) -> Jams:
@@ -131,6 +153,7 @@ def observe(
     *,
     aggregated: bool = True,
     with_balises: bool = True,
+    effort: np.ndarray | None = None,
     **values: Any,
 ) -> dict[str, np.ndarray]:
     """Outputs of the observer at the readings, each of shape (members, samples).
@@ -148,12 +171,13 @@ def observe(
     if with_balises:
         members, stamps, places = balises(run)
         batch.notify("balise", members=members, stamps=stamps, position=places)
-    batch.set("effort", -case.known)
+    batch.set("effort", -case.known if effort is None else effort[:, 0])
     batch.set("odometer", read[:, 0])
     batch.start()
     # An input is held from one instant to the next, and the sample at the end of a step must see the new reading.
     ahead = np.concatenate([read[:, 1:], read[:, -1:]], axis=1)
-    found = batch.run(PERIOD * np.arange(1, read.shape[1]), results=list(OUTPUTS), inputs={"odometer": ahead})
+    varied = {"odometer": ahead} | ({} if effort is None else {"effort": effort})
+    found = batch.run(PERIOD * np.arange(1, read.shape[1]), results=list(OUTPUTS), inputs=varied)
     assert not batch.failures, batch.failures
     return {name: found[:, :, i] for i, name in enumerate(OUTPUTS)}
 
@@ -188,10 +212,10 @@ class Verdicts:
     moving: np.ndarray
 
 
-def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0) -> Verdicts:
-    """Judge what was told (`odometer_fault`, shape (members, samples)), while the trains move."""
+def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0, *, standing: bool = False) -> Verdicts:
+    """Judge what was told (`odometer_fault`, shape (members, samples)), while the trains move, or all the time."""
     t = PERIOD * np.arange(told.shape[1])
-    moving = run.v[:, :: round(PERIOD / STEP)] > STANDING
+    moving = (run.v[:, :: round(PERIOD / STEP)] > STANDING) | standing
     fault = (told > 0.5) & moving
     start, end = jams.onset, jams.onset + jams.length
     near = (t >= start[:, None] - 1e-9) & (t <= end[:, None] + GRACE)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import matplotlib as mpl
@@ -24,10 +26,12 @@ from jam_runs import (
     STEP,
     Jams,
     Verdicts,
+    at_samples,
     observe,
     odometer_error,
     random_jams,
     readings,
+    station_stop,
     trains,
     verdicts,
 )
@@ -43,13 +47,17 @@ SEED, NOISE = 1, 0.02
 PAGE = Path(__file__).resolve().parents[1] / "jam_detection.md"
 PICTURE = PAGE.parent / "images" / "jam_detection.png"
 RULES = ("repaired", "printed")
+SIGNS = {"jam": 1.0, "skid": -1.0}
 
 
-def one(case: str, rules: str, members: int, noise: float = NOISE, **jam: Sequence[float]) -> tuple[Jams, Verdicts]:
-    """Random jams in one case, with one set of rules; the same trains and readings for both."""
+def one(
+    case: str, rules: str, members: int, noise: float = NOISE, fault: str = "jam", **jam: Sequence[float]
+) -> tuple[Jams, Verdicts]:
+    """Random jams or skids in one case, with one set of rules; the same trains and readings for both."""
     rng = np.random.default_rng(SEED)
     run = trains(CASES[case], members, rng)
     jams = random_jams(rng, members, CASES[case], jam.get("lengths", LENGTHS), jam.get("depths", DEPTHS))
+    jams = replace(jams, depth=SIGNS[fault] * jams.depth)
     read = readings(run, jams, noise, rng, True)
     found = observe(CASES[case], run, read, rules, with_balises=CASES[case].speed > 20.0)
     return jams, verdicts(run, jams, found["odometer_fault"])
@@ -57,24 +65,57 @@ def one(case: str, rules: str, members: int, noise: float = NOISE, **jam: Sequen
 
 def rates_table(members: int = 1000) -> str:
     """Missed, false, late, latched for each case, rules and noise."""
-    head = "| case | noise [m/s] | rules | missed of all jams [%] | false alarms per hour, 95 % | delay at start [s] | "
-    lines = [head + "latest end [s] | on at rest [%] |", "|---|---|---|---|---|---|---|---|"]
-    for case in CASES:
-        for noise in NOISES:
-            for rules in RULES:
-                _, v = one(case, rules, members, noise)
-                missed, false = int((~v.found).sum()), int(v.false.sum())
-                low, high = clopper_pearson(missed, members)
-                few, many = garwood(false, float(v.moving.sum()) / 3600.0)
-                latest = float(np.nanmax(v.late)) if np.isfinite(v.late).any() else np.nan
-                share = f"{100 * missed / members:.1f} ({100 * low:.1f} to {100 * high:.1f})"
-                lines.append(
-                    f"| {case} | {noise:g} | {rules} | {share} | "
-                    f"{number(false / (float(v.moving.sum()) / 3600.0))} ({number(few)} to {number(many)}) | "
-                    f"{np.nanmean(v.delay):.2f} | {'never' if np.isinf(latest) else f'{latest:.2f}'} | "
-                    f"{100 * v.on.mean():.1f} |"
-                )
+    head = (
+        "| case | noise [m/s] | rules | fault | missed of all [%] | false alarms per hour, 95 % | delay at start [s] | "
+    )
+    lines = [head + "latest end [s] | on at rest [%] |", "|---|---|---|---|---|---|---|---|---|"]
+    for case, noise, rules, fault in product(CASES, NOISES, RULES, SIGNS):
+        _, v = one(case, rules, members, noise, fault)
+        missed, false = int((~v.found).sum()), int(v.false.sum())
+        low, high = clopper_pearson(missed, members)
+        few, many = garwood(false, float(v.moving.sum()) / 3600.0)
+        latest = float(np.nanmax(v.late)) if np.isfinite(v.late).any() else np.nan
+        delay = f"{np.nanmean(v.delay):.2f}" if missed < members else "-"
+        share = f"{100 * missed / members:.1f} ({100 * low:.1f} to {100 * high:.1f})"
+        lines.append(
+            f"| {case} | {noise:g} | {rules} | {fault} | {share} | "
+            f"{number(false / (float(v.moving.sum()) / 3600.0))} ({number(few)} to {number(many)}) | "
+            f"{delay} | {'never' if np.isinf(latest) else f'{latest:.2f}'} | "
+            f"{100 * v.on.mean():.1f} |"
+        )
     return "\n".join(lines)
+
+
+def stops_table(members: int = 200) -> str:
+    """Station stops of 40 s and 5 min: one fault a member of either sign, before or after the stop or in the cruise."""
+    head = "| stop [s] | teeth | noise [m/s] | fault | missed of all faults [%] | false alarms per hour, 95 % | "
+    lines = [head + "position error, mean / largest [m] | odometer [m] |", "|---|---|---|---|---|---|---|---|"]
+    for stand, teeth, noise, (fault, sign) in product((40.0, 300.0), (100, 1000), (0.02, 0.05), SIGNS.items()):
+        lines.append(f"| {stand:g} | {teeth} | {noise:g} | {fault} | {_stop(stand, teeth, noise, sign, members)} |")
+    return "\n".join(lines)
+
+
+def _stop(stand: float, teeth: int, noise: float, sign: float, members: int) -> str:
+    rng = np.random.default_rng(SEED)
+    run, effort = station_stop(stand, members, rng)
+    moving = [(31.0, 49.0), (62.0 + stand, 120.0 + stand)]  # braking; departure and cruise
+    first = np.where(rng.random(members) < 0.5, rng.uniform(*moving[0], members), rng.uniform(*moving[1], members))
+    faults = Jams(first, rng.choice(LENGTHS[:-1], members), sign * rng.choice(DEPTHS, members))
+    read = readings(run, faults, noise, rng, True)
+    step = 2.0 * np.pi * 0.46 / (teeth * PERIOD)  # [m/s], of one pulse in a period
+    count = np.floor(np.cumsum(read, axis=1) / step)
+    read = np.concatenate([read[:, :1], np.diff(count, axis=1) * step], axis=1)
+    told = observe(CASES["3.3.4"]._replace(speed=20.0), run, read, effort=effort, with_balises=False)
+    v = verdicts(run, faults, told["odometer_fault"], standing=True)
+    missed, false, hours = int((~v.found).sum()), int(v.false.sum()), float(v.moving.sum()) / 3600.0
+    share, few = clopper_pearson(missed, members), garwood(false, hours)
+    error = np.abs(told["position"] - at_samples(run.p))[:, -1]
+    alone = np.abs(odometer_error(at_samples(run.p), read, np.inf))[:, -1]
+    return (
+        f"{100 * missed / members:.1f} ({100 * share[0]:.1f} to {100 * share[1]:.1f}) | {number(false / hours)} "
+        f"({number(few[0])} to {number(few[1])}) | {error.mean():.2f} / {error.max():.1f} | "
+        f"{alone.mean():.2f} / {alone.max():.1f}"
+    )
 
 
 def found_table(case: str = "3.3.4", members: int = 3000) -> tuple[str, dict[str, np.ndarray]]:
@@ -170,6 +211,7 @@ def main() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name, table in (
         ("rates", rates_table()),
+        ("stops", stops_table()),
         ("found", found),
         ("stuck", stuck_table()),
         ("micro", micro_table()),

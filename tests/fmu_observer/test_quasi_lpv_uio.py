@@ -211,3 +211,32 @@ def test_the_shipped_scenario_finds_the_jam_and_keeps_the_position() -> None:
     assert judged["end_delays"][0] <= 0.4 + 1e-9
     assert max(map(abs, judged["position_errors"])) < 0.6
     assert 7.0 < max(map(abs, alone["position_errors"])) < 10.0
+
+
+@pytest.mark.parametrize("depth", [-0.2, 0.2])
+@pytest.mark.parametrize("length", [4.0, 8.0, 15.0])
+@pytest.mark.parametrize("acceleration", [-0.6, 0.6])
+def test_a_fault_from_the_first_turn_of_the_wheel_on_leaves_it_no_worse_than_the_odometer(
+    depth: float, length: float, acceleration: float
+) -> None:
+    """A wheel that turns too slowly, or too fast, from the start on, driven from rest or braked from 30 m/s.
+
+    The odometer's error is the integral of the fault; readings know each of its two edges to a period.
+    """
+    begin = 0.0 if acceleration > 0.0 else 30.0
+    bench = Bench(QuasiLpvUio(), davis_a=0.0, davis_b=0.0, davis_c=0.0)
+    bench.set("x", {"estimated_speed": begin})
+    bench.set("u", {"effort": acceleration, "odometer": begin * (1.0 + depth)})
+    bench.runtime.start(0.0)
+    odometer = 0.0
+    for k in range(1, round(40.0 / PERIOD) + 1):
+        t = k * PERIOD
+        y = max(begin + acceleration * t, 0.0) * (1.0 + depth * (t < length))
+        odometer += PERIOD * y
+        bench.set("u", {"odometer": y})
+        bench.runtime.advance(t)
+    way, edges = (
+        begin * 40.0 + 0.5 * acceleration * 40.0**2,
+        2.0 * PERIOD * abs(depth) * max(begin, acceleration * length),
+    )
+    assert abs(bench.outputs()["position"] - way) <= abs(odometer - PERIOD * 0.5 * (y - begin) - way) + edges
