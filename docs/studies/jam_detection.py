@@ -63,7 +63,7 @@ def one(
     return jams, verdicts(run, jams, found["odometer_fault"])
 
 
-def rates_table(members: int = 1000) -> str:
+def rates_table(members: int = 500) -> str:
     """Missed, false, late, latched for each case, rules and noise."""
     head = (
         "| case | noise [m/s] | rules | fault | missed of all [%] | false alarms per hour, 95 % | delay at start [s] | "
@@ -80,7 +80,7 @@ def rates_table(members: int = 1000) -> str:
         lines.append(
             f"| {case} | {noise:g} | {rules} | {fault} | {share} | "
             f"{number(false / (float(v.moving.sum()) / 3600.0))} ({number(few)} to {number(many)}) | "
-            f"{delay} | {'never' if np.isinf(latest) else f'{latest:.2f}'} | "
+            f"{delay} | {'-' if np.isnan(latest) else 'never' if np.isinf(latest) else f'{latest:.2f}'} | "
             f"{100 * v.on.mean():.1f} |"
         )
     return "\n".join(lines)
