@@ -173,6 +173,7 @@ def test_observer_models_move_accurately_at_their_own_period(name: str) -> None:
     assert model.transition_error(model.start, known_of(model), model.sample_period) < 1e-4
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("period", [0.1, 0.2])  # one after the other in one process
 def test_the_period_in_a_scenario_is_the_one_that_a_filter_is_built_for(period: float) -> None:
     """No option is needed: readings every 0.1 or 0.2 s of a pendulum whose internal step is 5 ms."""
@@ -183,7 +184,7 @@ def test_the_period_in_a_scenario_is_the_one_that_a_filter_is_built_for(period: 
         observer="extended_kalman_filter",
         options={"model": "pendulum", "outputs": ["angle"]},
         parameters={"sample_period": period},
-        **{"as": "block3"},
+        **{"as": "fmu3"},
     )
     scenario.connect("plant.angle -> filter.measured_angle").set("plant.torque", 2.0).set("filter.torque", 2.0)
     outcome = scenario.run(warn=lambda _: None)
