@@ -178,8 +178,7 @@ def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summar
 def _seeds(data: Mapping[str, Any]) -> dict[str, Any]:
     """The seed of the run, from which all chance follows, and those that the scenario gives beside it."""
     seeds = {"seed": data.get("seed", RUN_SEED)}
-    seeds |= {f"balises.{k}": v for k, v in data.get("balises", {}).items() if "seed" in k}
-    seeds |= {f"network.{k}": v for k, v in data.get("network", {}).items() if "seed" in k}
+    tables = [(key, data.get(key, {})) for key in ("balises", "network")]
     for name, component in data["components"].items():
-        seeds |= {f"{name}.{k}": v for k, v in component.get("parameters", {}).items() if "seed" in k}
-    return seeds
+        tables += [(name, component.get("parameters", {})), (f"{name}.filter", component.get("filter", {}))]
+    return seeds | {f"{name}.{k}": v for name, table in tables for k, v in table.items() if "seed" in k}

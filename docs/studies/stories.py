@@ -62,8 +62,8 @@ def story(outcome: Outcome) -> dict[str, float]:
 
 
 def receivers(seeds: Sequence[int]) -> list[Settings]:
-    """Variations of the receiver alone."""
-    return [{"receiver.seed": seed} for seed in seeds]
+    """Variations of the seed, of which only the receiver draws."""
+    return [{"seed": seed} for seed in seeds]
 
 
 def rails(seeds: Sequence[int]) -> list[Settings]:
@@ -72,7 +72,7 @@ def rails(seeds: Sequence[int]) -> list[Settings]:
     for seed in seeds:
         numbers = np.random.default_rng(seed)
         peak, phase = float(numbers.uniform(*SOAPY)), float(numbers.choice(PHASES))
-        drawn.append({"receiver.seed": seed, "odometer.sample_offset": phase, "train.polach_degraded_mu0": peak})
+        drawn.append({"seed": seed, "odometer.sample_offset": phase, "train.polach_degraded_mu0": peak})
     return drawn
 
 

@@ -119,7 +119,7 @@ def judged(
         scenario.set("stop", stop)
     rows: dict[str, list[dict[str, float]]] = {tuned.observer: [] for tuned in chosen}
     for seed in seeds:
-        outcome = scenario.set("drawn_wheel.seed", seed).run(warn=lambda _text: None)
+        outcome = scenario.set("seed", seed).run(warn=lambda _text: None)
         if outcome.failure is not None:
             raise RuntimeError(outcome.failure)
         found = error_measures(outcome).items()

@@ -10,6 +10,7 @@ import tomllib
 from itertools import combinations
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -235,6 +236,20 @@ def test_one_name_and_seed_is_one_stream_in_every_form() -> None:
     assert (runs[RUN_SEED, "fmu3", "python"][1:] != runs[12, "fmu3", "python"][1:]).all()
 
 
+@pytest.mark.compiler
+@pytest.mark.parametrize("seed", [RUN_SEED, 5])
+def test_a_package_for_other_tools_draws_as_the_scenario(tmp_path: Path, seed: int) -> None:
+    """The FMU finds the seed of the default run by its name; that of another run stands among its parameters."""
+    scenario = Scenario(stop=5.0, step=0.1, seed=seed).add("one", model="odometer", parameters=NOISY)
+    scenario.export_ssp(tmp_path / "one.ssp")
+    again = Scenario.load(tmp_path / "one.ssp")
+    np.testing.assert_array_equal(quiet(again)["one.reading"], quiet(scenario)["one.reading"])
+    with ZipFile(tmp_path / "one.ssp") as package:
+        told = 'name="seed"' in package.read("resources/one.ssv").decode()
+    assert told == (seed != RUN_SEED)
+
+
+@pytest.mark.compiler
 def test_members_of_a_batch_draw_numbers_of_their_own() -> None:
     batch = Batch("odometer", 3)
     for name, value in NOISY.items():
