@@ -79,8 +79,8 @@ def test_costs_are_those_of_runs_of_the_scenario(found: Tuning) -> None:
     assert whole.how.startswith("of the whole scenario")
     assert (found.before, found.after, found.judged_after) == (whole.before, whole.after, whole.judged_after)
     assert found.searches == whole.searches
-    assert found.before[1] == pytest.approx(mean_square(drive_with_poor_guess().set("motor.seed", 1).run()), rel=1e-12)
-    again = found.scenario.copy().set("motor.seed", 5).run()
+    assert found.before[1] == pytest.approx(mean_square(drive_with_poor_guess().set("seed", 1).run()), rel=1e-12)
+    again = found.scenario.copy().set("seed", 5).run()
     assert found.judged_after[0] == pytest.approx(mean_square(again), rel=1e-12)
     assert sum(found.after) < sum(found.before)
 
@@ -168,7 +168,7 @@ def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, f
     evaluations = [json.loads(line) for line in (tmp_path / "evaluations.jsonl").read_text().splitlines()]
     assert len({entry["key"] for entry in evaluations}) == len(evaluations)  # none was done twice
     again = Scenario.load(tmp_path / "tuned.toml")
-    assert again.run(overrides={"motor.seed": 5}).failure is None
+    assert again.run(overrides={"seed": 5}).failure is None
     overlay = tmp_path / "both.toml"
     drive_with_poor_guess().save(tmp_path / "drive.toml")
     overlay.write_text('include = ["drive.toml", "overlay.toml"]\n')
