@@ -181,7 +181,8 @@ class RepairedRules:
        driven one slower, at all samples of that time, rolling between them. Jams and skids of that sign are short; what
        lasts is the end of a fault that was too small, or grew too slowly, to be seen. A wheel that locked while braking
        may still be slow when it is driven: for `release_time` after the sign of the effort has changed it counts as one
-       that coasts;
+       that coasts. Where balises, and no jump, began the hold, the odometer is believed by that, for what balises
+       correct a speed by is a mean over the way;
     b. an odometer that is not *proven*: since the last standstill, or a start with a speed that it contradicts, it has
        neither rolled with a small residual for `trust_time` nor been confirmed by a balise. A jump may then be the end
        of a fault that was there from the first turn of the wheel on. A quarter of the time for which it has rolled is
@@ -263,7 +264,10 @@ class RepairedRules:
         doubtful = np.maximum(1.0 - proven, lasts)
         vouched = np.maximum(brief, (1.0 - lasts) * VOUCHED * m.proven_time)
         limit = np.where(doubtful > 0.0, np.minimum(vouched, p.hold_limit), p.hold_limit)
-        expired = held * (1.0 - believed) * _is(hold + ROUNDING >= limit)
+        over = held * (1.0 - believed) * _is(hold + ROUNDING >= limit)
+        # Balises began the hold, at no jump of the wheel: what they corrected the speed by was a mean, and is outlived.
+        outlived = over * lasts * _is(m.refutations >= REFUTATIONS)
+        believed, expired = believed + outlived, over - outlived
         # unconfirmed: has the wheel rolled for long
         quiet = np.where(open_ * rolls * small > 0.0, m.agreeing + 1.0, 0.0)
         trusted = open_ * _is((quiet + ROUNDING) * p.odometer_period >= p.trust_time) * _is(settled >= p.settle_samples)
@@ -289,7 +293,7 @@ class RepairedRules:
             np.where(trusted > 0.0, p.trust_time, self._proven_time(m, told, np.maximum(held, onset), small, p)),
         )
         restart = np.maximum(np.maximum(believed, expired), jumped)
-        return Judgement(tuple(after), restart, onset, 0.0 * size, expired * doubtful)
+        return Judgement(tuple(after), restart, onset, 0.0 * size, over * doubtful)
 
     @staticmethod
     def _proven_time(m: RuleMemory, told: Reading, doubted: Array, small: Array, p: Any) -> Array:

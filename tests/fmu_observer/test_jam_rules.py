@@ -122,6 +122,13 @@ def test_faults_of_both_signs_begin_and_those_against_the_effort_are_short(
     assert until(armed, UNCONFIRMED, 20.0 + offset, 20.0, effort, without) == 76
 
 
+def test_a_hold_that_balises_began_ends_in_trust_where_samples_against_the_effort_last() -> None:
+    """What balises corrected the speed by was a mean over the way, and at no jump of the wheel."""
+    driven = ARMED._replace(mode=HELD, effort_time=99.0, last_odometer=18.0)
+    for refutations, ends in ((2.0, TRUSTED), (1.0, UNCONFIRMED)):
+        assert until(driven._replace(refutations=refutations), ends, 18.0, 20.0, 1.0) == 6
+
+
 @pytest.mark.parametrize("offset", [-2.0, 2.0])
 def test_an_odometer_that_is_not_proven_is_held_to_lie_for_a_second(offset: float) -> None:
     """The jump may be the end of a fault; the position is then what the odometer makes of it."""
