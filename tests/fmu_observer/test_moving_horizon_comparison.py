@@ -46,7 +46,10 @@ def test_three_balises_give_what_the_window_of_least_squares_gives(monkeypatch: 
     graph, x = study.FactorGraphSmoother(), START
     before, rows, points = np.hstack([START, START, SPREAD.ravel()]), [], []
     for k, place in enumerate((0.7, 30.2, 61.0)):
-        row = WindowRow(float(k > 0), 1.5, 1.5 * k, vector(0.1, 0.0, 0.0, 0.0, 20.0, 1.0), vector(place), vector(1.0))
+        inputs = vector(
+            0.1, 0.0, 0.0, 0.0, 20.0, 27e3, 1.0, 0.0, 0.0
+        )  # offsets, speed, effort, a balise of no accuracy
+        row = WindowRow(float(k > 0), 1.5, 1.5 * k, inputs, vector(place), vector(1.0))
         rows.append(vector(*LAYOUT.packed(row)))
         points.append(shaken(x, row, shared).state if k else START)
         graph_row = graph.iterate(None, 1, before, None, x, rows[-1], points[-1], shared)
