@@ -13,7 +13,7 @@ from fmu_observer.design.decoupling import SOURCE, decoupled_gain, decoupling, d
 from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.models.linearisation import start_of
 from fmu_observer.models.suitability import linear_part, with_unknown_inputs
-from fmu_observer.observers.continuous.errors_decay import NUMBERS, errors_decay
+from fmu_observer.observers.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
 from plant_models.hybrid import Signal, state

@@ -14,7 +14,7 @@ from fmu_observer.design.extended_disturbance import check_rho, extended_gain, e
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.models.suitability import linear_part, with_unknown_inputs
-from fmu_observer.observers.continuous.errors_decay import NUMBERS, errors_decay
+from fmu_observer.observers.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
 from plant_models.hybrid import output_signal, state, vector
