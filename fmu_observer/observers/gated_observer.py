@@ -55,7 +55,7 @@ class GatedObserver(HybridSystem):
 
     position_state: int = 0
     gate_start: float = REJECT
-    weighing: ClassVar[Weighing] = "innovation"
+    weighing: Weighing = "innovation"
     weighed_states: ClassVar[tuple[int, ...]] = (0,)
 
     def __init__(self, **options: Any) -> None:

@@ -224,19 +224,20 @@ def judge(before: GateMemory, told: Told, p: Any) -> Judgement:
     weight = np.where(settled * (1.0 - restart) > 0.0, gain_ratio(granted, accuracy, p.gate_floor), 1.0)
     beyond = np.maximum(size - accuracy, 0.0)
     share = beyond / (p.gate_floor / np.maximum(p.gate_drift, LEAST_SHARE) + np.abs(told.estimate - before.reference))
-    after = GateMemory(
-        np.where(used > 0.0, np.where(doubted > 0.0, float(DOUBTED), float(USED)), float(IGNORED)),
-        np.where(outside > 0.0, 0.0, before.settled + 1.0),
-        np.maximum(beyond, FORGETTING * before.recent),
-        np.maximum(share, FORGETTING * before.share),
-        told.position,
-        _root_of_squares((1.0 - weight) * granted, weight * accuracy),
-        *row,
+    after = GateMemory._make(
+        (
+            np.where(used > 0.0, np.where(doubted > 0.0, float(DOUBTED), float(USED)), float(IGNORED)),
+            np.where(outside > 0.0, 0.0, before.settled + 1.0),
+            np.maximum(beyond, FORGETTING * before.recent),
+            np.maximum(share, FORGETTING * before.share),
+            told.position,
+            _root_of_squares((1.0 - weight) * granted, weight * accuracy),
+            *row,
+        )
     )
     kept = (np.where(used > 0.0, new, old) for new, old in zip(after[1:6], before[1:6], strict=True))
-    return Judgement(
-        used, restart, weight, GateMemory(after[0], *kept, np.where(used > 0.0, 0.0, after.doubted), *after[7:])
-    )
+    still_doubted = np.where(used > 0.0, 0.0, after.doubted)
+    return Judgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
 
 
 def _row(before: GateMemory, told: Told, p: Any) -> tuple[Array, ...]:
