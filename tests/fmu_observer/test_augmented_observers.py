@@ -89,6 +89,7 @@ def test_signals_and_events(make: Callable[[], AugmentedTrainObserver]) -> None:
         "speed": "m/s",
         "slip": "1",
         "slip_indicator": "1",
+        "rolls_back": "1",
         "adhesion_force": "N",
         "innovation": "m",
         "coupler_force": "N",

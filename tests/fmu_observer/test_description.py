@@ -268,7 +268,14 @@ def test_dependencies_of_initial_unknowns_are_exact(version: Any) -> None:
     assert found["last_sample"] == ["sample"]
 
 
-ESTIMATE = {"position": [], "speed": [], "slip": ["odometer"], "slip_indicator": ["odometer"], "innovation": []}
+ESTIMATE = {
+    "position": [],
+    "speed": [],
+    "slip": ["odometer"],
+    "slip_indicator": ["odometer"],
+    "innovation": [],
+    "rolls_back": ["odometer"],
+}
 HAND = {  # read off the equations of the observers
     "differentiator_cdo": ESTIMATE | {"adhesion_force": ["effort"]},
     "takagi_sugeno_cdo": ESTIMATE | {"adhesion_force": ["effort"]},
