@@ -199,6 +199,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         begun = covariance_at_first(before, row, row, deviation**2, SIZES)
         excitation = excitation_now(known, since, p.excitation_time)
         innovation = x[P] - measured if row == 0 else of_state(x, "last_innovation")[0]
+        reading = u.odometer if row == 1 else of_state(x, "last_reading")[0]
         return vector(
             *estimate,
             *sensitivity,
@@ -213,6 +214,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             *self._learnt(excitation, estimate[V], p),
             *used,
             innovation,
+            reading,
         )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
@@ -235,7 +237,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             **{f"{n}_learnt": known.learnt[i] for i, n in enumerate(NAMES)},
             "resistance_per_mass": self._resistance(x, now, p),
             "resistance_per_mass_deviation": _root(of_resistance),
-            "rolls_back": rolls_back(u.odometer),
+            "rolls_back": rolls_back(of_state(x, "last_reading")[0]),
             "smallest_excitation": smallest_eigenvalue(excitation_now(known, since, p.excitation_time), 3),
         }
 

@@ -47,6 +47,7 @@ STATES = (
     memory("learnt", "1", (0.0,) * 3, "1 for each coefficient that is learnt until the next sample", size=3),
     memory("samples_used", "1", (0.0,) * 2, "Balises and readings used so far", size=2),
     memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+    memory("last_reading", "m/s", 0.0, "Last reading of the odometer that was not missing"),
 )
 ENDS = np.cumsum([0, *(s.width for s in STATES)])
 PLACES = {s.name: slice(int(a), int(b)) for s, a, b in zip(STATES, ENDS[:-1], ENDS[1:], strict=True)}
