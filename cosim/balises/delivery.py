@@ -48,6 +48,26 @@ class Delivery:
     before: np.ndarray | None = None
     after: np.ndarray | None = None
     outcome: str = "told"
+    _logged: tuple[dict[str, str], str] | None = None
+
+    def logged_in(self, outcomes: dict[str, str], receiver: str) -> None:
+        """From now on an outcome that becomes known later is written there too.
+
+        Args:
+            outcomes: by receiver, of the log. receiver: to which this was delivered.
+        """
+        self._logged = outcomes, receiver
+
+    def settle(self, outcome: str) -> None:
+        """The outcome has become known.
+
+        Args:
+            outcome: see the attribute.
+        """
+        self.outcome = outcome
+        if self._logged is not None:
+            outcomes, receiver = self._logged
+            outcomes[receiver] = outcome
 
 
 StepThrough = Callable[[float, float, Sequence[Any]], list[Delivery]]
@@ -88,7 +108,7 @@ class Receiver:
 
     def save(self) -> Any:
         """What it remembers from step to step; the component's own state is saved elsewhere."""
-        return dict(self.seen), list(self.backlog), self._announced
+        return dict(self.seen), list(self.backlog), self._announced, list(self._open), dict(self._kept)
 
     def restore(self, state: Any) -> None:
         """Return to what was saved.
@@ -96,8 +116,9 @@ class Receiver:
         Args:
             state: as `save` gave it.
         """
-        seen, backlog, self._announced = state
+        seen, backlog, self._announced, unsettled, kept = state
         self.seen, self.backlog = dict(seen), list(backlog)
+        self._open, self._kept = list(unsettled), dict(kept)
 
     def step(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         """Step from `t` to `until` [s] with the prepared inputs through `telegrams`, in order of delivery.
@@ -135,9 +156,8 @@ class Receiver:
         Returns:
             A delivery for each, in the same order.
         """
-        self.backlog.extend(telegrams)
         self.arrived = self.planned.outputs.copy()
-        return [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
+        return [self._put_off(telegram, snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
 
     def tell(self, t: float, letter: Letter) -> Delivery:
         """Tell of a letter at `t` [s], where all components have come to; one that has not, or that knows one letter
@@ -148,9 +168,7 @@ class Receiver:
         """
         component = self.planned.component
         if abs(component.time - t) > TIME_TOLERANCE or self._announced:
-            self.backlog.append(letter)
-            delivery = self._kept[id(letter)] = Delivery(t)
-            return delivery
+            return self._put_off(letter, t)
         if not component.event_needs_step:
             self._open.clear()
         self._announced = component.event_needs_step
@@ -195,8 +213,7 @@ class Receiver:
         if notified_at > now:
             self._advance(now, notified_at)
         if self._announced:
-            self.backlog.append(telegram)
-            return Delivery(notified_at)
+            return self._put_off(telegram, notified_at)
         self._announced = True
         return self._notify_here(notified_at, telegram, telegram.stamp)
 
@@ -238,10 +255,11 @@ class Receiver:
         if any(self._port(telegram).stamp is None for telegram in telegrams):
             return self._step_then_notify(t, until, telegrams)
         at_once = 1 if self.planned.component.event_needs_step else len(telegrams)
-        self.backlog.extend(telegrams[at_once:])
-        deliveries = [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
-        for telegram, delivery in zip(telegrams[:at_once], deliveries, strict=False):
+        times = [snapped(telegram.delivered_at, t, until) for telegram in telegrams]
+        deliveries = [Delivery(time) for time in times[:at_once]]
+        for telegram, delivery in zip(telegrams, deliveries, strict=False):
             self._notify(t, telegram, telegram.stamp, delivery)
+        deliveries += [self._put_off(*one) for one in zip(telegrams[at_once:], times[at_once:], strict=True)]
         self._advance(t, until)
         self.arrived = self._outputs()
         return deliveries
@@ -253,6 +271,7 @@ class Receiver:
         # the last payload replaces the others
         known = telegrams[-1:] if self.planned.component.event_needs_step else telegrams
         overwritten = len(telegrams) - len(known)
+        self._announced = bool(known) and self.planned.component.event_needs_step
         return [Delivery(until, self.arrived, self.arrived, "rejected") for _ in range(overwritten)] + [
             self._notify_here(until, telegram, until) for telegram in known
         ]
@@ -272,6 +291,11 @@ class Receiver:
         self.planned.read()
         return self.planned.outputs.copy()
 
+    def _put_off(self, telegram: Told, time: float) -> Delivery:
+        """The next step has it; what becomes of it there settles this delivery of `time` [s]."""
+        self.backlog.append(telegram)
+        return self._kept.setdefault(id(telegram), Delivery(time))
+
     def _notify(self, t: float, telegram: Told, stamp: float, delivery: Delivery) -> None:
         self.planned.component.notify(self._port(telegram), t, stamp, payload(telegram))
         self._open.append(delivery)
@@ -288,7 +312,7 @@ class Receiver:
         for name in OUTCOMES:
             if counts.get(name, 0) > seen.get(name, 0):
                 for delivery in self._open:
-                    delivery.outcome = name
+                    delivery.settle(name)
                 self._open.clear()
                 return
 

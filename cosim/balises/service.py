@@ -263,7 +263,9 @@ class BaliseService:
             times = sorted({d.time for d in deliveries.values()}) or [nominal]
             late = times[0] - telegram.delivered_at > TIME_TOLERANCE
             logged = replace(telegram, delivered_at=times[0]) if late else telegram
-            self.mailbox.delivered(logged, {name: d.outcome for name, d in deliveries.items()})
+            outcomes = self.mailbox.delivered(logged, {name: d.outcome for name, d in deliveries.items()})
+            for name, delivery in deliveries.items():
+                delivery.logged_in(outcomes, name)
             for time in times:
                 rows += self._pair(time, t, until, deliveries, at_stamp.get(telegram.delivered_at))
         return sorted(rows, key=lambda row: row[0])

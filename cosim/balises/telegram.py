@@ -126,13 +126,18 @@ class Mailbox(Generic[T]):
         taken, self.waiting = self.waiting[:count], self.waiting[count:]
         return taken
 
-    def delivered(self, telegram: T, outcomes: Mapping[str, str]) -> None:
+    def delivered(self, telegram: T, outcomes: Mapping[str, str]) -> dict[str, str]:
         """Log a delivered telegram with what became of it.
 
         Args:
             outcomes: by receiver.
+
+        Returns:
+            The outcomes in the log, where those that are known later only can be written.
         """
-        self.log.append(replace(telegram, outcomes=dict(outcomes)))  # type: ignore[type-var] # all are data classes
+        logged = dict(outcomes)
+        self.log.append(replace(telegram, outcomes=logged))  # type: ignore[type-var] # all are data classes
+        return logged
 
 
 PAYLOAD = ("position", "location_accuracy", "odometer_reading", "delivered_at")
