@@ -27,15 +27,18 @@ class NetworkOutputs(FMI3Component):
 
     Args:
         settings: of the network. components: by name, for what the signals are.
+        sampled: numbers of the signals of which somebody takes what arrives, and leaves out what is lost.
 
     Raises:
         ScenarioError, CouplingError: a signal does not exist, or is no number.
     """
 
-    def __init__(self, settings: NetworkSettings, components: Mapping[str, Component]) -> None:
-        self.settings = settings
+    def __init__(
+        self, settings: NetworkSettings, components: Mapping[str, Component], sampled: Sequence[int] = ()
+    ) -> None:
+        self.settings, self.sampled = settings, tuple(sampled)
         self.sources = [_source(name, node.name, components) for node in settings.nodes for name in node.signals]
-        description = _description(settings, self.sources, components)
+        description = _description(settings, self.sources, components, self.sampled)
         super().__init__(NAME, None, description, source="the network of the scenario", kind=KIND)
 
     def configure(self, starts: Mapping[str, StartValue]) -> None:
@@ -53,6 +56,15 @@ def error_name(signal: str) -> str:
         signal: ``component.signal``.
     """
     return f"error.{signal}"
+
+
+def arrived_name(signal: str) -> str:
+    """Output with what the last packet brought of a signal, NaN where it was lost.
+
+    Args:
+        signal: ``component.signal``.
+    """
+    return f"arrived.{signal}"
 
 
 def stamp_name(node: str) -> str:
@@ -78,7 +90,10 @@ def _source(name: str, node: str, components: Mapping[str, Component]) -> tuple[
 
 
 def _description(
-    settings: NetworkSettings, sources: Sequence[tuple[str, str]], components: Mapping[str, Component]
+    settings: NetworkSettings,
+    sources: Sequence[tuple[str, str]],
+    components: Mapping[str, Component],
+    sampled: Sequence[int],
 ) -> ModelDescription:
     variables: list[ModelVariable] = []
 
@@ -106,6 +121,10 @@ def _description(
     add(SENDER, "Number of the node that sent last, from 1; 0 before")
     for node in settings.nodes:
         add(stamp_name(node.name), f"When what was last received of node {node.name} was measured", unit="s")
+    for i in sampled:
+        name, (component, signal) = settings.signals[i], sources[i]
+        text = f"What the last packet brought of {name}, NaN where it was lost"
+        add(arrived_name(name), text, marks=[CAN_BE_MISSING], **_units(components[component], signal))
     abilities = CoSimulation(modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True)
     return ModelDescription(
         fmiVersion="3.0",

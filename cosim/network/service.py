@@ -7,7 +7,7 @@ not depend on the communication step, nor on the order in which components are s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf, nan
 from typing import Any
@@ -35,7 +35,7 @@ class Packet:
     Args:
         stamp: when its values were measured and it was sent [s]. delivered_at: when it arrives [s].
         node: number of its node, from 0. number: of the transmission, from 0. values: of the node's signals, in order.
-        kind: ``sent``, ``lost`` or ``duplicate``. place: in the log.
+        kind: ``sent``, ``lost`` or ``duplicate``; ``gap``: here a lost one would arrive. place: in the log.
     """
 
     stamp: float
@@ -96,6 +96,7 @@ class NetworkService:
         sources: columns of the measured signals in the values of the plan, shape (p,).
         first: column of the network's own outputs.
         listeners: components that are told by events. holders: by signal the components whose inputs hold it.
+        sampled: numbers of the signals of which what arrives is an output too, behind the others.
     """
 
     def __init__(
@@ -106,6 +107,7 @@ class NetworkService:
         first: int,
         listeners: Sequence[Listener],
         holders: Mapping[str, Sequence[str]],
+        sampled: Sequence[int] = (),
     ) -> None:
         self.settings, self.sources, self.listeners = settings, sources, list(listeners)
         self.chance = Chance(settings, start)
@@ -113,6 +115,8 @@ class NetworkService:
         self._held = slice(first, first + count)
         self._errors = slice(first + count, first + 2 * count)
         self._sender, self._stamps = first + 2 * count, slice(first + 2 * count + 1, first + 2 * count + 1 + nodes)
+        self._sampled, behind = np.array(sampled, dtype=np.intp), first + 2 * count + 1 + nodes
+        self._arriving = slice(behind, behind + len(self._sampled))
         node_of = np.array(settings.node_of)
         self._own = [np.flatnonzero(node_of == i) for i in range(nodes)]
         self._order = settings.order or tuple(range(nodes))
@@ -183,6 +187,7 @@ class NetworkService:
         values[self._errors] = 0.0
         values[self._sender] = 0.0
         values[self._stamps] = self._start
+        values[self._arriving] = values[self._held][self._sampled]
 
     def _begin(self) -> None:
         self._begun = True
@@ -205,17 +210,17 @@ class NetworkService:
         values[self._sender] = node + 1.0
         self.number, self._next = k + 1, self.chance.instant(k + 1)
         told = tuple(measured[own].tolist())
-        lost = self.chance.lost(k)
-        arrives = nan if lost else stamp + self.chance.delay(k)
+        lost, arrives = self.chance.lost(k), stamp + self.chance.delay(k)
         self._post(Packet(stamp, arrives, node, k, told, "lost" if lost else "sent", len(self.entries)))
         if not lost and self.chance.is_doubled(k):
             arrives = stamp + self.chance.delay(k, second=True)
             self._post(Packet(stamp, arrives, node, k, told, "duplicate", len(self.entries)))
 
     def _post(self, packet: Packet) -> None:
-        self.entries.append(Entry(packet))
-        if packet.kind != "lost":
-            self.mailbox.post(packet)
+        lost = packet.kind == "lost"
+        self.entries.append(Entry(replace(packet, delivered_at=nan) if lost else packet))
+        if not lost or np.isin(self._own[packet.node], self._sampled).any():
+            self.mailbox.post(replace(packet, kind="gap") if lost else packet)
 
     # -- delivering -------------------------------------------------------------------------------------------------
 
@@ -224,11 +229,16 @@ class NetworkService:
         checked = self.settings.sequence == "checked"
         again = packet.number in self._arrived[node]
         older = packet.number <= self._newest[node]
+        kept = not (checked and older)
+        if packet.kind == "gap":
+            if kept:
+                self._arrive(node, np.full(len(self._own[node]), nan))
+            return
         if self.settings.duplicate_fraction > 0.0:
             self._arrived[node].symmetric_difference_update({packet.number})  # of two copies the second is the last
-        kept = not (checked and older)
         if kept:
             values[self._held][self._own[node]] = packet.values
+            self._arrive(node, np.array(packet.values))
             values[self._stamps][node] = packet.stamp
             self._newest[node] = packet.number
         for name in self._holding[node]:
@@ -242,6 +252,13 @@ class NetworkService:
                 letter = self._letter(listener, packet)
                 delivery = entry.deliveries[listener.component] = listener.receiver.tell(t, letter)
                 delivery.before = delivery.after = None  # rows tell it; a log of a long run has no room for it
+
+    def _arrive(self, node: int, brought: np.ndarray) -> None:
+        """Those that leave out what is missing take what a packet of a node brought, NaN where it was lost."""
+        received = dict(zip(self._own[node].tolist(), brought.tolist(), strict=True))
+        arriving = self._plan.values[self._arriving]
+        for place, signal in enumerate(self._sampled.tolist()):
+            arriving[place] = received.get(signal, arriving[place])
 
     def _letter(self, listener: Listener, packet: Packet) -> Letter:
         """What a listener is told: the values of the packet, and of other nodes what was last received."""

@@ -15,7 +15,7 @@ from cosim.components.component import Component
 from cosim.coupling.connection import Connection, Link, connect, event_connection, split_name
 from cosim.coupling.plan import Plan
 from cosim.errors import ScenarioError, nearest
-from cosim.network.outputs import NAME, NetworkOutputs
+from cosim.network.outputs import NAME, NetworkOutputs, arrived_name
 from cosim.network.service import Field, Listener, NetworkService, ages
 from cosim.network.settings import NetworkSettings
 from cosim.results.data import PacketRecord
@@ -31,12 +31,15 @@ class Network:
     Args:
         settings: of the network. outputs: its face among the components.
         listeners: who is told by events. held: by signal, who holds it.
+        left_out, stale: ``component.input`` that leave out what is lost, and that hold what came before it.
     """
 
     settings: NetworkSettings
     outputs: NetworkOutputs
     listeners: list[Listener] = field(default_factory=list)
     held: dict[str, list[str]] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    stale: list[str] = field(default_factory=list)
 
     def service(self, plan: Plan, start: float) -> NetworkService:
         """The network for the master.
@@ -46,7 +49,15 @@ class Network:
         """
         columns = np.array([plan.column(name) for name in self.settings.signals], dtype=np.intp)
         first = plan.column(f"{NAME}.{self.settings.signals[0]}")
-        return NetworkService(self.settings, start, columns, first, self.listeners, self.held)
+        return NetworkService(self.settings, start, columns, first, self.listeners, self.held, self.outputs.sampled)
+
+    def notes(self) -> list[str]:
+        """What is done where a packet is lost."""
+        told = (
+            (self.left_out, "A reading whose packet is lost is missing, and left out, at"),
+            (self.stale, "Where a packet is lost the last reading stays, and is taken for a new one, at"),
+        )
+        return [f"{text} {', '.join(names)}." for names, text in told if names]
 
     def hidden(self, components: Mapping[str, Component]) -> dict[str, list[str]]:
         """Local variables that it measures, by component: they are read though no connection asks for them.
@@ -102,7 +113,8 @@ def connect_over(
     assert table.network is not None
     owned, told = set(network.settings.signals), table.network.receivers
     direct: list[Link] = []
-    over: set[tuple[str, str]] = set()
+    over: dict[tuple[str, str], bool] = {}
+    loses = network.settings.loss_fraction > 0.0
     fields: dict[tuple[str, str], list[Field]] = {}
     for pair in pairs:
         source, target = pair[0], pair[1]
@@ -122,19 +134,31 @@ def connect_over(
             continue
         direct.append(pair)
         if travels:
-            over.add((component, name))
+            # fields of a wired event are read when it occurs, and its count is not lost without them
+            over[component, name] = loses and event is None and components[component].can_be_missing(name)
             network.held.setdefault(source, []).append(component)
+            if loses and event is None:
+                (network.left_out if over[component, name] else network.stale).append(target)
     connections = connect(direct, components)
+    sampled = {".".join(c.source) for c in connections if over.get(c.target_variable)}
+    own = [i for i, signal in enumerate(network.settings.signals) if signal in sampled]
+    network.outputs = NetworkOutputs(network.settings, components, own)
     node_of = network.settings.node_of
     network.listeners += [
         Listener(component, event, tuple(parts), frozenset(node_of[part.signal] for part in parts))
         for (component, event), parts in sorted(fields.items())
     ]
     routed = [
-        replace(c, source=(NAME, ".".join(c.source)), source_array="", exact=False) if c.target_variable in over else c
+        replace(c, source=(NAME, _received(c, over)), source_array="", exact=False) if c.target_variable in over else c
         for c in connections
     ]
     return connections, routed
+
+
+def _received(connection: Connection, leaves_out: Mapping[tuple[str, str], bool]) -> str:
+    """The network's output that a target takes: what arrived, where it leaves out what did not, or the last value."""
+    signal = ".".join(connection.source)
+    return arrived_name(signal) if leaves_out[connection.target_variable] else signal
 
 
 def network_warnings(

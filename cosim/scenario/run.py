@@ -314,6 +314,7 @@ class _Setup:
             return connections, connections
         found = connect_over(self.network, self.table, pairs, self.components, self.where)
         settle_recordings(self.components, found[1])
+        self.notes += self.network.notes()
         for warning in network_warnings(self.network, self.table, self.components, self.where):
             self._warn(warning)
         return found
