@@ -23,6 +23,7 @@ from plant_models.hybrid import (
     scalar_names,
     vector,
 )
+from plant_models.hybrid.missing import MISSED_SAMPLES
 
 Seen = Callable[[Mapping[str, Any], Any], Mapping[str, Any]]
 
@@ -102,11 +103,13 @@ class Together(HybridSystem):
         self._p = observer.unpack_parameters(values)
         self._plant_u = plant.unpack_inputs(plant.start_inputs())
         self._plant_p = plant.unpack_parameters(plant.start_parameters())
-        self.states = (*plant.states, *observer.states)
+        self.states = (*plant.states, *(s for s in observer.states if s.name != MISSED_SAMPLES))
         self.outputs = tuple(output_signal(f"error_{i + 1}", "1") for i in range(self.order))
         periods = [e.period for e in observer.events if isinstance(e, PeriodicEvent)]
         self.parameters = tuple(parameter(name, "s", float(getattr(self._p, name))) for name in periods)
-        self.events = tuple(e if isinstance(e, PeriodicEvent) else TriggeredEvent(e.name) for e in observer.events)
+        self.events = tuple(
+            replace(e, samples=()) if isinstance(e, PeriodicEvent) else TriggeredEvent(e.name) for e in observer.events
+        )
         super().__init__()
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
@@ -118,7 +121,7 @@ class Together(HybridSystem):
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
         n = self.order
         after = self.observer.jump(event, t, x[n:], self._inputs(t, x, u), self._p)
-        return vector(*(x[i] for i in range(n)), *(after[i] for i in range(self.observer.state_count)))
+        return vector(*(x[i] for i in range(n)), *(after[i] for i in range(self.state_count - n)))
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         named = self.observer.output(t, x[self.order :], self._inputs(t, x, u), self._p)

@@ -115,8 +115,9 @@ def test_scenarios_are_calibrated_too() -> None:
 
 
 def words(path: Path, table: Path, *more: str) -> list[str]:
+    """The effort of this table is held from row to row, which a table does not say by itself."""
     settings = [word for name, value in FIXED.items() for word in ("--set", f"{name}={value}")]
-    return ["calibrate", str(path), str(table), *settings, *more]
+    return ["calibrate", str(path), str(table), "--between", "effort=hold", *settings, *more]
 
 
 GUESSES = [f"{name}={value}" for name, value in GUESS.items()]

@@ -67,8 +67,8 @@ def test_seeds_add_quartiles_to_print_and_report(
 
     monkeypatch.setattr(Scenario, "load", classmethod(load))
     assert main(["run", "any", "--out", str(tmp_path), "--seeds", "3"]) == 0
-    assert "over 3 balise seeds" in capsys.readouterr().out
-    assert "Over several balise seeds" in (tmp_path / "report.html").read_text()
+    assert "over 3 seeds" in capsys.readouterr().out
+    assert "Over several seeds" in (tmp_path / "report.html").read_text()
     study = read_results(tmp_path).summary["seed_study"]
     row = study["rows"][0]
     assert study["seeds"] == [0, 1, 2]
@@ -76,7 +76,7 @@ def test_seeds_add_quartiles_to_print_and_report(
     assert row["published"] == 0.5
     assert [line.split(",")[0] for line in (tmp_path / "seeds.csv").read_text().splitlines()] == ["seed", "0", "1", "2"]
 
-    run, failing = Scenario.run, {"balises.seed": 1}
+    run, failing = Scenario.run, {"seed": 1}
 
     def lost(self: Scenario, *args: Any, overrides: Any = None, **others: Any) -> Any:
         if overrides == failing:
@@ -86,7 +86,7 @@ def test_seeds_add_quartiles_to_print_and_report(
     monkeypatch.setattr(Scenario, "run", lost)
     assert main(["run", "any", "--out", str(tmp_path), "--seeds", "3", "--no-report"]) == 1
     printed = capsys.readouterr().out
-    assert "over 2 balise seeds" in printed
+    assert "over 2 seeds" in printed
     assert "seed 1 failed: the train is lost" in printed
 
 

@@ -92,7 +92,7 @@ def test_all_kinds_of_foreign_files_are_kept_and_the_scenario_runs_from_them(tmp
     again = quietly(Scenario.load(moved))
     np.testing.assert_array_equal(again.result.table, outcome.result.table)
     assert [e.identity for e in again.result.events] == ["B1", "B2"]
-    assert read_manifest(moved).data["seeds"] == {"balises.seed": 3}
+    assert read_manifest(moved).data["seeds"] == {"seed": 0, "balises.seed": 3}
 
 
 def test_a_scenario_from_a_package_is_kept_with_its_fmus(tmp_path: Path) -> None:
