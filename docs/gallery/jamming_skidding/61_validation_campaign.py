@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 from shared.sheet import Sheet
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
@@ -42,6 +43,8 @@ def main() -> None:
     for k, (case, published) in enumerate(PUBLISHED.items()):
         for i, (measure, factor) in enumerate(COLUMNS.values()):
             spread, why = found[case][measure], MICRO if "micro" in case else REASONS[i]
+            if "micro" in case and np.isnan(spread.mean):
+                continue  # no micro-jam was found within its own time: there is no delay
             sheet.add(f"{case}: {QUANTITIES[i]}", UNITS[i], published[i], factor * spread.mean, why)
         for i, colour in ((4, "tab:orange"), (5, "tab:blue")):
             measure, factor = list(COLUMNS.values())[i]
