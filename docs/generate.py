@@ -33,7 +33,7 @@ ROOT = DOCS.parent
 WORDS = DOCS / "scenario_keys.toml"
 PICTURE = DOCS / "images" / "main_picture.png"
 PART = r"(<!-- generated: {name} -->\n)(.*?)(<!-- end -->)"
-SHORTENED = ("traction zone", "braking zone")
+SHORTENED = ("traction zone", "braking zone", "whole run")
 
 
 def main() -> None:
@@ -93,7 +93,7 @@ def write_picture() -> None:
 
 
 def printed_table() -> str:
-    """The table of the default run, two phases of it, as ``cosim run`` prints it."""
+    """The table of the default run, two phases and the whole of it, as ``cosim run`` prints it."""
     outcome = default_run()
     head, rule, *rows = error_text(phase_metrics(outcome.result, outcome.spec), outcome.spec).splitlines()
     chosen = [row for row in rows if any(f"  {phase}  " in row for phase in SHORTENED)]
