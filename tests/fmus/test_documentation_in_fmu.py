@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Callable
+from math import isinf
 from pathlib import Path
 from typing import Any
 
@@ -91,9 +92,8 @@ def test_certificates_are_those_of_the_observer(name: str) -> None:
     for preset in list(system.presets) or [None]:
         certificate = system.certify(0.2, preset=preset)
         found = (certificate.aperiodic_limit, certificate.constant_limit)
-        limits = [
-            f"none up to {certificate.horizon:g} s" if limit == float("inf") else f"{limit:.3g} s" for limit in found
-        ]
+        unlimited = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
+        limits = [unlimited if isinf(limit) else f"{limit:.3g} s" for limit in found]
         assert rows[preset or "declared starts"][-2:] == limits
         assert certificate.error_model in tables.text_content()
         assert f"mixed {certificate.event} gaps certified up to" in tables.text_content()
