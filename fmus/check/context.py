@@ -18,6 +18,10 @@ SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
 
 
+INSTANCE = "checked"
+"""Name of all instances, one after the other and beside each other."""
+
+
 class Context:
     """What is checked and how.
 
@@ -43,21 +47,18 @@ class Context:
     ) -> None:
         self.folder, self.description = folder, description
         self.step, self.start_time, self.starts, self.budget, self.steps = step, start_time, dict(starts), budget, steps
-        self._made = 0
 
     def slave(self, *, logging: bool = False) -> FmuSlave:
-        """A fresh co-simulation instance, not yet instantiated, with a name of its own.
+        """A fresh co-simulation instance, not yet instantiated. All have one name: what is drawn may follow from it.
 
         Args:
             logging: whether the FMU is asked to log.
         """
-        self._made += 1
-        return make_slave(self.folder, self.description, f"checked_{self._made}", logging=logging)
+        return make_slave(self.folder, self.description, INSTANCE, logging=logging)
 
     def model(self) -> FmuModel:
         """A fresh model exchange instance, not yet instantiated."""
-        self._made += 1
-        return make_model(self.folder, self.description, f"checked_{self._made}")
+        return make_model(self.folder, self.description, INSTANCE)
 
     def quiet_bench(self) -> Bench:
         """A bench that has not been stepped to find an excitation; the caller puts it away."""

@@ -168,6 +168,7 @@ def test_predictors_against_an_adaptive_solver(m: int) -> None:
 @settings(max_examples=10, deadline=None)
 @given(start=st.floats(-20.0, 20.0), m=st.integers(1, 3))
 @example(start=0.0625, m=2)
+@example(start=0.1, m=1)
 def test_the_reaching_time_is_exact(start: float, m: int) -> None:
     """``2 sqrt|s(0)|``, to the reading: the root falls by half a period each."""
     observer = DelayedStateObserver("freight_train", predictors=m)
@@ -177,7 +178,8 @@ def test_the_reaching_time_is_exact(start: float, m: int) -> None:
     # the others start where the one before them does, so that theirs is that way alone. The last to arrive counts.
     way = 0.1 / m
     furthest = max(abs(start - way), way if m > 1 else 0.0)
-    assert expected == pytest.approx(2.0 * np.sqrt(furthest), rel=1e-6, abs=2e-2)
+    # the way under resistance is 1 mm shorter; the root of a way makes 60 ms of that near nothing
+    assert (0.5 * expected) ** 2 == pytest.approx(furthest, rel=1e-6, abs=2e-3)
     if expected > 0.04:
         runtime.advance(expected - 0.02)
         assert 0.0 < output(runtime, "reaching_time") == pytest.approx(0.02, abs=0.011)
@@ -218,7 +220,9 @@ def test_memory_stays_flat() -> None:
     """At rest, after 10^5 readings: nothing adds up (10^6 by the native one, see the gallery)."""
     runtime = started(DelayedStateObserver("pendulum"), internal_step=0.01)
     runtime.advance(1000.0)
-    assert np.abs(runtime.x[:-2]).max() < 1e-12
+    held = dict(zip(scalar_names(runtime.system.states), runtime.x, strict=True))
+    assert held.pop("missed_samples") == 0.0
+    assert np.abs(list(held.values())[:-2]).max() < 1e-12  # the last two are times
 
 
 # -- limits ---------------------------------------------------------------------------------------------------------

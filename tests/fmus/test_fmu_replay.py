@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exchange_importer import INSTANCE
 from fmpy.fmi1 import FMICallException
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -93,7 +94,7 @@ def _run(one: Any, happenings: list[Told], in_time: bool) -> np.ndarray:
 def _as_block(made: Any, system: Any, **arguments: Any) -> Any:
     """A second component, of which only the handle is used: it drives the block."""
     made.slave.freeInstance()
-    made.slave = make_block(system, made.version, **arguments)
+    made.slave = make_block(system, made.version, instance_name=INSTANCE, **arguments)
     made.instantiate()
     return made
 
