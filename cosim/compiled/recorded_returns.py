@@ -13,7 +13,10 @@ from contextlib import contextmanager
 from typing import Any
 
 OK = 0
-VALUES = 3  # place of the values among the arguments of a function that gets variables
+COUNT, VALUES = (
+    2,
+    3,
+)  # places of the number of references and of the values among the arguments of a function that gets variables
 
 
 class Answer:
@@ -32,8 +35,20 @@ class Answer:
             for argument, result in zip(arguments[-len(self.results) :], self.results, strict=True):
                 argument._obj.value = result
         if self.values is not None:
+            if len(self.values) != asked_for(arguments) * ctypes.sizeof(ctypes.c_double):
+                raise RuntimeError(f"an answer of {len(self.values)} bytes came to a call for {asked_for(arguments)}.")
             ctypes.memmove(arguments[VALUES], self.values, len(self.values))
         return self.status
+
+
+def asked_for(arguments: tuple[Any, ...]) -> int:
+    """How many doubles a call wants: FMI 3 says it last, in FMI 2 it is the number of references.
+
+    Args:
+        arguments: of a function that gets variables.
+    """
+    count = arguments[COUNT] if len(arguments) == VALUES + 1 else arguments[-1]
+    return int(getattr(count, "value", count))
 
 
 @contextmanager

@@ -30,6 +30,7 @@ from fmus.fmi.slave import Slave
 from fmus.fmi.values import element_reader, write_start
 from plant_models.hybrid.missing import MISSED_SAMPLES
 
+MISSED_VARIABLES = {MISSED_SAMPLES: MISSED_SAMPLES}
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 
 
@@ -83,7 +84,7 @@ class Component(Described, Slave):
         self.trespasses: dict[str, str] = {}
         self._numbers = LAST_CALL.numbers(name)
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
-        self._read_outcomes: Callable[[], Mapping[str, int] | None] | None = None
+        self._readers: dict[tuple[str, ...], Callable[[], Mapping[str, int] | None]] = {}
 
     # -- how it stands ----------------------------------------------------------------------------------------------
 
@@ -118,7 +119,7 @@ class Component(Described, Slave):
             if warning is None:
                 raise
             raise RunError(f"{error} Perhaps because: {warning}", self.name, error.time) from error
-        self._read_outcomes = None
+        self._readers.clear()
         self._switch_log()
 
     def set_start(self, name: str, value: StartValue) -> None:
@@ -193,36 +194,51 @@ class Component(Described, Slave):
         return release
 
     def outcomes(self) -> Mapping[str, int] | None:
-        """Counts of what became of the events told and of the samples that were missing, where the slave keeps them:
-        blocks, and FMUs with `OUTCOME_VARIABLES`.
+        """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
+        `OUTCOME_VARIABLES`.
 
         Of an FMU that cannot say any more those that were read last.
         """
-        read = self._read_outcomes or self._outcome_reader()
+        if getattr(self.slave, "counters", None) is not None:
+            return dict(vars(self.slave.counters))
+        return self._counts(OUTCOME_VARIABLES)
+
+    def missed_samples(self) -> Mapping[str, int]:
+        """How many measurements were missing at samples, by the name of the count; empty where none can be.
+
+        Apart from `outcomes`, which a receiver asks for while calls of an FMU are answered for the stepper in C.
+        """
+        return self._counts(MISSED_VARIABLES) or {}
+
+    def _counts(self, told: Mapping[str, str]) -> Mapping[str, int] | None:
+        """Variables that count, by what they are called; None where there are none.
+
+        Args:
+            told: what a count is called, by variable.
+        """
+        key = tuple(told)
+        read = self._readers.get(key) or self._count_reader(told)
         if self._alive:
-            self._read_outcomes = read
+            self._readers[key] = read
         return read()
 
-    def _outcome_reader(self) -> Callable[[], Mapping[str, int] | None]:
-        """`outcomes` of the slave as it is instantiated, prepared."""
-        counters = getattr(self.slave, "counters", None)
-        told = {**(OUTCOME_VARIABLES if counters is None else {}), MISSED_SAMPLES: MISSED_SAMPLES}
+    def _count_reader(self, told: Mapping[str, str]) -> Callable[[], Mapping[str, int] | None]:
+        """`_counts` of the slave as it is instantiated, prepared."""
         counted = [name for name in told if name in self.variables]  # an older export knows fewer
         if not counted:
-            return lambda: None if counters is None else dict(vars(self.slave.counters))
+            return lambda: None
         names, values = [told[name] for name in counted], np.zeros(len(counted))
         read = element_reader(self, counted, values) if self._alive else None
 
-        def outcomes() -> Mapping[str, int]:
+        def counts() -> Mapping[str, int]:
             try:
                 if self._alive and read is not None:
                     read()
             except Exception as error:
                 self.explained("counts of events", error)  # after a fatal error nothing is asked any more
-            own = {} if counters is None else vars(self.slave.counters)
-            return own | dict(zip(names, map(int, values), strict=True))
+            return dict(zip(names, map(int, values), strict=True))
 
-        return outcomes
+        return counts
 
     def choose_log(self, choice: LogChoice | None) -> None:
         """What the slave shall log; before `instantiate`. None leaves that to the slave.

@@ -55,7 +55,7 @@ def missed_samples(components: Mapping[str, Component]) -> Iterator[str]:
         components: by name.
     """
     for name, component in components.items():
-        count = (component.outcomes() or {}).get(MISSED_SAMPLES, 0)
+        count = component.missed_samples().get(MISSED_SAMPLES, 0)
         if count:
             yield f"{name}: {count} measurements were missing at its samples, and left out."
 

@@ -78,7 +78,7 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
 
 
 def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
-    outcomes = component.outcomes()
+    outcomes, missed = component.outcomes(), component.missed_samples()
     return {
         "name": component.name,
         "kind": component.kind,
@@ -95,7 +95,7 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "cost": call_statistics_table(component.calls, component.seconds, component.call_statistics),
         "messages": [message.text for message in component.messages.kept()[-MESSAGES_SHOWN:]],
         "message_counts": dict(component.messages.counts),
-        "events": None if outcomes is None else dict(outcomes),
+        "events": None if outcomes is None and not missed else {**(outcomes or {}), **missed},
     }
 
 
