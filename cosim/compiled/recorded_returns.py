@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from fmus.fmi.types import BOOLEANS, CTYPES
+
 OK = 0
 COUNT, VALUES = (
     2,
@@ -29,26 +31,35 @@ class Answer:
     def __init__(self, status: int = OK, results: tuple[Any, ...] = (), values: bytes | None = None) -> None:
         self.status, self.results, self.values = status, results, values
 
-    def __call__(self, *arguments: Any) -> int:
-        """Answer as the library did."""
+    def __call__(self, function: str, *arguments: Any) -> int:
+        """Answer as the library did.
+
+        Args:
+            function: that is called. arguments: of the call.
+
+        Raises:
+            RuntimeError: the values are not as many as the call asks for: it is for another call.
+        """
         if self.results:
             for argument, result in zip(arguments[-len(self.results) :], self.results, strict=True):
                 argument._obj.value = result
         if self.values is not None:
-            if len(self.values) != asked_for(arguments) * ctypes.sizeof(ctypes.c_double):
-                raise RuntimeError(f"an answer of {len(self.values)} bytes came to a call for {asked_for(arguments)}.")
+            if len(self.values) != (wanted := bytes_wanted(function, arguments)):
+                raise RuntimeError(f"{function} for {wanted} bytes met an answer of {len(self.values)}.")
             ctypes.memmove(arguments[VALUES], self.values, len(self.values))
         return self.status
 
 
-def asked_for(arguments: tuple[Any, ...]) -> int:
-    """How many doubles a call wants: FMI 3 says it last, in FMI 2 it is the number of references.
+def bytes_wanted(function: str, arguments: Sequence[Any]) -> int:
+    """How much a call writes; FMI 3 says the number of values last, before it is the number of references.
 
     Args:
-        arguments: of a function that gets variables.
+        function: that gets variables. arguments: of the call.
     """
     count = arguments[COUNT] if len(arguments) == VALUES + 1 else arguments[-1]
-    return int(getattr(count, "value", count))
+    version, kind = (int(function[3]) if function[3].isdigit() else 1), function.partition("Get")[2]
+    held = BOOLEANS[version] if kind == "Boolean" else CTYPES[kind]
+    return int(getattr(count, "value", count)) * ctypes.sizeof(held[0])
 
 
 @contextmanager
@@ -66,7 +77,7 @@ def answered(slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[No
             answer = waiting.pop(0)
             if not waiting:
                 functions[name] = real[name]
-            return answer(*arguments)
+            return answer(name, *arguments)
 
         call.restype, call.argnames, call.argtypes = ctypes.c_int, (), ()  # type: ignore[attr-defined]
         return call

@@ -201,16 +201,16 @@ class Component(Described, Slave):
         """
         if getattr(self.slave, "counters", None) is not None:
             return dict(vars(self.slave.counters))
-        return self._counts(OUTCOME_VARIABLES)
+        return self._read_counts(OUTCOME_VARIABLES)
 
     def missed_samples(self) -> Mapping[str, int]:
         """How many measurements were missing at samples, by the name of the count; empty where none can be.
 
         Apart from `outcomes`, which a receiver asks for while calls of an FMU are answered for the stepper in C.
         """
-        return self._counts(MISSED_VARIABLES) or {}
+        return self._read_counts(MISSED_VARIABLES) or {}
 
-    def _counts(self, told: Mapping[str, str]) -> Mapping[str, int] | None:
+    def _read_counts(self, told: Mapping[str, str]) -> Mapping[str, int] | None:
         """Variables that count, by what they are called; None where there are none.
 
         Args:
@@ -223,7 +223,7 @@ class Component(Described, Slave):
         return read()
 
     def _count_reader(self, told: Mapping[str, str]) -> Callable[[], Mapping[str, int] | None]:
-        """`_counts` of the slave as it is instantiated, prepared."""
+        """`_read_counts` of the slave as it is instantiated, prepared."""
         counted = [name for name in told if name in self.variables]  # an older export knows fewer
         if not counted:
             return lambda: None

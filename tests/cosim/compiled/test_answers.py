@@ -13,14 +13,16 @@ from cosim.compiled.recorded_returns import Answer
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_an_answer_is_never_written_into_a_smaller_call(version: int) -> None:
+def test_an_answer_is_never_written_into_another_call(version: int) -> None:
     target = np.zeros(3)
     place = target.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-    told = Answer(values=np.array([1.0, 2.0]).tobytes())
+    function, told = {2: "fmi2GetReal", 3: "fmi3GetFloat64"}[version], Answer(values=np.array([1.0, 2.0]).tobytes())
     for count in (1, 3):
-        with pytest.raises(RuntimeError, match=f"an answer of 16 bytes came to a call for {count}"):
-            told(None, None, ctypes.c_size_t(count), place, *([ctypes.c_size_t(count)] if version == 3 else []))
-    told(None, None, ctypes.c_size_t(2), place, *([ctypes.c_size_t(2)] if version == 3 else []))
+        with pytest.raises(RuntimeError, match=f"{function} for {8 * count} bytes met an answer of 16"):
+            told(
+                function, None, None, ctypes.c_size_t(count), place, *([ctypes.c_size_t(count)] if version == 3 else [])
+            )
+    told(function, None, None, ctypes.c_size_t(2), place, *([ctypes.c_size_t(2)] if version == 3 else []))
     assert target.tolist() == [1.0, 2.0, 0.0]
 
 
