@@ -154,8 +154,10 @@ class Sources:
 
 
 def _longest(gaps: Sequence[ExpectedGap]) -> ExpectedGap:
-    """The one that decides: the first that is not known, else the longest."""
-    return max(gaps, key=lambda gap: inf if gap.seconds is None else gap.seconds)
+    """The one that decides: the first of those that are not known, before all one of which no distance is known either,
+    since a certificate may speak of a distance; else the longest.
+    """
+    return max(gaps, key=lambda gap: (inf, gap.distance is None) if gap.seconds is None else (gap.seconds, False))
 
 
 def _not_as_certified(listener: Listener, settings: NetworkSettings, system: Any) -> str:

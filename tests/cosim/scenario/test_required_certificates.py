@@ -184,6 +184,17 @@ def test_a_reading_that_is_held_between_packets_or_rows_is_refused(tmp_path: Pat
         assert ("is held over the rows of seen" in applied(s)) == refused
 
 
+def test_a_lossy_odometer_is_not_hidden_by_balises_of_which_the_distance_is_known() -> None:
+    """The preset is certified at any gap, so the distance of its balises is no reason to refuse; its odometer is."""
+    scenario = Scenario(stop=1.0, step=0.1, certificates="require")
+    scenario.add("train", model="locomotive").add("observer", observer="takagi_sugeno_cdo", preset="long_gaps")
+    scenario.connect("train.wheel_speed -> observer.odometer")
+    scenario.balises(position="train.position", speed="train.speed", layout="spacing", spacing=100.0, track_end=500.0)
+    scenario.network(nodes={"n": ["train.wheel_speed"]}, period=0.1, loss_fraction=0.3)
+    with pytest.raises(CertificateError, match=r"observer\.odometer arrives by packets and is held"):
+        scenario.run(warn=lambda _: None)
+
+
 def test_a_component_that_tells_at_instants_of_its_own_is_refused() -> None:
     s = Scenario(stop=0.2, step=0.05, certificates="require")
     s.add("reader", model="balise_reader", **{"as": "block2"})
