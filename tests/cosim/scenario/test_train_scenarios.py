@@ -132,15 +132,26 @@ def test_sc3_the_effort_is_cut_and_hardly_any_sand_is_asked_for() -> None:
     assert not indicated(outcome)
 
 
+def cut(outcome: Outcome) -> float:
+    """Largest command on the slippery rail, a share of the largest one before it."""
+    time, command = rows(outcome, "time"), rows(outcome, "controller.effort")
+    return float(command[(time > 34.0) & (time < 50.0)].max() / command[time <= 30.0].max())
+
+
+def test_sc4_the_command_is_cut_to_less_than_four_fifths() -> None:
+    """Median over five seeds: of 24 the cut is to 0.55 to 0.90, above 0.8 in two."""
+    scenario = Scenario.load("freight_sc4")
+    runs = [scenario.run(warn=lambda _: None, overrides={"seed": seed}) for seed in range(1, 5)]
+    assert np.median([cut(outcome) for outcome in (run("freight_sc4"), *runs)]) < 0.8
+
+
 def test_sc4_the_command_is_cut_before_the_slip_is_excessive() -> None:
     """Published is a slip that the command follows; here the controller knows of it within the step: 11 to 17 % over 20
     seeds.
     """
     outcome = run("freight_sc4")
-    time, command = rows(outcome, "time"), rows(outcome, "controller.effort")
     assert 0.05 < largest_slip(outcome)[0] < 0.2
-    # 0.55 to 0.90 over 24 seeds of the receiver, above 0.8 in two of them
-    assert command[(time > 34.0) & (time < 50.0)].max() < command[time <= 30.0].max()
+    assert cut(outcome) < 1.0
     assert rows(outcome, "controller.effort_available").min() < 0.2 * 350e3
     assert 3.6 * rows(outcome, "train.speed").max() == pytest.approx(50.0, abs=1.0)
     assert not sanded(outcome)

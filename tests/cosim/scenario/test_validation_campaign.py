@@ -55,12 +55,10 @@ def test_the_observer_knows_its_position_better_than_the_odometer_in_jams() -> N
 
 
 def test_every_miss_and_every_false_detection_has_a_cause(study: ModuleType) -> None:
-    """Drawings with misses and jams between two rows: docs/validation_campaign.md. One miss has no excuse: a jam of
-    half the speed that begins 0.3 s after the end of another, whose residual is 17 times the threshold.
-    """
+    """Drawings with misses and jams between two rows: docs/validation_campaign.md."""
     found = [row for run in study.runs(["HS EBA", "AS EBA"], (1, 4, 11, 17, 19)) for row in study.traced(run)]
     assert {"missed", "false"} <= {row[2] for row in found}
-    assert {row[:3] for row in found if row[6] == "not explained"} <= {("AS EBA", 11, "missed")}
+    assert [row for row in found if row[6] == "not explained"] == []
 
 
 def test_the_odometer_is_read_with_its_age() -> None:
