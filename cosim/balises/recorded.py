@@ -155,7 +155,8 @@ def read_layout(path: Path) -> RecordedLayout:
     try:
         events = _read(path)
     except (OSError, ValueError) as error:
-        raise ScenarioError(f"{path} holds no telegrams: {error}") from error
+        words = str(error)
+        raise ScenarioError(words if words.startswith(str(path)) else f"{path} holds no telegrams: {words}") from error
     order = sorted(events, key=lambda record: record.stamp)  # stable: of one stamp those delivered first come first
     return RecordedLayout(tuple(order), str(path))
 

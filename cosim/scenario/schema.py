@@ -161,12 +161,24 @@ def parse_scenario(data: dict[str, Any], where: str, folder: Path | None = None)
     try:
         return ScenarioTable.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        lines = [
-            _explain(dict(item))
-            for item in error.errors()
-            if item["loc"][-1:] not in (("list[float]",), ("list[str]",))
-        ]
+        lines = [_explain(dict(item)) for item in error.errors() if not _of_another_form(dict(item))]
         raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+
+
+EXPECTED = {
+    "log": "expected 'all', 'errors', 'none', or a list of log categories",
+    "interpolation": "expected 'linear' or 'hold', or a table of these by column",
+    "can_be_missing": "expected a list of names, such as ['effort']",
+}
+"""Of a component: keys that have several forms, or one that is easily missed."""
+
+
+def _of_another_form(item: dict[str, Any]) -> bool:
+    """Whether an error is that a value has not one of several forms, where another of them is nearer to it."""
+    form = str((item["loc"] or ("",))[-1])
+    if form.startswith("literal[") and isinstance(item.get("input"), dict):
+        return True
+    return form in ("list[float]", "list[str]") or form.startswith("dict[")
 
 
 def _explain(item: dict[str, Any]) -> str:
@@ -180,8 +192,8 @@ def _explain(item: dict[str, Any]) -> str:
         return f"{place}: {message}"
     if item["loc"][-1:] == ("float",):
         message = "expected a number, or a list of numbers for a vector"
-    if item["loc"][-2:-1] == ("log",) and str(item["loc"][-1]).startswith("literal["):
-        message = "expected 'all', 'errors', 'none', or a list of log categories"
+    key = str(item["loc"][2]) if item["loc"][:1] == ("components",) and len(item["loc"]) > 2 else ""
+    message = EXPECTED.get(key, message)
     return f"{place}: {message} (got {json.dumps(given, default=str)})"
 
 
@@ -195,7 +207,7 @@ def _place(location: tuple[Any, ...]) -> str:
 
 def _is_form(place: str) -> bool:
     """Whether part of a place names one of several forms a value may have, which says nothing to the user."""
-    return place in ("float", "constrained-str", LINE, TABLE) or place.startswith(("list[", "literal["))
+    return place in ("float", "constrained-str", LINE, TABLE) or place.startswith(("list[", "literal[", "dict["))
 
 
 def _known_keys(location: tuple[Any, ...]) -> list[str]:

@@ -39,6 +39,7 @@ def _attach(
             place in ahead
             or (
                 method != "hold"
+                and source < len(givers)  # what a network delivers is held
                 and bool(plan.continuous[source])
                 and place not in inputs.tables
                 and is_continuous(component.variables[name])
@@ -48,7 +49,7 @@ def _attach(
     )
     if not continuous.any():
         return "held"
-    sources = [givers[source].component for source in inputs.sources]
+    sources = [givers[source].component if source < len(givers) else component for source in inputs.sources]
     hold = FirstOrderHold("interpolate" if method == "hold" else method, sources, continuous, known)
     planned.interpolator = make_interpolator(hold, inputs, component)
     plan.interpolators.append(planned.interpolator)

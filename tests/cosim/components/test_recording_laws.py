@@ -149,6 +149,17 @@ def test_telegrams_that_cannot_be_told_are_refused(
         small().balises(layout="recorded", file=str(tmp_path / "events.csv"), **{"method": "auto"} | keys).run()
 
 
+def test_a_wrong_row_of_telegrams_is_told_with_its_file_once(tmp_path: Path) -> None:
+    path = tmp_path / "events.csv"
+    path.write_text("stamp,position\n0.1,soon\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match="position: expected a number, got 'soon'") as refused:
+        small().balises(layout="recorded", file=str(path), method="auto").run()
+    text = str(refused.value)
+    assert text.count(str(path)) == 1
+    assert f"{path}, line 2" in text
+    assert "holds no telegrams" not in text  # it holds one, that is wrong
+
+
 def test_recorded_telegrams_are_not_exported(tmp_path: Path) -> None:
     write_events(tmp_path / "events.csv", [telegram()])
     scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("log", recording="log.csv")

@@ -252,3 +252,18 @@ def test_doubling_packets_loses_no_other_ones() -> None:
     assert any(p.kind == "duplicate" for p in twice)
     rest = [[(p.number, p.kind, p.stamp) for p in side if p.kind != "duplicate"] for side in (once, twice)]
     assert rest[0] == rest[1]
+
+
+def test_a_component_may_have_a_line_beside_a_network(tmp_path: Path) -> None:
+    """The source of a value that the network delivers is no component; its course is held."""
+    (tmp_path / "log.csv").write_text("time,effort\n0,0\n5,1000\n", encoding="utf-8")
+    run = Scenario(folder=tmp_path, stop=1.0, step=0.05, certificates="ignore")
+    run.add("log", recording="log.csv", interpolation="linear")
+    run.add("train", model="longitudinal_train").add("odometer", model="odometer")
+    run.add("observer", observer="quasi_lpv_uio")
+    run.connect("log.effort -> train.effort, observer.effort", "train.speed -> odometer.wheel_speed")
+    run.connect("odometer.reading -> observer.odometer")
+    run.network(nodes={"n": ["odometer.reading"]}, period=0.1)
+    outcome = run.run(warn=lambda _text: None)
+    assert len(outcome.result.packets) == 11  # at 0, 0.1 ... 1 s
+    assert outcome["train.speed"][-1] > 0.0

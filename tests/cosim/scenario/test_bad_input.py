@@ -60,6 +60,20 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
         {"driver.log": "everything"},
         r"driver\.log: expected 'all', 'errors', 'none', or a list of log categories \(got .everything.\)$",
     ),
+    "a word that interpolation does not know": (
+        {"driver.interpolation": "sometimes"},
+        r"^[^\n]*driver\.interpolation: expected 'linear' or 'hold', or a table of these by column "
+        r"\(got .sometimes.\)$",
+    ),
+    "a column's word that interpolation does not know": (
+        {"driver.interpolation": {"a": "sometimes"}},
+        r"^[^\n]*driver\.interpolation\.a: expected 'linear' or 'hold', or a table of these by column "
+        r"\(got .sometimes.\)$",
+    ),
+    "one name for the list of those that can be missing": (
+        {"driver.can_be_missing": "odometer"},
+        r"^[^\n]*driver\.can_be_missing: expected a list of names, such as \['effort'\] \(got .odometer.\)$",
+    ),
     "balises unsorted": (
         {"balises.positions": [3.0, 1.0]},
         "increasing position.*number 2 at 1 m follows number 1 at 3 m",
