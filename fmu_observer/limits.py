@@ -79,7 +79,8 @@ class Limit:
         quantity: what is limited, in words. unit: of all values.
         printed: bounds of a thesis. exact: first value at which the error equations are unstable, None where no exact
             test is known, inf where none was found. exact_test: what that test looks at, in words.
-        looked: how far that test looked, inf where what it says holds without end.
+        looked: how far that test looked, inf where what it says holds without end. tried: shortest value that it
+            looked at, for an `exact` of 0; 0 where there is none at which the error equations are stable.
         trial: to find the practical limit by, None for none.
     """
 
@@ -89,4 +90,5 @@ class Limit:
     exact: float | None = None
     exact_test: str = ""
     looked: float = inf
+    tried: float = 0.0
     trial: Trial | None = None

@@ -18,7 +18,7 @@ class LimitRow:
     Attributes:
         quantity: what is limited. unit: of the values. printed: bounds, each with its statement and source.
         exact: of the error equations, None where no test is known. exact_test: what it looks at.
-        looked: how far the exact test looked; inf where it holds without end.
+        looked: shortest and longest value that the exact test looked at; 0 and inf where it holds without end.
         practical: found by simulation, None where nothing was run; inf where all that was tried was survived, 0 where
             nothing was.
         searched: shortest and longest value of the simulation, empty where nothing was run.
@@ -29,9 +29,9 @@ class LimitRow:
     printed: tuple[tuple[float, str, str], ...]
     exact: float | None
     exact_test: str
-    looked: float
+    looked: tuple[float, float]
     practical: float | None
-    searched: tuple[float, ...]
+    searched: tuple[float, float] | tuple[()]
 
 
 def limit_rows(limits: Sequence[Limit], simulate: bool = True, members: int = MEMBERS) -> list[LimitRow]:
@@ -53,7 +53,8 @@ def limit_text(observer: str, rows: Sequence[LimitRow]) -> str:
     notes = []
     for row in rows:
         bounds = [_number(value, row.unit) for value, _, _ in row.printed] or ["-"]
-        cells.append([row.quantity, bounds[0], _number(row.exact, row.unit, row.looked), _practical(row)])
+        exact, practical = _number(row.exact, row.unit, row.looked), _number(row.practical, row.unit, row.searched)
+        cells.append([row.quantity, bounds[0], exact, practical])
         cells.extend(["", bound, "", ""] for bound in bounds[1:])
         notes += [f"{_number(value, row.unit)}: {statement} ({source})" for value, statement, source in row.printed]
         if row.exact is not None:
@@ -73,22 +74,19 @@ def _row(limit: Limit, trial: Trial | None, members: int) -> LimitRow:
         printed=tuple((bound.value, bound.statement, bound.source) for bound in limit.printed),
         exact=limit.exact,
         exact_test=limit.exact_test,
-        looked=limit.looked,
+        looked=(limit.tried, limit.looked),
         practical=None if trial is None else practical_limit(trial, members),
         searched=() if trial is None else reach(trial),
     )
 
 
-def _number(value: float | None, unit: str, looked: float = inf) -> str:
+def _number(value: float | None, unit: str, searched: tuple[float, float] | tuple[()] = ()) -> str:
     """A limit; the end of a search is none, and is shown as what the limit lies beyond."""
+    shortest, longest = searched or (0.0, inf)
     if value is None:
         return "-"
     if isinf(value):
-        return "none" if isinf(looked) else f"> {looked:.3g} {unit}"
+        return "none" if isinf(longest) else f"> {longest:.3g} {unit}"
+    if value == 0.0 and shortest > 0.0:
+        return f"< {shortest:.3g} {unit}"
     return f"{value:.3g} {unit}"
-
-
-def _practical(row: LimitRow) -> str:
-    if row.practical == 0.0:
-        return f"< {row.searched[0]:.3g} {row.unit}"
-    return _number(row.practical, row.unit, row.searched[1] if row.searched else inf)

@@ -34,7 +34,7 @@ COARSE = 16  # values of x for finding the Lyapunov matrix
 CUTS = 5
 LONGEST_X = 20.0  # theta times gap up to which a constant gap is searched for instability
 LIMIT_TOLERANCE = 1e-3  # relative width of the last bisection interval
-SMALLEST_GAP = 1e-3  # [s]; below it the limit counts as zero
+SMALLEST_LIMIT = 1e-5  # of the constant limit: below it no gap was found
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def _aperiodic_limit(adaptation: GainAdaptation, bound: float) -> float:
     if _common_decrease(adaptation, bound)[0] > MARGIN:
         return inf
     low, high = 0.0, bound
-    while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_GAP:
+    while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_LIMIT * bound:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _common_decrease(adaptation, middle)[0] > MARGIN else (low, middle)
     return low

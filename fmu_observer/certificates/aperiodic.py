@@ -28,7 +28,7 @@ MARGIN = 1e-6
 SHORTEST_HORIZON = 20.0  # [s]
 COARSE, FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
 CUTS = 4
-SMALLEST_LIMIT = 1e-4  # of the constant limit: below it the aperiodic limit counts as zero
+SMALLEST_LIMIT = 1e-4  # of the constant limit: below it no aperiodic limit was found
 LARGEST_GROWTH = 1e60  # an error that grows more over a gap is beyond what a quadratic form in floating point can judge
 LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
 
@@ -103,7 +103,7 @@ def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...
         covered = "not judged"
     elif common_decrease(vertices, certificate.max_gap, True).margin <= MARGIN:
         limit = aperiodic_limit(vertices, certificate.horizon, switching=True)
-        covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap"
+        covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap that was tried"
     return replace(certificate, notes=(*certificate.notes, f"{what} that change within a gap are {covered}"))
 
 

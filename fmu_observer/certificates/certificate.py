@@ -17,8 +17,8 @@ class Certificate:
         constant_limit: first constant gap at which the error grows from balise to balise [s]; inf if none up to the
         horizon.
         aperiodic_limit: longest gap such that one common quadratic Lyapunov function covers every mixture of gaps up to
-            it [s]; inf if all up to the horizon are covered. Between the two limits mixtures of gaps may make the
-            error grow.
+            it [s]; inf if all up to the horizon are covered, 0 if none that was tried. Between the two limits mixtures
+            of gaps may make the error grow.
         spectral_radius: largest factor per balise at the constant gap `max_gap` [1].
         quadratic_margin: smallest relative decrease of the Lyapunov function over all gaps up to `max_gap`, recomputed
             on a grid much finer than the one it was found on, less a bound for what lies between [1]; positive when
@@ -97,7 +97,7 @@ class Certificate:
 
     def _limit(self, limit: float) -> str:
         if limit == 0.0:
-            return "no gap at all"
+            return "no gap at all" if self.constant_limit == 0.0 else "no gap that was tried"
         if isinf(limit):
             return "none" if isinf(self.horizon) else f"none found up to {self.horizon:.4g} s"
         return f"{limit:.4g} s"

@@ -17,9 +17,10 @@ SHARES = (3.0, 2.0, 1.2)  # of an adapting gain: theta_min times longest gap, la
 def certified_gains(
     gap: float, family: Callable[[float], Gains], certify: Callable[[Mapping[str, float]], Certificate]
 ) -> Gains | None:
-    """Gains of a family with the largest theta, to three digits, certified for a gap.
+    """Gains of a family with the largest theta up to ``LIMIT / gap``, to three digits, certified for a gap.
 
-    The limit goes as 1 / theta but for the drag, so the limit at one theta tells the next.
+    The limit goes as 1 / theta but for the drag, so the limit at one theta tells the next. What the drag would allow
+    beyond ``LIMIT / gap`` is not sought.
 
     Args:
         gap: longest gap to certify [s]. family: gains by theta [1/s]. certify: judges gains for that gap.

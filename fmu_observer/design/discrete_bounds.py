@@ -10,7 +10,7 @@ from math import pi, sin
 import numpy as np
 import scipy
 
-from fmu_observer.design.scaled_slopes import scaled, scaled_lipschitz
+from fmu_observer.design.scaled_slopes import best_scale, scaled, scaled_lipschitz
 from fmu_observer.models import ObserverModel
 
 POINTS, FEW = 2048, 128  # on the upper half of the unit circle, for the answer and for the choice of coordinates
@@ -74,7 +74,7 @@ def transition_lipschitz(model: ObserverModel, period: float, scale: float) -> f
 
 
 def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> DiscreteBound:
-    """The condition for a gain L of shape (n, q) at a period [s], in the best coordinates of a grid of scales.
+    """The condition for a gain L of shape (n, q) at a period [s], in the best coordinates found.
 
     ``e+ = (A_d - L C) e + g`` with ``|g| <= lipschitz |e|`` decays when the loop gain is below one (small-gain theorem;
     quadratic stability for norm-bounded uncertainty asks the same).
@@ -88,10 +88,11 @@ def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> Dis
         return DiscreteBound(radius, 0.0, transition_lipschitz(model, period, 1.0), 1.0)
     if model.phi is None or model.lipschitz == 0.0:
         return DiscreteBound(radius, circle_distance(closed), 0.0, 1.0)
-    margins = [
-        circle_distance(scaled(closed, s), FEW) / transition_lipschitz(model, period, s) for s in map(float, SCALES)
-    ]
-    scale = float(SCALES[int(np.argmax(margins))])
+
+    def margin(scale: float) -> float:
+        return circle_distance(scaled(closed, scale), FEW) / transition_lipschitz(model, period, scale)
+
+    scale = best_scale(margin, closed, SCALES)
     return DiscreteBound(
         radius, circle_distance(scaled(closed, scale)), transition_lipschitz(model, period, scale), scale
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import ceil, inf, log, sqrt
 
 import numpy as np
 import scipy
@@ -60,15 +60,32 @@ def theta_from_slopes(model: ObserverModel, K: np.ndarray) -> float:
 
     Returns:
         The smallest theta of a fine grid from which on ``theta > 2 lmax(P) |inv(S) slope S|``; inf without slopes or
-        when there is none.
+        when there is none, however large.
     """
     size = lyapunov_size(K)
     if not model.slopes or size == inf:
         return inf
-    sizes = THETAS[:, None] ** np.arange(model.order)
-    steepest = [np.linalg.norm(slope * sizes[:, None, :] / sizes[:, :, None], 2, axis=(1, 2)) for slope in model.slopes]
-    enough = np.max(steepest, axis=0) * 2.0 * size < THETAS
-    if not enough[-1]:
+    last = max(_surely_enough(np.asarray(slope), 2.0 * size) for slope in model.slopes)
+    if last == inf:
         return inf
+    ratio = THETAS[1] / THETAS[0]
+    beyond = THETAS[-1] * ratio ** np.arange(1, 2 + max(0, ceil(log(last / THETAS[-1]) / log(ratio))))
+    thetas = np.r_[THETAS, beyond]
+    sizes = thetas[:, None] ** np.arange(model.order)
+    steepest = [np.linalg.norm(slope * sizes[:, None, :] / sizes[:, :, None], 2, axis=(1, 2)) for slope in model.slopes]
+    enough = np.max(steepest, axis=0) * 2.0 * size < thetas
     failing = np.flatnonzero(~enough)
-    return float(THETAS[failing[-1] + 1] if failing.size else THETAS[0])
+    return float(thetas[failing[-1] + 1] if failing.size else thetas[0])
+
+
+def _surely_enough(slope: np.ndarray, factor: float) -> float:
+    """A theta from which on ``theta > factor |inv(S) slope S|``, at least 1; inf where there is none.
+
+    Of a slope the entries above the diagonal grow with theta, by its first power next to it: less than theta only where
+    ``factor`` times their norm is below one, and whatever stands further off grows faster. The rest does not grow.
+    """
+    next_to = np.diag(np.diag(slope, 1), 1)
+    left = 1.0 - factor * float(np.linalg.norm(next_to, 2))
+    if np.triu(slope, 2).any() or left <= 0.0:
+        return inf
+    return max(1.0, factor * float(np.linalg.norm(np.tril(slope))) / left)

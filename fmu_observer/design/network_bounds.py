@@ -11,6 +11,9 @@ from math import inf, log, log1p
 import numpy as np
 import scipy
 
+POINTS = 400
+SPAN = 1e3  # the grid of frequencies reaches from the slowest pole over this to the fastest times this
+
 
 @dataclass(frozen=True)
 class NetworkBounds:
@@ -112,11 +115,15 @@ def largest_gain(A: np.ndarray, B: np.ndarray) -> float:
     def norm(frequency: float) -> float:
         return float(np.linalg.norm(np.linalg.solve(1j * frequency * np.eye(len(A)) - A, B), 2))
 
-    poles = np.abs(np.linalg.eigvals(A).imag)
-    grid = np.unique(np.concatenate([[0.0], poles, np.geomspace(1e-3, 1e3, 400)]))
+    poles = np.linalg.eigvals(A)
+    rates = np.abs(poles)
+    about = np.geomspace(rates.min() / SPAN, rates.max() * SPAN, POINTS)
+    grid = np.unique(np.concatenate([[0.0], np.abs(poles.imag), about]))
     best = int(np.argmax([norm(w) for w in grid]))
     around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    refined = scipy.optimize.minimize_scalar(lambda w: -norm(w), bounds=around, method="bounded")
+    refined = scipy.optimize.minimize_scalar(
+        lambda w: -norm(w), bounds=around, method="bounded", options={"xatol": 1e-9 * around[1]}
+    )
     return max(norm(grid[best]), -float(refined.fun))
 
 

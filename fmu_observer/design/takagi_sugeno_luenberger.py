@@ -106,7 +106,7 @@ def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:
     if gains is not None:
         return gains
     nearest = _nearest_decay(model, decay)
-    found = "none" if nearest is None else f"{nearest:.3g} 1/s"
+    found = f"none down to {SMALLEST * decay:.3g} 1/s" if nearest is None else f"{nearest:.3g} 1/s"
     raise ValueError(
         f"Takagi-Sugeno Luenberger design for {model.name!r}: no common P at the {model.vertices} vertices for decay "
         f"{decay:g} "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from fmu_observer.design.scaled_slopes import scaled, scaled_lipschitz
+from fmu_observer.design.scaled_slopes import best_scale, scaled, scaled_lipschitz
 from fmu_observer.models import ObserverModel
 
 SCALES = np.geomspace(0.1, 100.0, 301)
@@ -59,11 +59,14 @@ def scaled_thau_bound(model: ObserverModel, gain: np.ndarray, scale: float = 1.0
 
 
 def best_thau_bound(model: ObserverModel, gain: np.ndarray) -> ThauBound:
-    """The bound in the coordinates, of a geometric grid of scales, in which it leaves the largest factor over the
-    constant.
+    """The bound in the coordinates in which it leaves the largest factor over the constant.
 
     Args:
         model: the plant as the observer knows it. gain: shape (n, q).
     """
-    bounds = [scaled_thau_bound(model, gain, float(s)) for s in SCALES]
-    return max(bounds, key=lambda b: b.valid / max(b.lipschitz, 1e-12))
+
+    def margin(scale: float) -> float:
+        bound = scaled_thau_bound(model, gain, scale)
+        return bound.valid / max(bound.lipschitz, 1e-12)
+
+    return scaled_thau_bound(model, gain, best_scale(margin, model.A - gain @ model.C, SCALES))

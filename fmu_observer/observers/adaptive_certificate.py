@@ -41,7 +41,8 @@ def adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: f
             error.
 
     Returns:
-        The period; 0 where more is left at every one down to `SHORTEST`, inf where no more is left at `high`.
+        The period; 0 where more is left at the shortest one tried too (`shortest_tried`), inf where no more is left at
+        `high`.
     """
     key = (observer.name, observer.model.name, observer.sizes, high, left, tuple(float(v) for v in parameters))
     if key not in _LIMITS:
@@ -50,15 +51,25 @@ def adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: f
 
 
 def _longest_kept(keeps: Callable[[float], bool], high: float) -> float:
-    if high <= SHORTEST or not keeps(SHORTEST):
+    shortest = shortest_tried(high)
+    if high == 0.0 or not keeps(shortest):
         return 0.0
     if keeps(high):
         return inf
-    low, top = SHORTEST, high
+    low, top = shortest, high
     for _ in range(BISECTIONS):
         middle = float(np.sqrt(low * top))
         low, top = (middle, top) if keeps(middle) else (low, middle)
     return low
+
+
+def shortest_tried(high: float) -> float:
+    """The shortest period that the search for the longest one tries [s].
+
+    Args:
+        high: from which on it is not looked for [s].
+    """
+    return min(SHORTEST, 0.5 * high)
 
 
 _LIMITS: dict[Any, float] = {}  # of this process; a run of 40 s takes a quarter of a second

@@ -198,7 +198,7 @@ def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> Infe
     asked = "" if problem.alpha is None else f" and alpha = {problem.alpha:g}"
     of = "free gains" if gains is None else "the gains given"
     text = f"Proposition 4-1 has no solution for m = {problem.m:g} 1/s{asked} with {of}"
-    slower = "no decay was found" if m is None else f"m = {m:.4g} 1/s at most"
+    slower = f"no decay was found down to {SMALLEST * problem.m:.3g} 1/s" if m is None else f"m = {m:.4g} 1/s at most"
     at = "" if problem.alpha is None else " at this alpha"
     if alpha is None:
         why = f"the error cannot decay so fast, {DECAY}"

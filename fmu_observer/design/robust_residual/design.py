@@ -206,8 +206,9 @@ def _largest_decay(problem: ResidualProblem, attenuation: float | None) -> float
 
 def _without_gains(problem: ResidualProblem) -> InfeasibleResidualDesign:
     alpha, decay = _least_alpha(problem, None), _largest_decay(problem, None)
+    none = f"no decay down to {SLOWEST * problem.decay:.3g} 1/s"
     tried = f"decay {problem.decay:g} 1/s and K' P K <= alpha = {problem.alpha:g}, M = {problem.residual_gain:g}"
-    slower = "no decay with this alpha" if decay is None else f"decay {decay:.3g} 1/s with this alpha"
+    slower = f"{none} with this alpha" if decay is None else f"decay {decay:.3g} 1/s with this alpha"
     if alpha < inf:
         advice = f"Nearest found feasible: alpha = {alpha:.4g} with this decay, or {slower}."
         message = f"Robust residual: no gains for {tried}: {SIZE} stands against the decay. {advice}"
@@ -221,7 +222,9 @@ def _too_strong(problem: ResidualProblem, found: RobustResidualDesign, attenuati
     tried = f"lambda = {attenuation:g}, decay {problem.decay:g} 1/s, alpha = {problem.alpha:g}"
     near = [f"lambda = {found.attenuation:.4g} at this decay and alpha"]
     near.append(
-        "no decay at this lambda and alpha" if decay is None else f"decay {decay:.3g} 1/s at this lambda and alpha"
+        f"no decay down to {SLOWEST * problem.decay:.3g} 1/s at this lambda and alpha"
+        if decay is None
+        else f"decay {decay:.3g} 1/s at this lambda and alpha"
     )
     near.append(
         "no alpha at this lambda and decay" if alpha == inf else f"alpha = {alpha:.4g} at this lambda and decay"

@@ -188,7 +188,7 @@ def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains) ->
 
 def largest_eta(model: str | TakagiSugenoModel, gap: float, most: float, **options: Any) -> float | None:
     """Largest decay eta up to `most` [1/s] for which the error can be proven to fall at this gap, by bisection; None if
-    none is.
+    none is, down to a thousandth of it.
 
     Args:
         model: a model or the name of one. gap: longest gap [s]. options: gains, mu, disturbance, scaling, two_vertex of
@@ -201,7 +201,7 @@ def largest_eta(model: str | TakagiSugenoModel, gap: float, most: float, **optio
 
 def largest_gap(model: str | TakagiSugenoModel, eta: float, most: float, **options: Any) -> float | None:
     """Longest gap up to `most` [s] for which the error can be proven to fall with this eta, by bisection; None if none
-    is.
+    is, down to a thousandth of it.
 
     Args:
         model: a model or the name of one. eta: decay [1/s]. options: as of `largest_eta`.
@@ -260,7 +260,7 @@ def _infeasible(
     if eta == problem.eta:
         advice = "The decay alone is feasible: give other coordinates by `scaling`, or ask with performance=False."
     else:
-        near_eta = "no eta at this gap" if eta is None else f"eta = {eta:.3g} 1/s at this gap"
-        near_gap = "no gap at this eta" if gap is None else f"gaps up to {gap:.3g} s at this eta"
-        advice = f"Nearest found feasible: {near_eta}; {near_gap}."
+        near_eta = f"no eta down to {SMALLEST * problem.eta:.3g} 1/s" if eta is None else f"eta = {eta:.3g} 1/s"
+        near_gap = f"no gap down to {SMALLEST * problem.gap:.3g} s" if gap is None else f"gaps up to {gap:.3g} s"
+        advice = f"Nearest found feasible: {near_eta} at this gap; {near_gap} at this eta."
     return InfeasibleDesign(f"Theorem 7 has no solution for {model.name} with {', '.join(tried)}. {advice}", eta, gap)

@@ -17,7 +17,13 @@ from fmu_observer.design.adaptive_bounds import adaptive_bounds, gain_bound, set
 from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
 from fmu_observer.models.model import stacked
-from fmu_observer.observers.adaptive_certificate import HORIZON, LEFT, adaptation_limit, errors_left
+from fmu_observer.observers.adaptive_certificate import (
+    HORIZON,
+    LEFT,
+    adaptation_limit,
+    errors_left,
+    shortest_tried,
+)
 from fmu_observer.observers.adaptive_law import (
     Adaptation,
     Gains,
@@ -282,6 +288,7 @@ class AdaptiveObserver(GatedObserver, GapCertified):
                 else (),
                 exact=adapted if known == LONGEST_PERIOD else min(adapted, known),
                 looked=LONGEST_PERIOD,
+                tried=shortest_tried(known),
                 exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
                 f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",
                 trial=trial,

@@ -31,10 +31,11 @@ def test_no_limit_is_the_end_of_a_search(name: str) -> None:
     rows = limit_rows(observer.limits(), simulate=False)
     for row in rows:
         assert row.exact is not None
-        assert row.exact == inf or row.exact < row.looked
+        assert row.exact == inf or row.exact < row.looked[1]
         shown = limit_text(name, [row]).splitlines()[3]
         if row.exact == inf:
-            assert ("> " in shown) == (row.looked < inf), shown
+            assert ("> " in shown) == (row.looked[1] < inf), shown
+        assert (row.exact == 0.0 < row.looked[0]) == ("< " in shown), shown
     certificate = observer.certify(0.1)
     assert certificate.certified_up_to <= certificate.horizon
     assert certificate.aperiodic_limit == inf or certificate.aperiodic_limit < certificate.horizon
@@ -90,8 +91,9 @@ def test_runs_go_on_beyond_the_range() -> None:
     assert reach(trial(**told, high=0.4))[1] == 0.4  # delays: the memory ends there
     never = trial(**told, low=3.0, high=9.0, stop=20.0, settings={"gain": 400.0})
     assert practical_limit(never, 4) == 0.0
-    row = LimitRow("delay", "s", (), None, "", inf, 0.0, reach(never))
+    row = LimitRow("delay", "s", (), None, "", (0.0, inf), 0.0, reach(never))
     assert "< 0.0938 s" in limit_text("nobody", [row])
+    assert "< 0.02 s" in limit_text("nobody", [replace(row, exact=0.0, looked=(0.02, 9.0), searched=())])
     assert "> 9 s" in limit_text("nobody", [replace(row, practical=inf)])
 
 
@@ -99,7 +101,9 @@ def test_runs_go_on_beyond_the_range() -> None:
 def test_the_period_of_an_adaptation(keeps_to: float, found: float) -> None:
     limit = _longest_kept(lambda period: period <= keeps_to, 1.0)
     assert limit == found or found / 1.07 < limit <= found  # the last bisection is 6 % wide
-    assert _longest_kept(lambda _: True, SHORTEST) == 0.0
+    assert _longest_kept(lambda _: True, SHORTEST) == inf  # also where others end the search so early
+    assert _longest_kept(lambda period: period <= 0.7 * SHORTEST, SHORTEST) > 0.6 * SHORTEST
+    assert _longest_kept(lambda _: True, 0.0) == 0.0
 
 
 def test_the_adaptation_counts_in_the_exact_limit() -> None:
