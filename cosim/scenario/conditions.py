@@ -14,6 +14,8 @@ from cosim.scenario.tables import ComponentTable
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
 
+PRINTED = 0.01  # of a bound, by which its three digits in a text may be off
+
 
 def check_conditions(components: Mapping[str, ComponentTable], mode: str, where: str) -> list[str]:
     """What speaks against the observers that state a condition; those with a certificate are judged by that instead.
@@ -66,6 +68,35 @@ def deaf_receivers(
                 f"{name}: balises do not act on it, for their gain is 0 with these parameters, and nothing tells its "
                 f"{waits or 'position'}: its position is what its model makes of the start. Take a preset that uses "
                 f"balises, or connect what it waits for."
+            )
+    return doubts
+
+
+def left_working_points(components: Mapping[str, ComponentTable], links: Sequence[Link], where: str) -> list[str]:
+    """What components say against the values that they are given, and readings with more noise than is told of them.
+
+    Args:
+        components: tables of all components by name. links: all connections. where: name of the scenario, for
+            messages.
+    """
+    systems: dict[str, Any] = {name: make_system(table, where) for name, table in components.items()}
+    doubts = [
+        f"{name}: {doubt}"
+        for name, system in systems.items()
+        if hasattr(system, "working_point")
+        for doubt in system.working_point(values_in_use(components[name], system))
+    ]
+    for source, target, *_ in links:
+        (sensor, output), (name, read) = source.split(".", 1), target.split(".", 1)
+        told = getattr(systems.get(name), "told_bounds", {}).get(read)
+        if told is None or not hasattr(systems.get(sensor), "reading_bound"):
+            continue
+        arrives = systems[sensor].reading_bound(output, values_in_use(components[sensor], systems[sensor]))
+        believed = getattr(values_in_use(components[name], systems[name]), told)
+        if arrives > believed * (1.0 + PRINTED):
+            doubts.append(
+                f"{name}: noise and teeth move readings of {source} by up to {float(arrives):.3g} m/s, and {told} is "
+                f"{float(believed):.3g} m/s: noise is taken for faults. Set {name}.{told} to the former."
             )
     return doubts
 

@@ -42,7 +42,7 @@ from cosim.scenario.after_run import missed_samples, warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.balise_summary import all_telegrams, balise_summary
 from cosim.scenario.certificates import check_certificates
-from cosim.scenario.conditions import check_conditions, deaf_receivers, other_plants
+from cosim.scenario.conditions import check_conditions, deaf_receivers, left_working_points, other_plants
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.coupling_warnings import (
     coupling_warnings,
@@ -370,6 +370,7 @@ class _Setup:
             )
         others = deaf_receivers(table.components, receivers, links, self.where)
         others += other_plants(table.components, self.where)
+        others += left_working_points(table.components, links, self.where)
         for warning in (*of_gaps, *check_conditions(table.components, table.certificates, self.where), *others):
             self._warn(warning)
 

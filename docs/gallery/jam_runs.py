@@ -13,11 +13,14 @@ import numpy as np
 
 import fmus
 from fmu_observer.observers.train import QuasiLpvUio
+from plant_models.railway.sensors.pulses import pulse_length, reading_bound
 
 PERIOD = 0.2  # [s], between two readings
 STEP = 0.02  # [s], of the trains
 GRACE = 0.5  # [s]: as `cosim.evaluation.fault_detection.GRACE`
 ROOM = 2.0  # [s]
+WHEEL_RADIUS = 0.46  # [m]
+LARGEST = 2.0  # [m/s2]: trains on set D brake at up to 1.54
 STANDING = 0.5  # [m/s]: below, nothing is judged
 OUTPUTS = ("speed", "position", "odometer_fault", "recovering", "residual", "disturbance")
 
@@ -135,6 +138,13 @@ def readings(run: Trains, jams: Jams | None, noise: float, rng: np.random.Genera
     return np.maximum(read + noise * moving * rng.standard_normal(read.shape), 0.0)
 
 
+def counted(read: np.ndarray, teeth: float) -> np.ndarray:
+    """Readings of a wheel with so many teeth: whole pulses of what is read, shape (members, samples)."""
+    step = float(pulse_length(teeth, WHEEL_RADIUS)) / PERIOD  # [m/s], of one pulse in a period
+    count = np.floor(np.cumsum(read, axis=1) / step)
+    return np.concatenate([read[:, :1], np.diff(count, axis=1) * step], axis=1)
+
+
 def balises(run: Trains, spacing: float = 200.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Member, stamp [s] and place [m] of every passing."""
     found = []
@@ -154,18 +164,24 @@ def observe(
     aggregated: bool = True,
     with_balises: bool = True,
     effort: np.ndarray | None = None,
+    noise: float | None = None,
+    teeth: float = 0.0,
     **values: Any,
 ) -> dict[str, np.ndarray]:
     """Outputs of the observer at the readings, each of shape (members, samples).
 
-    With the printed rules the reading is held, and rule 4 is off; with the repaired ones the innovation is held, and
-    the age of an aggregated reading made up for.
+    With the printed rules the reading is held, and rule 4 is off; with the repaired ones the innovation is held, the
+    age of an aggregated reading made up for. With `noise` [m/s] the observer is told what that and `teeth` of the
+    odometer can do, and how hard these trains brake.
     """
     repaired = rules == "repaired"
     observer = QuasiLpvUio(rules=rules, hold="innovation" if repaired else "reading")  # type: ignore[arg-type]
     batch = fmus.Batch(observer, len(read), case.preset)
     chosen = {"threshold": case.threshold, "estimated_speed": case.speed}
     chosen |= {"reading_age": 0.5 * PERIOD * aggregated} if repaired else {"rule_4": 0.0}
+    if noise is not None and repaired:
+        bound = float(reading_bound(noise, teeth, WHEEL_RADIUS, PERIOD))
+        chosen |= {"odometer_noise": bound, "acceleration_limit": LARGEST}
     for name, value in (chosen | values).items():
         batch.set(name, value)
     if with_balises:

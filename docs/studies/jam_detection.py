@@ -27,6 +27,7 @@ from jam_runs import (
     Jams,
     Verdicts,
     at_samples,
+    counted,
     observe,
     odometer_error,
     random_jams,
@@ -39,6 +40,9 @@ from jam_runs import (
 from cosim.drawing.style import RC
 from cosim.evaluation.fault_detection import clopper_pearson, garwood
 from cosim.evaluation.numbers import number
+from fmu_observer.detection.jam_rules import certain_fault, doubt_limit
+from fmu_observer.observers.train import QuasiLpvUio
+from plant_models.railway.sensors.pulses import reading_bound
 
 LENGTHS = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 2.0, 3.0, 5.0)  # [s]
 DEPTHS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -59,7 +63,7 @@ def one(
     jams = random_jams(rng, members, CASES[case], jam.get("lengths", LENGTHS), jam.get("depths", DEPTHS))
     jams = replace(jams, depth=SIGNS[fault] * jams.depth)
     read = readings(run, jams, noise, rng, True)
-    found = observe(CASES[case], run, read, rules, with_balises=CASES[case].speed > 20.0)
+    found = observe(CASES[case], run, read, rules, with_balises=CASES[case].speed > 20.0, noise=noise)
     return jams, verdicts(run, jams, found["odometer_fault"])
 
 
@@ -86,6 +90,29 @@ def rates_table(members: int = 500) -> str:
     return "\n".join(lines)
 
 
+def sizes_table(members: int = 1000) -> str:
+    """Faults by the largest error of a reading that they make, beside the sizes that the rules can tell from noise."""
+    head = "| case | noise [m/s] | one in two from [m/s] | all from [m/s] | found of smaller ones [%] | between [%] | "
+    lines = [head + "of larger ones [%] |", "|---|---|---|---|---|---|---|"]
+    observer = QuasiLpvUio()
+    for name, noise in product(CASES, NOISES):
+        case, rng = CASES[name], np.random.default_rng(SEED)
+        p = observer.unpack_parameters(observer.start_parameters(case.preset))
+        p = p._replace(threshold=case.threshold, odometer_noise=float(reading_bound(noise, 0.0, 1.0, PERIOD)))
+        half, sure = float(doubt_limit(p) / p.residual_gain), float(certain_fault(p))
+        run, sizes, found = trains(case, members, rng), [], []
+        for fault in SIGNS:
+            jams, v = one(name, "repaired", members, noise, fault)
+            error = readings(run, jams, 0.0, rng, True) - readings(run, None, 0.0, rng, True)
+            sizes.append(np.abs(error).max(axis=1))
+            found.append(v.found)
+        size, was = np.concatenate(sizes), np.concatenate(found)
+        parts = (size <= half, (size > half) & (size <= sure), size > sure)
+        shares = [f"{100.0 * was[part].mean():.1f}" if part.any() else "-" for part in parts]
+        lines.append(f"| {name} | {noise:g} | {half:.3f} | {sure:.3f} | " + " | ".join(shares) + " |")
+    return "\n".join(lines)
+
+
 def stops_table(members: int = 200) -> str:
     """Station stops of 40 s and 5 min: one fault a member of either sign, before or after the stop or in the cruise."""
     head = "| stop [s] | teeth | noise [m/s] | fault | missed of all faults [%] | false alarms per hour, 95 % | "
@@ -102,10 +129,9 @@ def _stop(stand: float, teeth: int, noise: float, sign: float, members: int) -> 
     first = np.where(rng.random(members) < 0.5, rng.uniform(*moving[0], members), rng.uniform(*moving[1], members))
     faults = Jams(first, rng.choice(LENGTHS[:-1], members), sign * rng.choice(DEPTHS, members))
     read = readings(run, faults, noise, rng, True)
-    step = 2.0 * np.pi * 0.46 / (teeth * PERIOD)  # [m/s], of one pulse in a period
-    count = np.floor(np.cumsum(read, axis=1) / step)
-    read = np.concatenate([read[:, :1], np.diff(count, axis=1) * step], axis=1)
-    told = observe(CASES["3.3.4"]._replace(speed=20.0), run, read, effort=effort, with_balises=False)
+    read = counted(read, teeth)
+    case, sensor = CASES["3.3.4"]._replace(speed=20.0), {"noise": noise, "teeth": teeth}
+    told = observe(case, run, read, effort=effort, with_balises=False, **sensor)
     v = verdicts(run, faults, told["odometer_fault"], standing=True)
     missed, false, hours = int((~v.found).sum()), int(v.false.sum()), float(v.moving.sum()) / 3600.0
     share, few = clopper_pearson(missed, members), garwood(false, hours)
@@ -143,7 +169,7 @@ def stuck_table(members: int = 100) -> str:
             run = trains(case, members, rng)
             jams = Jams(*(np.full(members, value) for value in (16.0, 1e3, depth)))
             read = readings(run, jams, NOISE, rng, True)
-            found = observe(case, run, read, with_balises=with_balises)
+            found = observe(case, run, read, with_balises=with_balises, noise=NOISE)
             t, every = PERIOD * np.arange(read.shape[1]), round(PERIOD / STEP)
             window = (t > 17.0) & (run.v[:, ::every].min(axis=0) > 1.0)
             error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
@@ -171,7 +197,7 @@ def micro_table(members: int = 200) -> str:
         t, every = PERIOD * np.arange(read.shape[1]), round(PERIOD / STEP)
         growing = np.clip((t - 10.0) / 10.0, 0.0, 1.0)  # more and more of them: no edge to be seen
         read = read * (1.0 - share * growing)
-        found = observe(case, run, read)
+        found = observe(case, run, read, noise=NOISE)
         window = (t > 20.0) & (run.v[:, ::every].min(axis=0) > 1.0)
         error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
         told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
@@ -211,6 +237,7 @@ def main() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name, table in (
         ("rates", rates_table()),
+        ("sizes", sizes_table()),
         ("stops", stops_table()),
         ("found", found),
         ("stuck", stuck_table()),

@@ -13,6 +13,7 @@ import numpy as np
 
 from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import matrix_powers
+from fmu_observer.detection.jam_rules import doubt_limit, settled_limit
 
 NEGLIGIBLE, LONGEST = 1e-9, 5000  # of what is left of an error; periods until then at most
 
@@ -22,12 +23,12 @@ class RecoveryBounds:
     """What is proven of `RepairedRules` on a wheel that rolls for good.
 
     Attributes:
-        agrees: whether agreement is guaranteed: the error at the onset and the noise are within eps / M.
+        agrees: whether agreement is guaranteed: the error at the onset and the noise are within eps' / M.
         agreement: from the instant at which the wheel rolls to the sample that believes it [s], where `agrees`, and the
             model's error grows by the disturbance bound at most, and the hold limit is not reached before.
-        settles: whether the residual of a followed odometer stays below eps / 2 from `settle_time` on, until the next
-            stop.
-        settle_time: from a restart, or a departure, to a residual below eps / 2 until the next stop [s]; infinite where
+        settles: whether the residual of a followed odometer stays small (`settled_limit`) from `settle_time` on, until
+            the next stop.
+        settle_time: from a restart, or a departure, to a small residual until the next stop [s]; infinite where
             it does not settle.
         any_state: from the instant at which the wheel rolls to trust for good, from whatever state and memory [s].
         steady_residual: bound of the residual of a settled estimate [m/s].
@@ -92,7 +93,7 @@ def recovery_bounds(
     Returns:
         The bounds.
     """
-    period, noise, theta = float(p.odometer_period), float(p.odometer_noise), float(p.threshold / p.residual_gain)
+    period, noise, theta = float(p.odometer_period), float(p.odometer_noise), float(doubt_limit(p) / p.residual_gain)
     samples, late = float(p.recover_samples), period if aggregated else 0.0
     error = _over_a_period(drifts, gains, period)
     corners = np.array([noise, disturbance_error, rate_error])
@@ -111,11 +112,23 @@ def recovery_bounds(
     )
 
 
+def estimate_noise(drifts: np.ndarray, gains: np.ndarray, p: Any) -> float:
+    """Deviation of a settled estimate before a reading over that of a reading, at the middle of the vertices [1];
+    infinite where the gains are unstable at the period. Noise of one reading is independent of that of the others.
+
+    Args:
+        drifts, gains, p: as in `recovery_bounds`.
+    """
+    error = _over_a_period(drifts, gains, float(p.odometer_period))
+    radius = float(np.abs(np.linalg.eigvals(error.middle)).max())
+    return inf if radius >= 1.0 else float(np.sqrt(np.sum((_powers(error.middle, radius) @ error.noise)[:, 0] ** 2)))
+
+
 def _settling(error: _PeriodError, p: Any, corners: np.ndarray, curvature: float) -> tuple[float, float, float]:
     """Bound of the steady speed error [m/s], time until the residual of any start within the corners is small from then
     on [s], and the spectral radius at the middle of the vertices.
     """
-    period, noise, half = float(p.odometer_period), float(p.odometer_noise), 0.5 * float(p.threshold / p.residual_gain)
+    period, noise, small = float(p.odometer_period), float(p.odometer_noise), float(settled_limit(p) / p.residual_gain)
     radius = float(np.abs(np.linalg.eigvals(error.middle)).max())
     if radius >= 1.0:
         return inf, inf, radius
@@ -134,9 +147,9 @@ def _settling(error: _PeriodError, p: Any, corners: np.ndarray, curvature: float
     steady = noise + float((closed @ driven)[0])
     left = _decay(powers, error.spread, corners)
     tail = float((closed @ np.abs(powers).max(axis=0) @ left[-1])[0])  # of all that comes after the last period
-    if steady + tail >= half:
+    if steady + tail >= small:
         return steady, inf, radius
-    above = np.flatnonzero(left[:, 0] > half - steady)
+    above = np.flatnonzero(left[:, 0] > small - steady)
     return steady, period * (int(above[-1]) + 1 if above.size else 0), radius
 
 

@@ -7,11 +7,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Reading, RepairedRules, Rules
+from fmu_observer.detection.jam_rules import (
+    SHARED_PARAMETERS,
+    Reading,
+    RepairedRules,
+    Rules,
+    certain_fault,
+    doubt_limit,
+)
 from fmu_observer.detection.printed_jam_rules import PrintedRules
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, vector
 from plant_models.hybrid.system import Array
 
+NOISE = "odometer_noise"
 RuleChoice = Literal["repaired", "printed"]
 RULES: Mapping[str, Rules] = {"repaired": RepairedRules(), "printed": PrintedRules()}
 FAULT_OUTPUTS = (
@@ -50,6 +58,32 @@ def verdict(rules: Rules, memory: tuple[Array, ...], p: Any) -> dict[str, Array]
         "recovering": rules.recovering(memory),
         "residual_limit": rules.limit(memory, p),
     }
+
+
+def told_bounds(rules: Rules) -> dict[str, str]:
+    """The parameter that bounds the noise of an input, by its name; the printed rules are told nothing of noise.
+
+    Args:
+        rules: that judge.
+    """
+    return {"odometer": NOISE} if any(s.name == NOISE for s in rules.parameters) else {}
+
+
+def noise_doubts(p: Any) -> list[str]:
+    """What a user should read before a run where faults are judged by noise and not by the threshold, in words.
+
+    Args:
+        p: parameters of a system with the rules.
+    """
+    if not hasattr(p, NOISE) or doubt_limit(p) <= p.threshold:
+        return []
+    half, sure = float(doubt_limit(p) / p.residual_gain), float(certain_fault(p))
+    return [
+        f"readings are told to be within {float(p.odometer_noise):.3g} m/s of the speed ({NOISE}), which makes a "
+        f"residual of {float(doubt_limit(p)):.3g} m/s, beyond the threshold of {float(p.threshold):.3g} m/s. The rules "
+        f"take the former, and find a fault that moves a reading by {half:.3g} m/s in one of two cases, by "
+        f"{sure:.3g} m/s always; smaller ones are noise to them. A longer period or more teeth make less noise."
+    ]
 
 
 class JamDetector(HybridSystem):
@@ -95,7 +129,16 @@ class JamDetector(HybridSystem):
         self.rules = find_rules(self.name, rules)
         self.states = self.rules.memory
         self.parameters = (*SHARED_PARAMETERS, *self.rules.parameters)
+        self.told_bounds = told_bounds(self.rules)
         super().__init__(rules=rules)
+
+    def working_point(self, p: Any) -> list[str]:
+        """Which faults cannot be told from the noise of a reading, in words; nothing where the threshold is beyond it.
+
+        Args:
+            p: parameters, as in `HybridSystem.flow`.
+        """
+        return noise_doubts(p)
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A sample is judged."""

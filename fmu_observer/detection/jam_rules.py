@@ -166,7 +166,7 @@ class RepairedRules:
     While the odometer is *held* to lie (mode 1) the model runs alone and its error grows by `disturbance_bound` at
     most. The odometer is believed again, and the speed set to it,
 
-    1. where ``|r| <= eps + M delta T`` at `recover_samples` samples in a row, T the time held, and the wheel rolled
+    1. where ``|r| <= eps' + M delta T`` at `recover_samples` samples in a row, T the time held, and the wheel rolled
        between them: ``|y_k - y_{k-1}| <= a_max period + 2 noise``;
     2. where, from one balise to the next, the way of the odometer is the distance.
 
@@ -177,7 +177,7 @@ class RepairedRules:
     In two cases the estimate may be what is wrong. Then the limit is `release_time` and a period, and what the position
     has missed meanwhile is made up for (`Judgement.withdrawn`):
 
-    a. against the sign of the effort: a braked wheel has been faster than the estimate by more than eps / M, or a
+    a. against the sign of the effort: a braked wheel has been faster than the estimate by more than eps' / M, or a
        driven one slower, at all samples of that time, rolling between them. Jams and skids of that sign are short; what
        lasts is the end of a fault that was too small, or grew too slowly, to be seen. A wheel that locked while braking
        may still be slow when it is driven: for `release_time` after the sign of the effort has changed it counts as one
@@ -188,9 +188,11 @@ class RepairedRules:
        of a fault that was there from the first turn of the wheel on. A quarter of the time for which it has rolled is
        the limit where that is longer.
 
-    A fault begins where ``|r| > eps``, of either sign, in time to keep the very sample out; or where balises refute the
-    way of an odometer that was believed twice in a row. None is judged before `arming_delay` has passed and the
-    residual has been below eps / 2 for `settle_samples` (until then an odometer that is not proven is followed at once
+    A fault begins where ``|r| > eps'``, of either sign, in time to keep the very sample out; or where balises refute
+    the way of an odometer that was believed twice in a row. eps' is eps, or what the noise that is told of the odometer
+    makes of a residual, ``sqrt(2) M nu``, where that is more (`doubt_limit`); a residual is small that is below eps / 2
+    or explained by noise (`settled_limit`). None is judged before `arming_delay` has passed and the residual has been
+    small for `settle_samples` (until then an odometer that is not proven is followed at once
     where it jumps), nor after `fault_limit` faults between which it was not, nor below `least_speed`.
 
     Source: the three states of Aguiar Cota 2019, Algorithm 3-3; the rules are ours.
@@ -214,7 +216,7 @@ class RepairedRules:
         parameter(
             "disturbance_bound", "m/s2", 0.1, "Growth of the speed error while the model runs alone, delta", min=0.0
         ),
-        parameter("odometer_noise", "m/s", 0.15, "Bound of the odometer's noise and quantisation", min=0.0),
+        parameter("odometer_noise", "m/s", 0.15, "Bound of the odometer's noise and quantisation, nu", min=0.0),
         parameter("acceleration_limit", "m/s2", 1.5, "Largest acceleration of a train whose wheels roll", min=0.0),
         parameter("recover_samples", "1", 2.0, "Samples in a row that agree before the odometer is believed", min=1.0),
         parameter("hold_limit", "s", 15.0, "Longest time for which the model runs alone", min=0.0),
@@ -239,13 +241,13 @@ class RepairedRules:
         rolls = _is(np.abs(told.odometer - m.last_odometer) <= rolling_limit(p)) * _is(m.samples > 0.0)
         held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
         size = np.abs(told.residual)
-        small = _is(size <= 0.5 * p.threshold)
+        small = _is(size <= settled_limit(p))
         sign = _is(told.effort > 0.0) - _is(told.effort < 0.0)
         effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
         # Of a period in which the sign changes a part is unknown, and a reading tells of the period before it.
         brief = p.release_time + p.odometer_period
         lasting = sign * _is(np.abs(effort_time) + ROUNDING >= brief)
-        large = _is(size > p.threshold)
+        large = _is(size > doubt_limit(p))
         against = large * _against(told, lasting, p) * (1.0 + rolls * m.against)
         # followed: when are faults judged, and does one begin
         settled = np.where(held > 0.0, 0.0, np.where(small > 0.0, m.settled + 1.0, 0.0))
@@ -301,7 +303,7 @@ class RepairedRules:
         rolled = np.where(m.proven_time >= p.trust_time, p.trust_time, small * (m.proven_time + p.odometer_period))
         stands = _is(np.maximum(np.abs(told.speed), np.abs(told.odometer)) <= p.odometer_noise)
         later = np.where(doubted > 0.0, m.proven_time, _is(m.mode == TRUSTED) * rolled)
-        first = _is(np.abs(told.residual) <= p.threshold) * p.trust_time
+        first = _is(np.abs(told.residual) <= doubt_limit(p)) * p.trust_time
         return np.where(stands > 0.0, 0.0, np.where(m.samples > 0.0, later, first))
 
     def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
@@ -384,12 +386,55 @@ class RepairedRules:
 
 
 def agreement_limit(hold_time: Array, p: Any) -> Array:
-    """Residual within which a held odometer agrees [m/s]: ``eps + M delta T``.
+    """Residual within which a held odometer agrees [m/s]: ``eps' + M delta T``.
 
     Args:
         hold_time: for which the model has run alone, T [s]. p: parameters.
     """
-    return p.threshold + p.residual_gain * p.disturbance_bound * hold_time
+    return doubt_limit(p) + p.residual_gain * p.disturbance_bound * hold_time
+
+
+def noise_residual(p: Any) -> Array:
+    """Residual that noise and quantisation explain [m/s]: ``M sqrt(2) nu``.
+
+    A reading of a rolling wheel is within nu of the speed, and so is an estimate that has just been set to one; both
+    are independent, so their difference is ``sqrt(2)`` times as large. What gains make of readings later must be no
+    worse than a reading (`fmu_observer.design.jam_recovery.estimate_noise`).
+
+    Args:
+        p: parameters.
+    """
+    return np.sqrt(2.0) * p.residual_gain * p.odometer_noise
+
+
+def doubt_limit(p: Any) -> Array:
+    """Residual beyond which an odometer is doubted [m/s]: eps, or what noise explains where that is more.
+
+    Args:
+        p: parameters.
+    """
+    return np.maximum(p.threshold, noise_residual(p))
+
+
+def settled_limit(p: Any) -> Array:
+    """Residual of an estimate that has settled, at most [m/s]: eps / 2, or what noise explains where that is more.
+
+    It is asked of all samples of a time, up to `trust_time`, so that noise must not be beyond it.
+
+    Args:
+        p: parameters.
+    """
+    return np.maximum(0.5 * p.threshold, noise_residual(p))
+
+
+def certain_fault(p: Any) -> Array:
+    """Error of a reading beyond which it is doubted whatever its noise, where the estimate is right [m/s]:
+    ``eps' / M + nu``. At ``eps' / M`` one in two is.
+
+    Args:
+        p: parameters.
+    """
+    return doubt_limit(p) / p.residual_gain + p.odometer_noise
 
 
 def rolling_limit(p: Any) -> Array:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from jam_members import PERIOD, Members
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_discrete_lyapunov
 
-from fmu_observer.design.jam_recovery import held_position_error, held_speed_error, recovery_bounds
+from fmu_observer.design.jam_recovery import estimate_noise, held_position_error, held_speed_error, recovery_bounds
 from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1
 from fmu_observer.detection.jam_detector import RULES, JamDetector
 from fmu_observer.detection.jam_rules import (
@@ -24,6 +24,7 @@ from fmu_observer.detection.jam_rules import (
     RepairedRules,
     RuleMemory,
     agreement_limit,
+    certain_fault,
 )
 from fmu_observer.detection.printed_jam_rules import PrintedMemory, PrintedRules
 from fmu_observer.observers.train import QuasiLpvUio
@@ -242,6 +243,80 @@ def test_a_hold_ends_at_its_limit_and_is_not_called_healthy() -> None:
     assert memory.mode == UNCONFIRMED
     memory = RuleMemory(*repaired(memory, 5.0, 5.0).memory)  # 100 samples are the 20 s of trust_time
     assert (memory.mode, memory.faults) == (TRUSTED, 0.0)
+
+
+# -- noise
+# ----------------------------------------------------------------------------------------------------------
+
+DESIGNS = {"as_published": SECTION_3_3_4, "as_published_5_3_1": SECTION_5_3_1}
+
+
+@pytest.mark.parametrize("preset", DESIGNS)
+@pytest.mark.parametrize("deviation", [0.05, 0.1])
+def test_noise_that_is_told_is_not_taken_for_faults(preset: str, deviation: float) -> None:
+    """Wheels that roll, with the noise that is told: at most what is beyond four deviations, 1.1 an hour of samples.
+
+    2.2 hours: the chance of more than 9 is 4e-4 at that rate (Poisson). The thresholds of the print alone have 40 and
+    2767 in the design of chapter 5, 29 in that of section 3.3.4 at 0.1 m/s.
+    """
+    members, count, rng = 100, 400, np.random.default_rng(2)
+    run = Members(members, -0.68, preset, **{**NO_DRAG, "odometer_noise": 4.0 * deviation})
+    v = wheel(rng, members, count * PERIOD)
+    run.x[1], run.x[2], run.x[7] = v[0], 0.12, 0.12
+    onsets, mode = 0, np.full(members, TRUSTED)
+    for k in range(count):
+        run.sample(v[k] + deviation * rng.standard_normal(members))
+        onsets += int(((run.rule("mode") == HELD) & (mode != HELD)).sum())
+        mode = run.rule("mode").copy()
+    assert onsets <= 9
+    assert (run.rule("faults") == 0.0).all()  # all were armed
+
+
+def test_noise_that_is_told_does_not_keep_an_odometer_from_being_proven() -> None:
+    """20 s without a residual that noise does not explain; below eps / 2, 1.6 deviations, there are none such."""
+    members, rng, deviation = 100, np.random.default_rng(3), 0.05
+    run = Members(members, -0.68, "as_published_5_3_1", **{**NO_DRAG, "odometer_noise": 4.0 * deviation})
+    run.set_rules(mode=UNCONFIRMED, faults=1000.0, samples=99.0)
+    v = wheel(rng, members, 40.0)
+    run.x[1], run.x[2], run.x[7] = v[0], 0.12, 0.12
+    for k in range(len(v)):
+        run.sample(v[k] + deviation * rng.standard_normal(members))
+    assert (run.rule("mode") == TRUSTED).all()
+    assert (run.rule("proven_time") >= run.p.trust_time - 1e-9).all()
+
+
+@pytest.mark.parametrize("threshold", [0.4, 0.9])
+@pytest.mark.parametrize("noise", [0.0, 0.08, 0.15, 0.4])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_fault_that_is_larger_than_noise_hides_is_seen_at_its_first_sample(
+    threshold: float, noise: float, sign: float
+) -> None:
+    p = SimpleNamespace(**{**vars(P), "threshold": threshold, "odometer_noise": noise})
+    for nu in np.linspace(-noise, noise, 9):
+        judged = repaired(ARMED, 20.0 + sign * (certain_fault(p) + 1e-9) + nu, 20.0, p=p)
+        assert RuleMemory(*judged.memory).mode == HELD
+        assert RuleMemory(*repaired(ARMED, 20.0 + nu, 20.0, p=p).memory).mode == TRUSTED
+    # At an estimate that was just set to a reading: independent noise of both.
+    both = np.sqrt(2.0) * noise
+    assert RuleMemory(*repaired(ARMED, 20.0 + sign * both * (1.0 - 1e-9), 20.0, p=p).memory).mode == TRUSTED
+
+
+@pytest.mark.parametrize("preset", DESIGNS)
+def test_the_noise_of_an_estimate_is_that_of_the_stationary_covariance(preset: str) -> None:
+    """SciPy's exponential and Lyapunov equation; the printed gains make less noise than a reading has."""
+    observer = QuasiLpvUio()
+    p = observer.unpack_parameters(observer.start_parameters(preset))
+    drifts, gains = speed_errors(p)
+    F, G = [], []
+    for A, K in zip(drifts, gains, strict=True):
+        flown = expm(np.block([[A, K], [np.zeros((1, 4))]]) * PERIOD)
+        F.append(flown[:3, :3] - np.outer(flown[:3, 3], [1.0, 0.0, 0.0]))
+        G.append(flown[:3, 3])
+    P = solve_discrete_lyapunov(0.5 * (F[0] + F[1]), np.outer(0.5 * (G[0] + G[1]), 0.5 * (G[0] + G[1])))
+    noise = estimate_noise(drifts, gains, p)
+    assert noise == pytest.approx(np.sqrt(P[0, 0]), rel=1e-3)  # products of mean and mean of products
+    assert 0.5 < noise < 0.7
+    assert estimate_noise(drifts, -gains, p) == np.inf
 
 
 # -- repaired, at balises

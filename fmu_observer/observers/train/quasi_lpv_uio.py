@@ -12,6 +12,7 @@ import numpy as np
 from fmu_observer.certificates import Certificate, ImpulsiveError, first_unstable_gap
 from fmu_observer.certificates.periodic import PeriodicStability, periodic_stability
 from fmu_observer.certificates.polytope import polytope_stability
+from fmu_observer.design.jam_recovery import estimate_noise
 from fmu_observer.design.quasi_lpv_published import (
     SECTION_3_3_4,
     SECTION_5_3_1,
@@ -19,7 +20,16 @@ from fmu_observer.design.quasi_lpv_published import (
     QuasiLpvDesign,
     quasi_lpv_vertices,
 )
-from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, RULES, RuleChoice, find_rules, verdict
+from fmu_observer.detection.jam_detector import (
+    FAULT_OUTPUTS,
+    ODOMETER_SAMPLE,
+    RULES,
+    RuleChoice,
+    find_rules,
+    noise_doubts,
+    told_bounds,
+    verdict,
+)
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -135,6 +145,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def __init__(self, rules: RuleChoice = "repaired", hold: HoldChoice = "innovation") -> None:
         self.rules = find_rules(self.name, rules)
+        self.told_bounds = told_bounds(self.rules)
         if hold not in HOLDS:
             raise ValueError(f"{self.name}: unknown hold {hold!r}; use 'innovation' or 'reading'.")
         self.hold = hold
@@ -249,6 +260,16 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             notes=(note,),
             lyapunov_matrix=tuple(tuple(map(float, row)) for row in P),
         )
+
+    def working_point(self, p: Any) -> list[str]:
+        """What to know of noise before a run, in words: faults that cannot be told from it, gains that make more of it.
+
+        Args:
+            p: parameters, as in `HybridSystem.flow`.
+        """
+        noise = estimate_noise(*speed_errors(p), p)
+        noisy = f"its gains make the estimate {noise:.3g} times as noisy as a reading; its rules take 1 for the most."
+        return [*noise_doubts(p), *([noisy] if noise > 1.0 else [])]
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """Gains, vertices and coefficients."""

@@ -20,7 +20,7 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.system import Array
-from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window
+from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 from plant_models.railway.sensors.sampling import sampling_event
 
 
@@ -85,6 +85,15 @@ class Odometer(HybridSystem):
         window = pulses_in_window(count, x[2], x[3], u.wheel_speed, p.sample_period, pulse)
         speed = np.where(p.teeth > 0.0, window * pulse / p.sample_period, u.wheel_speed)
         return vector(x[0], speed + p.noise_std * u.reading_noise, count, 1.0)
+
+    def reading_bound(self, output: str, p: Any) -> Array:
+        """How far a reading is from the wheel's speed at most, see `pulses.reading_bound` [m/s].
+
+        Args:
+            output: its name; the distance has no such bound. p: parameters, as in `HybridSystem.flow`.
+        """
+        bound = reading_bound(p.noise_std, p.teeth, p.wheel_radius, p.sample_period)
+        return np.where(output == "reading", bound, 0.0)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The held reading and the counted distance."""

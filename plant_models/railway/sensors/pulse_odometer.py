@@ -23,7 +23,7 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
-from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window
+from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 
 CountFrom = Literal["wheel_speed", "wheel_distance"]
 
@@ -120,6 +120,15 @@ class PulseOdometer(HybridSystem):
         window = pulses_in_window(count, last, primed, u.wheel_speed, p.aggregation_period, pulse)
         speed = window * pulse / p.aggregation_period + p.noise_std * u.reading_noise
         return vector(*flowing, speed, sampled, count, count, primed_sample, 1.0)
+
+    def reading_bound(self, output: str, p: Any) -> Array:
+        """How far a reading is from the mean speed of the wheel at most, see `pulses.reading_bound` [m/s].
+
+        Args:
+            output: its name; the distance has no such bound. p: parameters, as in `HybridSystem.flow`.
+        """
+        period = {"reading": p.aggregation_period, "sampled_reading": p.sample_period}.get(output, np.inf)
+        return np.where(output == "distance", 0.0, reading_bound(p.noise_std, p.teeth, p.wheel_radius, period))
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The held readings and the counted distance."""

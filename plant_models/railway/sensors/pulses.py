@@ -9,6 +9,8 @@ import numpy as np
 
 from plant_models.hybrid.system import Array
 
+BOUND = 4.0  # standard deviations of noise that count as its bound
+
 
 def pulse_length(teeth: Array, wheel_radius: Array) -> Array:
     """Rim distance of one pulse [m]; of a whole revolution where there are no teeth, so that nothing divides by zero.
@@ -30,6 +32,22 @@ def counted_pulses(distance: Array, pulse: Array) -> Array:
         distance: of the rim [m]. pulse: length of a pulse [m].
     """
     return np.floor(distance / pulse)
+
+
+def reading_bound(noise_std: Array, teeth: Array, wheel_radius: Array, period: Array) -> Array:
+    """How far a reading is from the mean speed of a wheel over its period, at most [m/s]: noise and whole pulses.
+
+    Of noise alone four standard deviations, which at five readings a second one in an hour exceeds. A count that is
+    short of q at its begin and at its end by any part of it is off by less than q in all, with the variance ``q^2 /
+    6``, q one pulse in a period; both together are within the smaller of the sum and of four deviations.
+
+    Args:
+        noise_std: standard deviation of the noise [m/s]. teeth: pulses in one revolution, 0 for no quantisation.
+            wheel_radius: [m]. period: of a reading [s].
+    """
+    step = np.where(teeth > 0.0, pulse_length(teeth, wheel_radius) / period, 0.0)
+    both = np.sqrt(noise_std * noise_std + step * step / 6.0)
+    return np.minimum(BOUND * noise_std + step, BOUND * both)
 
 
 def pulses_in_window(

@@ -1,0 +1,91 @@
+"""What the jam rules are told of an odometer's noise, beside what it has: told before a run where it matters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import cosim
+from cosim import Scenario
+from cosim.scenario.conditions import left_working_points
+from cosim.scenario.connections import parse_connections
+from fmu_observer import OBSERVERS
+from plant_models import PLANTS
+from plant_models.hybrid import scalar_names
+
+NOISE, SIZE = "move readings of odometer.reading by up to", "smaller ones are noise to them"
+SHIPPED = sorted(path.stem for path in Path(cosim.__file__).parent.joinpath("scenarios").glob("*.toml"))
+JUDGES = sorted(name for name in OBSERVERS if getattr(OBSERVERS[name](), "told_bounds", {}))
+
+
+def warned(name: str, sensor: str, given: dict[str, float], **parameters: float) -> list[str]:
+    scenario = Scenario(stop=0.2, step=0.1, certificates="warn")
+    scenario.add("train", model="longitudinal_train", parameters={"train_speed": 20.0})
+    scenario.add("odometer", model=sensor, parameters=given)
+    scenario.add("observer", observer=name, preset="as_published_5_3_1", parameters=parameters)
+    scenario.connect("train.wheel_speed -> odometer.wheel_speed", "odometer.reading -> observer.odometer")
+    texts: list[str] = []
+    scenario.run(warn=texts.append)
+    return [text for text in texts if NOISE in text or SIZE in text]
+
+
+def test_those_that_judge_an_odometer_are_told_of_its_noise() -> None:
+    assert JUDGES == ["jam_detector", "quasi_lpv_uio"]
+    holders = [n for n in OBSERVERS if "odometer_noise" in scalar_names(OBSERVERS[n]().parameter_signals)]
+    assert sorted(holders) == JUDGES
+
+
+@pytest.mark.parametrize("name", JUDGES)
+@pytest.mark.parametrize(
+    ("sensor", "given", "bound"),
+    [
+        ("odometer", {"sample_period": 0.2, "noise_std": 0.02}, 0.08),
+        ("odometer", {"sample_period": 0.2, "teeth": 100.0, "wheel_radius": 0.46}, 0.14451),
+        ("pulse_odometer", {"teeth": 1000.0, "noise_std": 0.02}, 0.08338),
+    ],
+)
+def test_less_than_arrives_is_told_and_enough_is_not(
+    name: str, sensor: str, given: dict[str, float], bound: float
+) -> None:
+    """Bounds by hand: four deviations; 2 pi 0.46 / (100 . 0.2); four of sqrt(0.02^2 + 0.01445^2 / 6)."""
+    (told,) = warned(name, sensor, given, odometer_noise=0.9 * bound, threshold=9.0)
+    assert NOISE in told
+    assert f"{bound:.3g} m/s, and odometer_noise is" in told
+    assert warned(name, sensor, given, odometer_noise=1.001 * bound, threshold=9.0) == []
+
+
+@pytest.mark.parametrize("name", JUDGES)
+def test_faults_that_are_noise_are_told_by_their_size(name: str) -> None:
+    """eps / M is 0.4 / 3.36; noise of 0.05 m/s makes sqrt(2) 0.2 = 0.283 m/s, 0.483 m/s with that of the reading."""
+    quiet = {"sample_period": 0.2, "noise_std": 0.02}
+    noisy = quiet | {"noise_std": 0.05}
+    assert warned(name, "odometer", quiet, odometer_noise=0.08, threshold=0.4) == []
+    (told,) = warned(name, "odometer", noisy, odometer_noise=0.2, threshold=0.4)
+    assert "by 0.283 m/s in one of two cases, by 0.483 m/s always" in told
+
+
+def test_gains_that_make_more_of_noise_are_told() -> None:
+    loud = {"gain_low": [9.0, -1.34, -0.22], "gain_high": [9.0, -1.33, -0.22]}
+    told = left_working_points(Scenario.load("jam_odometry").table().components, [], "here")
+    assert told == []
+    scenario = Scenario.load("jam_odometry")
+    for key, value in loud.items():
+        scenario.set(f"quasi_lpv_uio.{key}", value)
+    (doubt,) = left_working_points(scenario.table().components, [], "here")
+    assert "times as noisy as a reading" in doubt
+
+
+@pytest.mark.parametrize("scenario", SHIPPED)
+def test_nothing_is_said_of_what_ships(scenario: str) -> None:
+    table = Scenario.load(scenario).table()
+    assert left_working_points(table.components, parse_connections(table.connections, scenario), scenario) == []
+
+
+def test_sensors_have_a_bound_for_each_reading() -> None:
+    for name in ("odometer", "pulse_odometer"):
+        system = PLANTS[name]()
+        p = system.unpack_parameters(system.start_parameters())
+        bounds = {output: float(system.reading_bound(output, p)) for output in scalar_names(system.outputs)}
+        assert bounds["distance"] == 0.0
+        assert ("sampled_reading" not in bounds) or bounds["sampled_reading"] > bounds["reading"] > 0.0
