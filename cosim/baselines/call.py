@@ -13,6 +13,7 @@ from cosim.baselines.subject import Subject, make_subject
 from cosim.baselines.update import Update, plan_update
 from cosim.comparison.tolerance import Tolerances
 from cosim.comparison.verdict import Comparison
+from cosim.errors import BaselineError
 
 WORST = 20
 """Lines told of a difference."""
@@ -80,6 +81,7 @@ class Call:
         Raises:
             BaselineError: it is missing, unreadable or of another model. ComparisonError: nothing can be compared.
         """
+        self._demand_either()
         return check(self._given, read_baseline(self.path), self.tolerances)
 
     def update(self) -> Update:
@@ -89,8 +91,19 @@ class Call:
         )
 
     def without_baseline(self) -> Regression:
-        """The run alone, nothing compared."""
+        """The run alone, nothing compared.
+
+        Raises:
+            BaselineError: the run failed.
+        """
+        self._demand_either()
         return regression(Comparison(self.path.name, "result", ()), self.subject.outcome, self.subject.result, None)
+
+    def _demand_either(self) -> None:
+        """A run that failed without a baseline: a baseline is not what is missing."""
+        failure = self.subject.result.failure
+        if failure is not None and not self.path.exists():
+            raise BaselineError(f"The run failed, and there is no baseline {self.path} yet: {failure}")
 
     @staticmethod
     def worst(found: Comparison) -> list[str]:

@@ -143,7 +143,7 @@ def calibrate(
     except ValueError as error:
         if isinstance(error, CalibrationError):
             raise
-        raise CalibrationError(f"The fit cannot begin: {error}. Give other first guesses.") from error
+        raise CalibrationError(f"The fit cannot begin with these first guesses: {error}") from error
     idle = [name for i, name in enumerate(names) if not np.any(found.jacobian[..., i])]
     if idle:
         signals = ", ".join(recorded.measured)

@@ -8,7 +8,7 @@ import argparse
 import json
 from typing import Any
 
-from cosim.cli.model_info import declared_model
+from cosim.cli.model_info import declared_model, in_own_words
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import CosimError
 from cosim.results.summary_file import jsonable
@@ -60,14 +60,12 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         CosimError: there is no such observer, it has no bounds, or an argument is not legal.
     """
-    bounds = _bounds(options)
-    try:
+    with in_own_words(options.observer, "bound"):
+        bounds = _bounds(options)
         data = bound_data(bounds, options.limit, options.missing)
         text = (
             json.dumps(jsonable(data), indent=2) if options.json else bound_text(bounds, options.limit, options.missing)
         )
-    except ValueError as error:
-        raise CosimError(f"bound: {error}") from error
     print(text)
     exceeded = options.limit is not None and data["rows"][0][options.by] > options.limit
     return EXCEEDED if exceeded else KEPT
@@ -81,10 +79,5 @@ def _bounds(options: argparse.Namespace) -> ErrorBounds:
             f"Observer {name!r} tells no bound of its error; discrete_measurement_observer and "
             "continuous_discrete_observer do."
         )
-    try:
-        bounds: ErrorBounds = made.error_bounds(dict(map(parse_setting, options.settings)), options.preset)
-    except ValueError as error:
-        if isinstance(error, CosimError):
-            raise
-        raise CosimError(str(error)) from error
+    bounds: ErrorBounds = made.error_bounds(dict(map(parse_setting, options.settings)), options.preset)
     return bounds

@@ -9,7 +9,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from cosim.cli.model_info import declared_model
+from cosim.cli.model_info import declared_model, in_own_words
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import CosimError
 from cosim.limits import limit_rows, limit_text
@@ -60,12 +60,10 @@ def execute(options: argparse.Namespace) -> int:
     made = declared_model(name, "limits", ("observer",), dict(map(parse_setting, options.option)))
     if not hasattr(made, "limits"):
         raise CosimError(f"Observer {name!r} tells no limits: {_why_none(made)}")
-    try:
+    with in_own_words(name, "limits"):
         rows = limit_rows(
             made.limits(dict(map(parse_setting, options.set)), options.preset), not options.no_runs, options.members
         )
-    except ValueError as error:
-        raise error if isinstance(error, CosimError) else CosimError(f"limits: {error}") from error
     if options.json:
         print(json.dumps(jsonable([asdict(row) for row in rows]), indent=2))
     else:

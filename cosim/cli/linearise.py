@@ -9,6 +9,7 @@ from typing import Any
 
 import fmu_observer
 import plant_models
+from cosim.cli.model_info import in_own_words
 from cosim.cli.scenarios import parse_setting
 from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError, nearest
@@ -133,14 +134,15 @@ def _of_model(options: argparse.Namespace, settings: dict[str, float]) -> Linear
     inputs = {n for signal in system.inputs for n in signal.scalar_names}
     if options.states:
         raise ScenarioError("--states belongs to FMUs; a model of ours declares its own.")
-    found = linearise_system(
-        system,
-        t=options.at,
-        states={n: value for n, value in settings.items() if n in states},
-        inputs={n: value for n, value in settings.items() if n in inputs},
-        parameters={n: value for n, value in settings.items() if n not in states | inputs},
-        preset=options.preset,
-    )
+    with in_own_words(name, f"{name} at t = {options.at:g} s"):
+        found = linearise_system(
+            system,
+            t=options.at,
+            states={n: value for n, value in settings.items() if n in states},
+            inputs={n: value for n, value in settings.items() if n in inputs},
+            parameters={n: value for n, value in settings.items() if n not in states | inputs},
+            preset=options.preset,
+        )
     return found.part(options.inputs, options.outputs)
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-from cosim.errors import ScenarioError, nearest
+from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.scenario.models import make_declared
 from cosim.scenario.tables import ComponentTable
 from fmu_observer import OBSERVERS
 from fmus.recipes import legal_values
 from plant_models import PLANTS
+from plant_models.hybrid import TracingError
 from plant_models.hybrid.signal import Signal
-from plant_models.user_file import names_code
+from plant_models.user_file import explained, names_code
 
 REGISTRIES = {"model": PLANTS, "observer": OBSERVERS}
 
@@ -34,6 +36,29 @@ def declared_model(
         known = [one for kind in kinds for one in REGISTRIES[kind]]
         raise ScenarioError(f"There is no {' or '.join(kinds)} {name!r}; {nearest(name, known)}")
     return make_declared(ComponentTable.model_validate({key: name, "options": options or {}}), where)
+
+
+@contextmanager
+def in_own_words(name: str, where: str) -> Iterator[None]:
+    """What a model's own methods raise, in their own words.
+
+    Args:
+        name: of the model, as a user calls it. where: place for messages.
+
+    Raises:
+        CosimError: an argument is not legal, or the code of a user raised something, with its kind and line; what is
+            not legal in what ships raises on as it is.
+    """
+    try:
+        yield
+    except CosimError:
+        raise
+    except (ValueError, TracingError) as error:
+        raise CosimError(f"{where}: {error}") from error
+    except Exception as error:
+        if not names_code(name):
+            raise
+        raise CosimError(f"{where}: {name}: {explained(error)}") from error
 
 
 def describe_model(name: str) -> dict[str, Any]:

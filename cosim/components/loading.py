@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,7 +20,7 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.shared_libraries import refuse_foreign_libraries
 from cosim.components.surroundings import Surroundings
 from cosim.components.unpacking import unpack
-from cosim.errors import FmuLoadError
+from cosim.errors import FmuLoadError, ScenarioError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
 from fmu_observer.description import describe
@@ -27,7 +29,7 @@ from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
 from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, fmi_version
-from plant_models.hybrid import HybridSystem
+from plant_models.hybrid import HybridSystem, TracingError
 
 COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Component}
 
@@ -112,10 +114,14 @@ def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, 
         system: what the block runs.
         name: of the component.
         fmi_version: of its call surface.
+
+    Raises:
+        ScenarioError: its equations cannot be traced, although it does not declare so.
     """
     from fmu_observer.block import make_block  # noqa: PLC0415 - CasADi only for those who run in Python
 
-    block = make_block(system, fmi_version, instance_name=name, **arguments)
+    with _traced(name):
+        block = make_block(system, fmi_version, instance_name=name, **arguments)
     source = system.source or type(system).__qualname__
     face = COMPONENTS[fmi_version]
     component: Component = face(name, block, block.model_description, source=source, kind="block")
@@ -132,12 +138,24 @@ def describe_system(
         preset: whose values become the start values; None for the default.
 
     Raises:
-        ValueError: the preset is unknown.
+        ValueError: the preset is unknown. ScenarioError: as for `load_block`.
     """
-    description = describe(system, fmi_version, preset=preset)
+    with _traced(name):
+        description = describe(system, fmi_version, preset=preset)
     source = system.source or type(system).__qualname__
     component: Component = COMPONENTS[fmi_version](name, None, description, source=source, kind="block")
     return component
+
+
+@contextmanager
+def _traced(name: str) -> Iterator[None]:
+    try:
+        yield
+    except TracingError as error:
+        raise ScenarioError(
+            f"Component {name!r}: {error} Where it is right as it is, declare traceable = False in the class: it then "
+            "runs in Python, which is slower."
+        ) from error
 
 
 def _library(folder: Path, description: ModelDescription) -> Path:

@@ -18,7 +18,7 @@ from cosim.scenario.tables import Backend, ComponentTable
 from fmus.cache import CacheEntry, cache_entry
 from fmus.toolchain.compile import CompilerMissing, find_compiler
 from fmus.toolchain.platforms import Platform
-from plant_models.hybrid import HybridSystem
+from plant_models.hybrid import HybridSystem, TracingError
 
 if TYPE_CHECKING:
     from fmus.build import Draft
@@ -28,7 +28,7 @@ IN_PYTHON: Backend = "block3"
 AT_A_TIME = 2
 """Compilers that work at once; each takes a processor and some hundred megabytes for seconds."""
 
-FAULTS = (OSError, RuntimeError, ValueError)
+FAULTS = (OSError, RuntimeError, ValueError, TracingError)
 """What building raises: no compiler, a compiler that refuses, a system that cannot be traced, a cache that cannot be
 written.
 """

@@ -70,7 +70,7 @@ class Host:
         """
         text = str(error)
         if not isinstance(error, FMICallException):  # a block's own refusal names call and time already
-            at = "" if t is None else f" at t = {t!r} s"
+            at = "" if t is None else f" at t = {round(t, 9)!r} s"
             text = f"{function}{at}: {type(error).__name__}: {text}"
         place = self._place(error.__cause__ or error)
         return f"{text} ({place})" if place else text

@@ -26,7 +26,8 @@ from plant_models.hybrid.system import HybridSystem, vector
 if TYPE_CHECKING:
     from plant_models.hybrid.kernel import NumpyKernel, TracedKernel, make_kernel
     from plant_models.hybrid.runtime import Runtime, Snapshot
-    from plant_models.hybrid.tracing import TracedSystem, TracingError, traced_once
+    from plant_models.hybrid.tracing import TracedSystem, traced_once
+    from plant_models.hybrid.tracing_error import TracingError
 
 __all__ = [
     "CommunicationEvent",
@@ -61,7 +62,7 @@ _HOMES = {
     "Snapshot": "runtime",
     "TracedKernel": "kernel",
     "TracedSystem": "tracing",
-    "TracingError": "tracing",
+    "TracingError": "tracing_error",
     "make_kernel": "kernel",
     "traced_once": "tracing",
 }

@@ -20,6 +20,7 @@ import numpy as np
 
 from plant_models.hybrid import integration
 from plant_models.hybrid.system import HybridSystem
+from plant_models.hybrid.tracing_error import TracingError
 
 SYMBOLIC = ca.ArrayInterface.SX
 Expression = TypeVar("Expression")
@@ -37,10 +38,6 @@ ADVICE = (
     "np.array([...]), "
     "np.sin instead of math.sin."
 )
-
-
-class TracingError(TypeError):
-    """A system's function uses something CasADi cannot trace; the message names the function and the line."""
 
 
 @dataclass(frozen=True)
@@ -298,8 +295,9 @@ class TracedSystem:
         else:  # it returned something wrong, and is no longer on the stack
             code = getattr(type(self.system), WRITTEN_AS.get(function, function)).__code__
             place = f"{code.co_filename}:{code.co_firstlineno}"
+        told = bool(users) and "raise " in str(users[-1].line)  # in words of its own, which know better
         of_kind = isinstance(error, (AttributeError, NameError, LookupError)) or not users
-        advice = "" if of_kind else f" {ADVICE}"
+        advice = "" if of_kind or told else f" {ADVICE}"
         reason = str(error).removeprefix(f"{self.system.name}: ").removesuffix(".")
         return f"{self.system.name}: cannot trace {WRITTEN_AS.get(function, function)}: {reason} (at {place}).{advice}"
 

@@ -13,7 +13,6 @@ import pytest
 from failing_models import WORDS
 
 from cosim import Scenario, benchmark_observers
-from cosim.cli import main
 from cosim.diagnostics.messages import MessageLog
 from cosim.errors import CosimError
 from fmu_observer.moving_horizon.full_solver import FullSolver, WindowError
@@ -22,7 +21,7 @@ from fmus.hosted import build_hosted_fmu
 FILE = failing_models.__file__
 SYSTEMS = ("InFlow", "InOutput", "InSample", "InPacket")
 KINDS = [(name, backend) for name in SYSTEMS for backend in ("block2", "block3")]
-KINDS += [("PlainStep", None), ("PlainStart", None)]
+KINDS += [("PlainStep", None), ("PlainStart", None), ("Worn", "block3")]
 ADVICE = ("smaller communication step", "can_be_missing")
 
 
@@ -107,10 +106,13 @@ def test_in_a_benchmark() -> None:
     in_own_words(score.failure or "nothing", score.name)
 
 
-def test_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = scenario("PlainStep").save(tmp_path / "boiler.toml")
-    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--no-report"]) == 2
-    in_own_words(capsys.readouterr().err)
+@pytest.mark.parametrize("backend", [None, "block3", "block2", "fmu3"])
+def test_of_what_cannot_be_traced(backend: str | None) -> None:
+    """No time, since none is known; and nobody can trace what its author refuses."""
+    text = failure(scenario("Traced", backend))
+    assert WORDS in text
+    assert "boiler" in text
+    assert "np.where" not in text
 
 
 def test_advice_stands_where_nothing_better_is_known() -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import failing_models
 import pytest
 
 import cosim.baselines.call
@@ -170,6 +171,40 @@ def test_a_difference_is_told_where_its_picture_fails(
     checked = run(pytester)
     checked.assert_outcomes(failed=1)
     checked.stdout.fnmatch_lines(["*at worst 0.5 m/s too high at 1 s*", "*picture: could not be made: no font*"])
+
+
+FAILING = """
+import pytest
+from cosim import Scenario
+
+def scenario(begin):
+    s = Scenario(stop=0.6, step=0.1).add("boiler", model="FILE:Worn", **{"as": "block3"})
+    return s.set("boiler.from_when", begin)
+
+def test_boiler(fmu_regression):
+    fmu_regression(scenario(SLOPE))
+"""
+
+
+def test_what_a_component_raises_is_told_in_its_own_words(pytester: pytest.Pytester) -> None:
+    """With and without a baseline, when it is compared and when it is written."""
+    text = FAILING.replace("FILE", failing_models.__file__)
+    fails = f"*Component 'boiler' at t = 0.2 s: *{failing_models.WORDS}*"
+    write(pytester, text, 0.29)
+    for options in ([], ["--fmu-baseline=update"], ["--fmu-baseline=diff"]):
+        told = run(pytester, *options)
+        told.assert_outcomes(failed=1)
+        told.stdout.fnmatch_lines([fails])
+    write(pytester, text, 99.0)
+    run(pytester, "--fmu-baseline=update").assert_outcomes(passed=1)
+    before = tree(pytester)
+    write(pytester, text, 0.29)
+    for options in ([], ["--fmu-baseline=update"]):
+        told = run(pytester, *options)
+        told.assert_outcomes(failed=1)
+        told.stdout.fnmatch_lines([fails])
+        told.stdout.no_fnmatch_line("*Traceback*")
+    assert tree(pytester) == before
 
 
 BESIDE = ONE + "def test_other():\n    assert SLOPE == 1.0\n"

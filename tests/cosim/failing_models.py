@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_observer.observers.train import DiscreteMeasurementObserver
 from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,
@@ -21,8 +22,8 @@ WORDS = "the table of the boiler ends at 12 bar"
 FROM = 0.29  # [s]
 
 
-def fail(t: Any) -> None:
-    if float(t) > FROM:
+def fail(t: Any, begin: float = FROM) -> None:
+    if float(t) > begin:
         raise ValueError(WORDS)
 
 
@@ -72,6 +73,35 @@ class InPacket(InSample):
     description = "Fails when a packet comes"
     parameters = ()
     events = (TriggeredEvent("packet", (input_signal("packet_z", "m", 0.0, "Z", variability="discrete"),), "A packet"),)
+
+
+class Traced(InFlow):
+    """Fails as soon as its equations are looked at: what is traced knows no time."""
+
+    traceable = True
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        raise RuntimeError(WORDS)
+
+
+class Worn(InFlow):
+    """Fails from a time on that a scenario tells."""
+
+    parameters = (parameter("from_when", "s", 0.29, "From then on"), parameter("gain", "1/s", 1.0, "Gain", min=0.0))
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        fail(t, p.from_when)
+        return vector(p.gain * (1.0 - x[0]))
+
+
+class Judged(DiscreteMeasurementObserver):
+    """Fails where it is asked for what it knows of itself."""
+
+    def error_bounds(self, *_: Any) -> Any:
+        raise RuntimeError(WORDS)
+
+    def limits(self, *_: Any) -> Any:
+        raise RuntimeError(WORDS)
 
 
 class PlainStep:
