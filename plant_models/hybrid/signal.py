@@ -1,7 +1,7 @@
 """Signals: the names, units and attributes of everything that crosses a boundary.
 
 A `Signal` uses FMI's own words, so that a model description is a transcription and not a translation.
-This file imports nothing but the warning that an output may carry.
+This file imports NumPy, and the warning that an output may carry.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from keyword import iskeyword
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
 
 from plant_models.hybrid.output_warning import OutputWarning
 
@@ -32,6 +34,8 @@ class Signal:
         max: largest legal value [unit], or None.
         description: one line for the user.
         size: None for a scalar, else the number of elements of a vector, named ``name[1]`` ... ``name[size]``.
+        shape: of a state that is a matrix, (rows, columns); outside it is a vector of its entries, row by row.
+        symmetric: whether that vector holds the upper triangle alone.
         display_unit: unit to show at the user's edge, e.g. ``km/h``.
         integer: a whole number to the outside; only a discrete output can be one.
         warning: what is told after a run in which the value was not zero; of scalar outputs only.
@@ -59,6 +63,8 @@ class Signal:
     warning: OutputWarning | None = None
     optional: bool = False
     can_be_missing: bool = False
+    shape: tuple[int, int] | None = None
+    symmetric: bool = False
 
     def __post_init__(self) -> None:
         if self.integer and (self.causality, self.variability) != ("output", "discrete"):
@@ -71,6 +77,8 @@ class Signal:
             raise ValueError(
                 f"Signal {self.name!r} can be missing; only an input, or an output that is no integer, is."
             )
+        if self.shape is not None and self.causality != "local":
+            raise ValueError(f"Signal {self.name!r} has the shape {self.shape}; only a state can be a matrix.")
         if not self.name.isidentifier():
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
@@ -87,6 +95,13 @@ class Signal:
     def width(self) -> int:
         """Number of scalar variables this signal stands for."""
         return 1 if self.size is None else self.size
+
+    @property
+    def dimensions(self) -> tuple[int, ...]:
+        """Shape of its value as equations see it, () for a scalar."""
+        if self.shape is not None:
+            return self.shape
+        return () if self.size is None else (self.size,)
 
     @property
     def scalar_names(self) -> tuple[str, ...]:
@@ -109,24 +124,77 @@ class Signal:
         return self.start if isinstance(self.start, tuple) else (float(self.start),)
 
 
-def state(name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None) -> Signal:
+def state(
+    name: str,
+    unit: str,
+    start: Start | np.ndarray = 0.0,
+    description: str = "",
+    *,
+    size: int | None = None,
+    shape: tuple[int, int] | None = None,
+    symmetric: bool = False,
+) -> Signal:
     """A continuous state: flows between events, may jump at them.
 
     Args:
-        name: of the signal. unit: SI, as FMI writes units (``m/s2``). start: initial value; a sequence for vectors.
-        description: one line. size: number of elements of a vector, None for a scalar.
+        name: of the signal. unit: SI, as FMI writes units (``m/s2``).
+        start: initial value, one for all elements; a sequence for vectors, an array of `shape` for matrices.
+        description: one line. size: number of elements of a vector, None for a scalar or a matrix.
+        shape: of a matrix, (rows, columns). symmetric: whether only its upper triangle is a state.
+
+    Raises:
+        ValueError: see `Signal`; or a symmetric state is no square matrix, or its start is not symmetric.
     """
-    return Signal(name, unit, "local", "continuous", start, description=description, size=size)
+    return _local(name, unit, start, description, "continuous", size, shape, symmetric)
 
 
-def memory(name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None) -> Signal:
+def memory(
+    name: str,
+    unit: str,
+    start: Start | np.ndarray = 0.0,
+    description: str = "",
+    *,
+    size: int | None = None,
+    shape: tuple[int, int] | None = None,
+    symmetric: bool = False,
+) -> Signal:
     """A discrete state: constant between events, changes only in jumps.
 
     Args:
-        name: of the signal. unit: SI, as FMI writes units (``m/s2``). start: initial value; a sequence for vectors.
-        description: one line. size: number of elements of a vector, None for a scalar.
+        name: of the signal. unit: SI, as FMI writes units (``m/s2``).
+        start: initial value, one for all elements; a sequence for vectors, an array of `shape` for matrices.
+        description: one line. size: number of elements of a vector, None for a scalar or a matrix.
+        shape: of a matrix, (rows, columns). symmetric: whether only its upper triangle is a state.
+
+    Raises:
+        ValueError: see `state`.
     """
-    return Signal(name, unit, "local", "discrete", start, description=description, size=size)
+    return _local(name, unit, start, description, "discrete", size, shape, symmetric)
+
+
+def _local(
+    name: str,
+    unit: str,
+    start: Start | np.ndarray,
+    description: str,
+    variability: Variability,
+    size: int | None,
+    shape: tuple[int, int] | None,
+    symmetric: bool,
+) -> Signal:
+    if shape is None:
+        if symmetric:
+            raise ValueError(f"State {name!r} is symmetric; give its shape (n, n).")
+        first = tuple(start.tolist()) if isinstance(start, np.ndarray) else start
+        return Signal(name, unit, "local", variability, first, description=description, size=size)
+    rows, columns = shape
+    matrix = np.array(np.broadcast_to(start, shape), dtype=float)
+    if symmetric and (rows != columns or not np.array_equal(matrix, matrix.T)):
+        raise ValueError(f"State {name!r} is symmetric; expected a square shape and start, got {shape}, {start}.")
+    entries = matrix[np.triu_indices(rows)] if symmetric else matrix.ravel()
+    first = tuple(entries.tolist())
+    kept: dict[str, Any] = {"description": description, "size": len(first), "shape": shape, "symmetric": symmetric}
+    return Signal(name, unit, "local", variability, first, **kept)
 
 
 def input_signal(

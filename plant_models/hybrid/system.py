@@ -15,33 +15,19 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from plant_models.hybrid.arrays import Array, vector
 from plant_models.hybrid.declarations import check_declarations
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.missing import MISSED_SAMPLES, is_there, or_else
 from plant_models.hybrid.noise import FROM_NAME, SEED_LIMIT, Purpose
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import Signal, memory, parameter, width
+from plant_models.hybrid.state_layout import StateLayout
 
-Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
+__all__ = ["Array", "HybridSystem", "Method", "vector"]
+
 Method = Literal["rk4", "rosenbrock", "euler"]
 MISSED = memory(MISSED_SAMPLES, "1", 0.0, "Measurements that were missing at samples")
-NUMBERS = frozenset((float, np.float64))
-
-
-def vector(*components: Array) -> Array:
-    """Stack scalars (or batches of them) into a vector, broadcasting constants.
-
-    Args:
-        components: n scalars, or arrays of one common shape ``(members,)``; plain numbers are broadcast.
-
-    Returns:
-        Array of shape (n,), or (n, members) for a batch.
-    """
-    if components and NUMBERS.issuperset(map(type, components)):
-        return np.array(components)  # the same numbers; states of thousands are stacked ten times as slowly
-    if all(getattr(c, "ndim", 0) == 0 for c in components):
-        return np.stack([np.asarray(c) if isinstance(c, int | float) else c for c in components])
-    return np.stack(np.broadcast_arrays(*components))
 
 
 class HybridSystem:
@@ -54,10 +40,11 @@ class HybridSystem:
        attributes, or as instance attributes before it calls ``super().__init__()`` when they depend on options.
     2. `flow`, `output`, `jump` and `friction` are pure functions in plain NumPy, without branching on values
        (``np.where``, not ``if``); nothing is kept on ``self`` between calls.
-    3. ``x`` is an array of shape (n,) (or (n, members) in a batch): the continuous states first, then the memory.
-       ``u`` and ``p`` are named tuples of the inputs (with event payloads and noises) and of the parameters.
-    4. `flow` returns the derivatives of the continuous states, shape (nc,); `jump` returns the whole new ``x``, shape
-       (n,); `output` returns a dictionary with every declared output.
+    3. ``x``, ``u`` and ``p`` are named tuples of the states, of the inputs (with event payloads and noises) and of the
+       parameters. A state that is a vector or matrix has its declared shape, in a batch with the members as last
+       dimension.
+    4. All return dictionaries: `flow` the derivatives of all continuous states, `jump` the new values of those states
+       that the event changes, `output` every declared output.
     5. Dry friction is declared, not regularised: a state named in `frictions` feels a resistance of magnitude
        `friction(...)` against its sign. The integrator lets it stop exactly at zero and stay there while the flow is
        smaller than the friction.
@@ -79,6 +66,8 @@ class HybridSystem:
     13. `purpose` is what its noises are drawn for: two systems of different purpose draw independently even from the
         same seed.
     14. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    15. A system without ``by_name = True`` is handed ``x`` as one flat array and returns such arrays from `flow` and
+        `jump`.
     """
 
     name: str = ""
@@ -100,6 +89,7 @@ class HybridSystem:
     internal_step: float = 1e-3
     purpose: Purpose = Purpose.NOISE
     traceable: bool = True
+    by_name: ClassVar[bool] = False
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
 
     def __init__(self, **options: Any) -> None:
@@ -124,27 +114,29 @@ class HybridSystem:
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the continuous states, shape (nc,)."""
-        return np.zeros((self.continuous_count, *x.shape[1:]))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> Any:
+        """Derivatives of the continuous states by name; without it they stand still."""
+        if not self.by_name:
+            return np.zeros((self.continuous_count, *x.shape[1:]))
+        return {s.name: np.zeros(s.dimensions) for s in self.states if s.variability == "continuous"}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Values of all outputs by name."""
         return {}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """State after the event, shape (n,)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
+        """What the event changes: new values of states by name."""
         raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no jump for it.")
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Magnitudes of the dry frictions in units of the derivatives, shape (len(frictions),)."""
         return np.zeros(len(self.frictions))
 
-    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Switching functions, continuous in `t` and `x`: a change of sign switches the equations; shape
         (len(switchings),).
         """
-        return np.zeros((len(self.switchings), *x.shape[1:]))
+        return np.zeros(len(self.switchings))
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else
@@ -152,18 +144,18 @@ class HybridSystem:
         """
         return {}
 
-    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+    def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """What the states must fulfil where time begins, by what is said where they do not (it names them): 1 where
         they do, else 0.
 
         Args:
-            x: state with which time would begin, before any event, shape (n,). p: named tuple of all parameters.
+            x: states with which time would begin, before any event. p: named tuple of all parameters.
         """
         return {}
 
     # -- for those who write these functions ------------------------------------------------------------------------
 
-    def switches(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def switches(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """1 where a switching function is not negative, else 0: as held over the integration step, if one is on its
         way, otherwise now; shape (len(switchings),)."""
         if u.held_switches is not None:
@@ -217,6 +209,10 @@ class HybridSystem:
         text = "Seed of the noise, a whole number; -1: it follows from the instance name"
         seed = parameter("seed", "1", FROM_NAME, text, min=FROM_NAME, max=SEED_LIMIT - 1)
         return (*self.parameters, step, *((seed,) if self.noises else ()))
+
+    def unpack_states(self, values: Array) -> Any:
+        """Named tuple `x` from the flat array, shape (n,) or (n, members)."""
+        return self._all_places.named(values)
 
     def unpack_inputs(self, values: Array, held_switches: Array | None = None) -> Any:
         """Named tuple `u` from the flat array, shape (m,) or (m, members), with the switches that an integration step
@@ -275,12 +271,14 @@ class HybridSystem:
         Args:
             held_switches: see `unpack_inputs`.
         """
-        derivative = self.flow(t, x, self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+        derivative = self.flow(t, self._handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+        if self.by_name:
+            return self._flowing_places.flat(derivative, f"{self.name}: flow()", x.shape[1:])
         return self._checked("flow()", derivative, self.continuous_count)
 
     def output_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`output` on flat arrays, stacked in the declared order, shape (q,)."""
-        values = self.output(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        values = self.output(t, self._handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
         if not isinstance(values, Mapping):
             raise TypeError(
                 f"{self.name}: output() returns a {type(values).__name__}; expected a dictionary of values by name."
@@ -299,7 +297,7 @@ class HybridSystem:
         """`jump` on flat arrays: the state after the event, shape (n,)."""
         given, unpacked = self.unpack_inputs(u), self.unpack_parameters(p)
         if not self._sampling:
-            return self._checked(f"jump({event!r})", self.jump(event, t, x, given, unpacked), self.state_count)
+            return self._jumped(event, t, x, given, unpacked)
         count, sampled = self.state_count - 1, self._sampling.get(event)
         names = () if sampled is None else sampled.samples
         values = [value for name in names for value in _parts(getattr(given, name), self._widths[name])]
@@ -307,7 +305,7 @@ class HybridSystem:
         whole = sampled is not None and not sampled.leaves_out
         if whole:
             given = given._replace(**{name: or_else(getattr(given, name), 0.0) for name in names})
-        after = self._checked(f"jump({event!r})", self.jump(event, t, x[:count], given, unpacked), count)
+        after = self._jumped(event, t, x[:count], given, unpacked)
         if whole:
             after = np.where(lacking > 0.0, x[:count], after)
         missed = np.reshape(x[count] + lacking, (1, *x.shape[1:]))
@@ -319,22 +317,24 @@ class HybridSystem:
         Args:
             held_switches: see `unpack_inputs`.
         """
-        return self.friction(t, x, self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+        return self.friction(t, self._handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
 
     def switching_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`switching` on flat arrays, shape (len(switchings),)."""
-        values = self.switching(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        values = self.switching(t, self._handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
         return self._checked("switching()", values, len(self.switchings))
 
     def requirement_vector(self, x: Array, p: Array) -> Array:
         """Values of `requirements`, then of `start_requirements`, in the declared order, stacked."""
         unpacked = self.unpack_parameters(p)
-        values = [*self.requirements(unpacked).values(), *self.start_requirements(x, unpacked).values()]
+        values = [*self.requirements(unpacked).values(), *self.start_requirements(self._handed(x), unpacked).values()]
         return vector(*values) if values else np.zeros(0)
 
     def switch_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`switches` on flat arrays, now, shape (len(switchings),); None for a system without any."""
-        return self.switches(t, x, self.unpack_inputs(u), self.unpack_parameters(p)) if self.switchings else None
+        if not self.switchings:
+            return None
+        return self.switches(t, self._handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
 
     def held_vector(self, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """What a solver holds between events, as it is now: signs of the states with friction, then the switches."""
@@ -359,6 +359,30 @@ class HybridSystem:
         return np.array([float(s.name in self.stiff) for s in continuous for _ in range(s.width)])
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _handed(self, x: Array) -> Any:
+        """The states as the equations get them."""
+        return self.unpack_states(x) if self.by_name else x
+
+    def _jumped(self, event: str, t: Array, own: Array, u: Any, p: Any) -> Array:
+        """`jump` on the states without the count of missed samples."""
+        what = f"jump({event!r})"
+        if not self.by_name:
+            return self._checked(what, self.jump(event, t, own, u, p), own.shape[0])
+        changed = self.jump(event, t, self._own_places.named(own), u, p)
+        return self._own_places.flat(changed, f"{self.name}: {what}", own.shape[1:], own)
+
+    @cached_property
+    def _own_places(self) -> StateLayout:
+        return StateLayout(self.states[:-1] if self._sampling else self.states)
+
+    @cached_property
+    def _flowing_places(self) -> StateLayout:
+        return StateLayout([s for s in self.states if s.variability == "continuous"])
+
+    @cached_property
+    def _all_places(self) -> StateLayout:
+        return StateLayout(self.states)
 
     def _place(self, name: str) -> int:
         """Position in `x` of a scalar state; the names of thousands of others are not written for it."""

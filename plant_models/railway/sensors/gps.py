@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.system import Array
 
 
@@ -38,6 +38,7 @@ class Gps(HybridSystem):
     """
 
     name = "gps"
+    by_name = True
     description = "Satellite positioning: position of a train in, fixes with drift and noise out"
     source = "Bouchama 2024, section 4.1 (10 Hz, 0.5 m); the error model is ours"
     internal_step = 1e-2  # nothing flows
@@ -83,12 +84,14 @@ class Gps(HybridSystem):
     }
     default_preset = "half_metre"
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Take a fix: its count, instant, position and drift, shape (4,) or (4, members)."""
-        kept = np.where(x[0] > 0.0, np.exp(-p.sample_period / p.drift_time), 0.0)  # the first drift is drawn afresh
-        drift = kept * x[3] + np.sqrt(1.0 - kept * kept) * p.drift_std * u.drift_noise
-        return vector(x[0] + 1.0, t, u.position + drift + p.white_std * u.white_noise, drift)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Take a fix: its count, instant, position and drift."""
+        kept = np.where(x.fix_count > 0.0, np.exp(-p.sample_period / p.drift_time), 0.0)  # the first is drawn afresh
+        drift = kept * x.fix_drift + np.sqrt(1.0 - kept * kept) * p.drift_std * u.drift_noise
+        position = u.position + drift + p.white_std * u.white_noise
+        return {"fix_count": x.fix_count + 1.0, "fix_time": t, "fix_position": position, "fix_drift": drift}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The last fix, held, and as an announcement."""
-        return {"reading": x[2], "drift": x[3], "gps_count": x[0], "gps_time": x[1], "gps_position": x[2]}
+        announced = {"gps_count": x.fix_count, "gps_time": x.fix_time, "gps_position": x.fix_position}
+        return {"reading": x.fix_position, "drift": x.fix_drift, **announced}

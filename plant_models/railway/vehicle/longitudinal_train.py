@@ -54,6 +54,7 @@ class LongitudinalTrain(LongitudinalForces):
     name = "longitudinal_train"
     description = "Train as one point per unit mass: effort in, position, speed and adhesion limit out"
     source = "Aguiar Cota 2019, (2.1)-(2.8), (2.26)-(2.28), Tables 2.1 and 5.1"
+    by_name = True
     internal_step = 2e-3  # a stop is placed within 2e-6 m per m/s2 of braking; the motion would allow 10 ms
     states = (
         state("train_position", "m", 0.0, "Position of the train at start"),
@@ -80,19 +81,22 @@ class LongitudinalTrain(LongitudinalForces):
         )
         self.switchings = self._track.edges
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of position and speed without dry friction, shape (2,) or (2, members)."""
-        return vector(x[1], self._forces(t, x[0], x[1], u, p).push / p.mass)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of position and speed without dry friction."""
+        push = self._forces(t, x.train_position, x.train_speed, u, p).push
+        return {"train_position": x.train_speed, "train_speed": push / p.mass}
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Dry friction on the speed [m/s2], shape (1,) or (1, members)."""
-        return vector((p.davis_a + self._forces(t, x[0], x[1], u, p).brake) / p.mass)
+        return vector((p.davis_a + self._forces(t, x.train_position, x.train_speed, u, p).brake) / p.mass)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs."""
         degraded = self._track.degraded(self.switches(t, x, u, p))
-        return self._outputs(x[0], x[1], self._forces(t, x[0], x[1], u, p), degraded, p)
+        return self._outputs(
+            x.train_position, x.train_speed, self._forces(t, x.train_position, x.train_speed, u, p), degraded, p
+        )
 
-    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """How far beyond the edges of the zones."""
-        return vector(*self._track.beyond_edges(t, x[0], p))
+        return vector(*self._track.beyond_edges(t, x.train_position, p))
