@@ -15,6 +15,10 @@ from typing import Any
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from turned_faults import turned
+
 from cosim import Outcome, Scenario
 from cosim.evaluation.balise_gaps import GapErrors, gap_errors, largest, root_mean_square
 from cosim.evaluation.numbers import error_number, number
@@ -102,21 +106,40 @@ def longest_gaps(found: GapErrors) -> str:
     return table(head, rows)
 
 
-def all_gaps(found: GapErrors, quiet: GapErrors) -> str:
-    """What all gaps come to, with jams and skids, and without.
+def all_gaps(found: GapErrors, quiet: GapErrors, other: GapErrors) -> str:
+    """What all gaps come to, with jams and skids, without, and with those of the other sign.
 
     Args:
-        found: of the run with faults. quiet: of the same run without.
+        found: of the run with faults. quiet: of the same run without. other: with all faults turned.
     """
     head = [f"{len(found.gaps)} gaps", "largest [m]", "rms [m]", "largest [s]", "within SUBSET-041 [%]"]
-    head += ["largest without jams and skids [m]"]
+    head += ["largest without jams and skids [m]", "jams and skids turned: largest [m]", "rms [m]"]
     rows = []
     for name, errors in found.errors.items():
         seconds = found.running_time(name)
         cells = [error_number(largest(errors)), error_number(root_mean_square(errors))]
         cells += [error_number(largest(seconds[~np.isnan(seconds)])), number(100.0 * found.within_envelope(name))]
-        rows.append([found.labels[name], *cells, error_number(largest(quiet.errors[name]))])
+        cells += [error_number(largest(quiet.errors[name])), error_number(largest(other.errors[name]))]
+        rows.append([found.labels[name], *cells, error_number(root_mean_square(other.errors[name]))])
     return table(head, rows)
+
+
+def told(outcome: Outcome) -> list[list[str]]:
+    """Faults told and false alarms of the observers that tell any, as cells of a table."""
+    known = [entry for entry in outcome.result.summary["fault_detection"] if entry["tells"]]
+    return [[entry["observer"], f"{entry['detected']} of {entry['faults']}", f"{entry['false']}"] for entry in known]
+
+
+def detections(outcome: Outcome, other: Outcome) -> str:
+    """Faults told with either sign.
+
+    Args:
+        outcome: of the run with faults. other: with all faults turned.
+    """
+    head = ["", "faults told", "false alarms", "turned: faults told", "false alarms"]
+    return table(
+        head, [[f"`{one[0]}`", *one[1:], *two[1:]] for one, two in zip(told(outcome), told(other), strict=True)]
+    )
 
 
 def certified(outcome: Outcome) -> Mapping[str, str]:
@@ -161,13 +184,15 @@ def tables() -> dict[str, str]:
     """All tables, by their names on the page."""
     outcome, found = run(scenario())
     _, quiet = run(scenario(faults=False))
+    other_outcome, other = run(turned(scenario()))
     known = certified(outcome)
-    head, line, *rows = all_gaps(found, quiet).splitlines()
+    head, line, *rows = all_gaps(found, quiet, other).splitlines()
     head += " certified for 22.5 s |"
     judged = [f"{row} {known.get(name, '–')} |" for name, row in zip(found.errors, rows, strict=True)]
     return {
         "longest gaps": longest_gaps(found),
         "all gaps": "\n".join([head, f"{line} --- |", *judged]),
+        "turned": detections(outcome, other_outcome),
         "steps": step_table(),
     }
 

@@ -15,6 +15,10 @@ from typing import Any
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from turned_faults import turned
+
 from cosim import Scenario
 from fmu_observer import OBSERVERS
 from plant_models.hybrid import HybridSystem
@@ -78,7 +82,7 @@ class Situation:
         name: of the row. right: whether the odometer is right. mass: of the train [kg]. told: share of the mass that
             observers believe. drag: share of the resistance that they believe. spacing: of balises [m]. slope: its
             sections, position [m] and gradient. noise: of a reading [m/s]. loss: share of readings that is lost.
-        faults: onset [s], length [s], depth, kind (-1 jam, 1 skid).
+        faults: onset [s], length [s], depth, kind (-1 jam, 1 skid). turned: whether they act with the other sign.
     """
 
     name: str
@@ -91,6 +95,7 @@ class Situation:
     noise: float = 0.0
     loss: float = 0.0
     faults: Sequence[tuple[float, float, float, float]] = ()
+    turned: bool = False
 
 
 UP, DOWN = ((0.0, 0.0), (1000.0, 0.006)), ((0.0, 0.0), (1000.0, -0.006))
@@ -111,14 +116,8 @@ SITUATIONS = (
     Situation("noise of 0.05 m/s", noise=0.05),
     Situation("noise of 0.1 m/s, hills, told 10 % less", noise=0.1, told=0.9, slope=HILLS),
     Situation("three readings in ten lost", right=False, loss=0.3),
-    Situation(
-        "jams and skids", right=False, faults=((125.0, 3.0, 1.0, -1.0), (210.0, 3.0, 0.3, 1.0), (295.0, 2.0, 0.5, -1.0))
-    ),
-    Situation(
-        "the same of the other sign",
-        right=False,
-        faults=((125.0, 3.0, 1.0, 1.0), (210.0, 3.0, 0.3, -1.0), (295.0, 2.0, 0.5, 1.0)),
-    ),
+    Situation("jams and skids", right=False, faults=FAULTS),
+    Situation("the same of the other sign", right=False, faults=FAULTS, turned=True),
 )
 
 
@@ -154,7 +153,7 @@ def scenario_of(s: Situation, labels: Iterable[str]) -> Scenario:
         _add_observer(made, label, s, davis)
     place = {"position": "train.position", "speed": "train.speed", "odometer": "odometer.reading"}
     made.balises(layout="spacing", spacing=s.spacing, track_start=0.0, track_end=1e5, **place)
-    return made
+    return turned(made) if s.turned else made
 
 
 def _add_observer(made: Scenario, label: str, s: Situation, davis: Mapping[str, float]) -> None:

@@ -80,8 +80,9 @@ def study() -> ModuleType:
 
 
 @cache
-def shipped(*, faults: bool = True) -> tuple[Outcome, GapErrors]:
-    outcome, found = study().run(study().scenario(everybody=False, faults=faults))
+def shipped(*, faults: bool = True, turned: bool = False) -> tuple[Outcome, GapErrors]:
+    chosen = study().scenario(everybody=False, faults=faults)
+    outcome, found = study().run(study().turned(chosen) if turned else chosen)
     return outcome, found
 
 
@@ -124,6 +125,24 @@ def test_jams_cost_their_length_those_who_are_not_told() -> None:
 
 
 @pytest.mark.compiler
+def test_faults_of_the_other_sign_are_those_faults() -> None:
+    """What the wheel loses in a jam it wins in a skid of that depth: the plain odometer, by hand as above."""
+    outcome, found = shipped(turned=True)
+    given, quiet = shipped()[1], shipped(faults=False)[1]
+    lost, won = (np.array(e.errors[PLAIN_ODOMETER]) - quiet.errors[PLAIN_ODOMETER] for e in (given, found))
+    np.testing.assert_allclose(won, -lost, atol=0.4)  # twice the pulse of 0.03 m, and a reading of 0.2 s
+    assert np.abs(lost).max() > 70.0
+    told = {entry["observer"]: entry for entry in outcome.result.summary["fault_detection"]}
+    assert told["quasi_lpv_uio"]["detected"] >= 15
+    for name, limit in zip(TOLD, (27.0, 24.3), strict=True):  # jams of a driven wheel are followed after 1.2 s
+        assert np.abs(found.errors[name]).max() < limit
+    assert (
+        outcome["discrete_measurement_observer.error_bound"]
+        - np.abs(outcome["discrete_measurement_observer.speed"] - outcome["train.speed"])
+    ).min() > 0.0
+
+
+@pytest.mark.compiler
 def test_the_tables_of_the_page_are_those_of_the_study() -> None:
     page = (ROOT / "docs" / "amsterdam_utrecht.md").read_text(encoding="utf-8")
     outcome, found = shipped()
@@ -132,7 +151,7 @@ def test_the_tables_of_the_page_are_those_of_the_study() -> None:
         printed = next(row for row in page.splitlines() if row.startswith(f"| {label} |"))
         now, then = (np.array([float(n) for n in re.findall(r"-?\d+\.?\d*", text)[-20:]]) for text in (line, printed))
         np.testing.assert_allclose(now, then, rtol=0.05, atol=0.02)  # two digits; other compilers round elsewhere
-    for line in study().all_gaps(found, shipped(faults=False)[1]).splitlines()[2:]:
+    for line in study().all_gaps(found, shipped(faults=False)[1], shipped(turned=True)[1]).splitlines()[2:]:
         label, *cells = (cell.strip() for cell in line.split("|")[1:-1])
         assert re.search(rf"^\| {re.escape(label)} \| {re.escape(cells[0])} \|", page, re.MULTILINE), line
     assert study().certified(outcome)["adaptive_gain_cdo"] == "no"
