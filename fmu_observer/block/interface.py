@@ -271,7 +271,8 @@ class FMIInterface:
             function: name of the call. reason: what was wrong, in words.
         """
         status = FMI_DISCARD if isinstance(reason, StepDiscarded) else FMI_ERROR
-        return BlockCallError(function, f"{self.instanceName} at t = {round(float(self.instance.runtime.t), 9)!r} s: {reason}", status)
+        when = round(float(self.instance.runtime.t), 9)
+        return BlockCallError(function, f"{self.instanceName} at t = {when!r} s: {reason}", status)
 
     def _mode_after_initialization(self) -> Mode:
         return "step"

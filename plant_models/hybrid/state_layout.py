@@ -134,7 +134,7 @@ def _joined(parts: Sequence[Array], widths: Sequence[int], members: tuple[int, .
     numbers = all(isinstance(part[0] if isinstance(part, list) else part, NUMBERS) for part in parts if len(part))
     if not numbers:
         return vector(*(part[i] for part, size in zip(parts, widths, strict=True) for i in range(size)))
-    rows = [np.asarray(part, dtype=float) for part in parts]
+    rows = [np.asarray(part, dtype=float) for part in parts] or [np.zeros(0)]
     return np.concatenate([np.broadcast_to(_column(row, members), (len(row), *members)) for row in rows])
 
 

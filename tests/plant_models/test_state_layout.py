@@ -63,6 +63,11 @@ def test_symbols_are_laid_out_as_numbers_are(layout: StateLayout, seed: int) -> 
     np.testing.assert_array_equal(function(flat).full().ravel(), 2.0 * flat)
 
 
+@pytest.mark.parametrize("members", [(), (4,)])
+def test_of_no_states_nothing_is_left(members: tuple[int, ...]) -> None:
+    assert StateLayout(()).flat({}, "flow()", members).shape == (0, *members)
+
+
 def test_a_constant_is_the_same_for_all_members() -> None:
     layout = StateLayout([state("a", "1"), state("b", "1", size=2), state("c", "1")])
     flat = layout.flat({"a": np.array([1.0, 2.0]), "b": np.array([[3.0, 3.0], [4.0, 4.0]]), "c": 5.0}, "it", (2,))
