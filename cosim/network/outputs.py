@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, inf
 from typing import Any
 
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
@@ -14,6 +16,7 @@ from cosim.coupling.connection import split_name
 from cosim.errors import ScenarioError
 from cosim.network.settings import NetworkSettings
 from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
+from fmus.fmi.standard import TIME_TOLERANCE
 from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES
 
 NAME = "network"
@@ -22,23 +25,49 @@ KIND = "network"
 SENDER = "sender"
 
 
+@dataclass(frozen=True)
+class Reader:
+    """An input that leaves out what is missing: a reading that it has sampled is missing until the next one arrives.
+
+    Args:
+        target: ``component.input``. signal: number of the signal that it reads.
+        period, offset: of its samples, the offset after the start of the run [s]; None where nobody knows them, and
+            what it was told stays until a packet is lost.
+    """
+
+    target: str
+    signal: int
+    period: float | None = None
+    offset: float = 0.0
+
+    def next_sample(self, t: float, start: float) -> float:
+        """Its first sample after `t` [s], of a run that starts at `start` [s]; infinite where nobody knows.
+
+        One at `t` itself has read what was told before.
+        """
+        if self.period is None:
+            return inf
+        passed = max(floor((t + TIME_TOLERANCE - start - self.offset) / self.period) + 1, 0)
+        return start + self.offset + passed * self.period
+
+
 class NetworkOutputs(FMI3Component):
     """What was last received of each signal, ``network.component.signal``, and by whom and when it was sent.
 
     Args:
         settings: of the network. components: by name, for what the signals are.
-        sampled: numbers of the signals of which somebody takes what arrives, and leaves out what is lost.
+        readers: inputs that take what arrives, and leave out what is missing.
 
     Raises:
         ScenarioError, CouplingError: a signal does not exist, or is no number.
     """
 
     def __init__(
-        self, settings: NetworkSettings, components: Mapping[str, Component], sampled: Sequence[int] = ()
+        self, settings: NetworkSettings, components: Mapping[str, Component], readers: Sequence[Reader] = ()
     ) -> None:
-        self.settings, self.sampled = settings, tuple(sampled)
+        self.settings, self.readers = settings, tuple(readers)
         self.sources = [_source(name, node.name, components) for node in settings.nodes for name in node.signals]
-        description = _description(settings, self.sources, components, self.sampled)
+        description = _description(settings, self.sources, components, self.readers)
         super().__init__(NAME, None, description, source="the network of the scenario", kind=KIND)
 
     def configure(self, starts: Mapping[str, StartValue]) -> None:
@@ -58,13 +87,13 @@ def error_name(signal: str) -> str:
     return f"error.{signal}"
 
 
-def arrived_name(signal: str) -> str:
-    """Output with what the last packet brought of a signal, NaN where it was lost.
+def arrived_name(target: str) -> str:
+    """Output with what arrived for an input and was not yet read, NaN where nothing did.
 
     Args:
-        signal: ``component.signal``.
+        target: ``component.input``.
     """
-    return f"arrived.{signal}"
+    return f"arrived.{target}"
 
 
 def stamp_name(node: str) -> str:
@@ -93,7 +122,7 @@ def _description(
     settings: NetworkSettings,
     sources: Sequence[tuple[str, str]],
     components: Mapping[str, Component],
-    sampled: Sequence[int],
+    readers: Sequence[Reader],
 ) -> ModelDescription:
     variables: list[ModelVariable] = []
 
@@ -121,10 +150,10 @@ def _description(
     add(SENDER, "Number of the node that sent last, from 1; 0 before")
     for node in settings.nodes:
         add(stamp_name(node.name), f"When what was last received of node {node.name} was measured", unit="s")
-    for i in sampled:
-        name, (component, signal) = settings.signals[i], sources[i]
-        text = f"What the last packet brought of {name}, NaN where it was lost"
-        add(arrived_name(name), text, marks=[CAN_BE_MISSING], **_units(components[component], signal))
+    for reader in readers:
+        component, signal = sources[reader.signal]
+        text = f"What arrived of {component}.{signal} for {reader.target}, NaN where it is lost or was read"
+        add(arrived_name(reader.target), text, marks=[CAN_BE_MISSING], **_units(components[component], signal))
     abilities = CoSimulation(modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True)
     return ModelDescription(
         fmiVersion="3.0",

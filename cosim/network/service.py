@@ -20,6 +20,7 @@ from cosim.balises.telegram import Mailbox
 from cosim.coupling.chain import Mover, Position, Stage, around
 from cosim.coupling.plan import Plan
 from cosim.network.chance import Chance
+from cosim.network.outputs import Reader
 from cosim.network.settings import NetworkSettings
 from cosim.results.data import PacketRecord
 from fmus.fmi.standard import TIME_TOLERANCE
@@ -96,7 +97,7 @@ class NetworkService:
         sources: columns of the measured signals in the values of the plan, shape (p,).
         first: column of the network's own outputs.
         listeners: components that are told by events. holders: by signal the components whose inputs hold it.
-        sampled: numbers of the signals of which what arrives is an output too, behind the others.
+        readers: inputs for which what arrives is an output too, behind the others.
     """
 
     def __init__(
@@ -107,7 +108,7 @@ class NetworkService:
         first: int,
         listeners: Sequence[Listener],
         holders: Mapping[str, Sequence[str]],
-        sampled: Sequence[int] = (),
+        readers: Sequence[Reader] = (),
     ) -> None:
         self.settings, self.sources, self.listeners = settings, sources, list(listeners)
         self.chance = Chance(settings, start)
@@ -115,8 +116,10 @@ class NetworkService:
         self._held = slice(first, first + count)
         self._errors = slice(first + count, first + 2 * count)
         self._sender, self._stamps = first + 2 * count, slice(first + 2 * count + 1, first + 2 * count + 1 + nodes)
-        self._sampled, behind = np.array(sampled, dtype=np.intp), first + 2 * count + 1 + nodes
-        self._arriving = slice(behind, behind + len(self._sampled))
+        self._readers, behind = list(readers), first + 2 * count + 1 + nodes
+        self._sampled = np.array([reader.signal for reader in readers], dtype=np.intp)
+        self._arriving = slice(behind, behind + len(self._readers))
+        self._reads = [reader.next_sample(start, start) for reader in readers]  # a packet at the start, as it were
         node_of = np.array(settings.node_of)
         self._own = [np.flatnonzero(node_of == i) for i in range(nodes)]
         self._order = settings.order or tuple(range(nodes))
@@ -155,8 +158,9 @@ class NetworkService:
 
     @property
     def next_instant(self) -> float:
-        """When something is sent or arrives next [s]."""
-        return min(self._next, self.mailbox.waiting[0].delivered_at if self.mailbox.waiting else inf)
+        """When something is sent, arrives, or has been read next [s]."""
+        arrives = self.mailbox.waiting[0].delivered_at if self.mailbox.waiting else inf
+        return min(self._next, arrives, *self._reads)
 
     @property
     def idle_until(self) -> float:
@@ -166,13 +170,16 @@ class NetworkService:
         return self.next_instant
 
     def is_due(self, t: float) -> bool:
-        """Whether something is sent or arrives at `t` [s]."""
+        """Whether something is sent, arrives, or has been read at `t` [s]."""
         return self.next_instant <= t + TIME_TOLERANCE
 
     def handle(self, t: float) -> None:
-        """All components stand at `t` [s]: send what is due, then deliver what is due."""
+        """All components stand at `t` [s]: what they have read is no new reading; send what is due, then deliver it."""
         if not self._begun:
             self._begin()
+        for place, read_at in enumerate(self._reads):
+            if read_at <= t + TIME_TOLERANCE:
+                self._plan.values[self._arriving][place], self._reads[place] = nan, inf
         while self._next <= t + TIME_TOLERANCE:
             self._transmit(t)
         for packet in self.mailbox.due(t + TIME_TOLERANCE):
@@ -232,13 +239,13 @@ class NetworkService:
         kept = not (checked and older)
         if packet.kind == "gap":
             if kept:
-                self._arrive(node, np.full(len(self._own[node]), nan))
+                self._arrive(t, node, np.full(len(self._own[node]), nan))
             return
         if self.settings.duplicate_fraction > 0.0:
             self._arrived[node].symmetric_difference_update({packet.number})  # of two copies the second is the last
         if kept:
             values[self._held][self._own[node]] = packet.values
-            self._arrive(node, np.array(packet.values))
+            self._arrive(t, node, np.array(packet.values))
             values[self._stamps][node] = packet.stamp
             self._newest[node] = packet.number
         for name in self._holding[node]:
@@ -253,12 +260,15 @@ class NetworkService:
                 delivery = entry.deliveries[listener.component] = listener.receiver.tell(t, letter)
                 delivery.before = delivery.after = None  # rows tell it; a log of a long run has no room for it
 
-    def _arrive(self, node: int, brought: np.ndarray) -> None:
-        """Those that leave out what is missing take what a packet of a node brought, NaN where it was lost."""
+    def _arrive(self, t: float, node: int, brought: np.ndarray) -> None:
+        """Those that leave out what is missing take what a packet of a node brought, NaN where it was lost, until they
+        have read it.
+        """
         received = dict(zip(self._own[node].tolist(), brought.tolist(), strict=True))
-        arriving = self._plan.values[self._arriving]
-        for place, signal in enumerate(self._sampled.tolist()):
-            arriving[place] = received.get(signal, arriving[place])
+        for place, reader in enumerate(self._readers):
+            if reader.signal in received:
+                self._plan.values[self._arriving][place] = received[reader.signal]
+                self._reads[place] = reader.next_sample(t, self._start)
 
     def _letter(self, listener: Listener, packet: Packet) -> Letter:
         """What a listener is told: the values of the packet, and of other nodes what was last received."""
@@ -324,7 +334,7 @@ class NetworkService:
         return (
             list(self.mailbox.waiting),
             len(self.entries),
-            (self.number, self._next, self._begun, self._sent.copy()),
+            (self.number, self._next, self._begun, self._sent.copy(), list(self._reads)),
             (list(self._newest), [set(numbers) for numbers in self._arrived]),
             [receiver.save() for receiver in self._receivers],
         )
@@ -340,7 +350,8 @@ class NetworkService:
         del self.entries[count:]
         for packet in waiting:
             self.entries[packet.place].deliveries = {}
-        self.number, self._next, self._begun, sent = sending
+        self.number, self._next, self._begun, sent, reads = sending
+        self._reads = list(reads)
         self._sent[:] = sent
         self._newest, self._arrived = list(newest), [set(numbers) for numbers in arrived]
         for receiver, saved in zip(self._receivers, receivers, strict=True):

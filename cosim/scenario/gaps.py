@@ -20,13 +20,9 @@ from cosim.network.settings import NetworkSettings
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.layouts import Layout
 from cosim.scenario.models import make_system, values_in_use
-from cosim.scenario.network import Network, is_wired
+from cosim.scenario.network import READINGS, ROUNDING, Network, is_wired
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import BalisesTable, ComponentTable
-
-READINGS = "measured_", "odometer"
-"""How the inputs begin by which an observer reads a measurement whenever it likes."""
-ROUNDING = 1e-9  # relative, of times
 
 
 @dataclass(frozen=True)
@@ -123,9 +119,8 @@ class Sources:
         inputs = [f"{name}.{s.name}" for s in system.inputs if s.name.startswith(READINGS)]
         for source, target, *_ in self.links:
             if target in inputs and self._travels(source, name):
-                found.append(
-                    ExpectedGap(None, f"{target} arrives by packets and is held, so it is read more than once")
-                )
+                text = f"{target} arrives by packets: between two of them it is missing, or is read more than once"
+                found.append(ExpectedGap(None, text))
             component = self.components.get(source.partition(".")[0])
             if target in inputs and isinstance(component, RecordingComponent):
                 found += self._of_rows(component, target)

@@ -15,13 +15,20 @@ from cosim.components.component import Component
 from cosim.coupling.connection import Connection, Link, connect, event_connection, split_name
 from cosim.coupling.plan import Plan
 from cosim.errors import ScenarioError, nearest
-from cosim.network.outputs import NAME, NetworkOutputs, arrived_name
+from cosim.network.intervals import longest_interval
+from cosim.network.outputs import NAME, NetworkOutputs, Reader, arrived_name
 from cosim.network.service import Field, Listener, NetworkService, ages
 from cosim.network.settings import NetworkSettings
 from cosim.results.data import PacketRecord
+from cosim.scenario.models import make_system, values_in_use
 from cosim.scenario.network_table import network_settings
 from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.tables import ComponentTable
 from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON
+
+READINGS = "measured_", "odometer"
+"""How the inputs begin by which an observer reads a measurement whenever it likes."""
+ROUNDING = 1e-9  # relative, of times
 
 
 @dataclass
@@ -32,6 +39,8 @@ class Network:
         settings: of the network. outputs: its face among the components.
         listeners: who is told by events. held: by signal, who holds it.
         left_out, stale: ``component.input`` that leave out what is lost, and that hold what came before it.
+        read_once, repeated: ``component.input`` that sample between two packets, and leave out what they have read; or
+            that take it for a new reading, or of which nobody knows when they sample.
     """
 
     settings: NetworkSettings
@@ -40,6 +49,8 @@ class Network:
     held: dict[str, list[str]] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     stale: list[str] = field(default_factory=list)
+    read_once: list[str] = field(default_factory=list)
+    repeated: list[str] = field(default_factory=list)
 
     def service(self, plan: Plan, start: float) -> NetworkService:
         """The network for the master.
@@ -49,11 +60,13 @@ class Network:
         """
         columns = np.array([plan.column(name) for name in self.settings.signals], dtype=np.intp)
         first = plan.column(f"{NAME}.{self.settings.signals[0]}")
-        return NetworkService(self.settings, start, columns, first, self.listeners, self.held, self.outputs.sampled)
+        return NetworkService(self.settings, start, columns, first, self.listeners, self.held, self.outputs.readers)
 
     def notes(self) -> list[str]:
-        """What is done where a packet is lost."""
+        """What is done where a packet is lost, and at samples between two packets."""
         told = (
+            (self.read_once, "A reading is read once, and missing and left out until the next packet arrives, at"),
+            (self.repeated, "Samples between two packets take the last reading for a new one, at"),
             (self.left_out, "A reading whose packet is lost is missing, and left out, at"),
             (self.stale, "Where a packet is lost the last reading stays, and is taken for a new one, at"),
         )
@@ -114,6 +127,7 @@ def connect_over(
     owned, told = set(network.settings.signals), table.network.receivers
     direct: list[Link] = []
     over: dict[tuple[str, str], bool] = {}
+    sampled: dict[tuple[str, str], tuple[float, float]] = {}
     loses = network.settings.loss_fraction > 0.0
     fields: dict[tuple[str, str], list[Field]] = {}
     for pair in pairs:
@@ -135,14 +149,25 @@ def connect_over(
         direct.append(pair)
         if travels:
             # fields of a wired event are read when it occurs, and its count is not lost without them
-            over[component, name] = loses and event is None and components[component].can_be_missing(name)
+            able = event is None and components[component].can_be_missing(name)
+            samples = None if event else _samples(table.components[component], components[component], name, where)
+            repeats = samples is not None and _is_faster(samples[0], network.settings, source)
+            if able and samples is not None:
+                sampled[component, name] = samples
+            over[component, name] = able and (loses or repeats)
             network.held.setdefault(source, []).append(component)
+            if repeats or (able and samples is None):
+                (network.read_once if able and repeats else network.repeated).append(target)
             if loses and event is None:
-                (network.left_out if over[component, name] else network.stale).append(target)
+                (network.left_out if able else network.stale).append(target)
     connections = connect(direct, components)
-    sampled = {".".join(c.source) for c in connections if over.get(c.target_variable)}
-    own = [i for i, signal in enumerate(network.settings.signals) if signal in sampled]
-    network.outputs = NetworkOutputs(network.settings, components, own)
+    number_of = {signal: i for i, signal in enumerate(network.settings.signals)}
+    readers = [
+        Reader(".".join(c.target), number_of[".".join(c.source)], *sampled.get(c.target_variable, ()))
+        for c in connections
+        if over.get(c.target_variable)
+    ]
+    network.outputs = NetworkOutputs(network.settings, components, readers)
     node_of = network.settings.node_of
     network.listeners += [
         Listener(component, event, tuple(parts), frozenset(node_of[part.signal] for part in parts))
@@ -157,8 +182,38 @@ def connect_over(
 
 def _received(connection: Connection, leaves_out: Mapping[tuple[str, str], bool]) -> str:
     """The network's output that a target takes: what arrived, where it leaves out what did not, or the last value."""
-    signal = ".".join(connection.source)
-    return arrived_name(signal) if leaves_out[connection.target_variable] else signal
+    leaves = leaves_out[connection.target_variable]
+    return arrived_name(".".join(connection.target)) if leaves else ".".join(connection.source)
+
+
+def _samples(table: ComponentTable, component: Component, name: str, where: str) -> tuple[float, float] | None:
+    """Period and offset [s] of the samples at which a component reads an input; None where it does not stop at them,
+    reads it all the time, or nobody knows.
+    """
+    if not component.can_vary_step or table.every > 1:
+        return None
+    if table.filter is not None:
+        period = table.filter.sample_period if name.startswith("measured_") else None
+        return None if period is None else (period, period)
+    system: Any = None if table.observer is None else make_system(table, where)
+    if system is None:
+        return None
+    events = [e for e in system.periodic_events if name.partition("[")[0] in e.samples]
+    if not events and name.startswith(READINGS):
+        events = list(system.periodic_events)
+    if len(events) != 1:
+        return None
+    values = values_in_use(table, system)
+    period, offset = (0.0 if n is None else float(getattr(values, n)) for n in (events[0].period, events[0].offset))
+    return (period, offset) if period > 0.0 else None
+
+
+def _is_faster(period: float, settings: NetworkSettings, source: str) -> bool:
+    """Whether samples every so often [s] may find nothing new of a signal that is not lost."""
+    node = settings.node_of[settings.signals.index(source)]
+    longest, _ = longest_interval(replace(settings, loss_fraction=0.0), [node])
+    shortest, latest = settings.delay_range
+    return longest is None or period * (1.0 + ROUNDING) < longest + latest - shortest
 
 
 def network_warnings(
