@@ -27,6 +27,12 @@ ADVICE = {
     "underconfident": "its errors are smaller than it tells. Decrease the covariances of process or measurements; a "
     "plant or a sensor that adds no noise in this run looks alike",
 }
+MEANING = {
+    "NIS": "how far measurements are from what it expects, squared, over the variance that it tells for that",
+    "NEES": "how far all its states are from the truth, squared, over the variances that it tells for that",
+    "error": "how far this one is from the truth, squared, over the variance that it tells for that",
+}
+"""What is judged, by kind, for those who do not know the words."""
 NOTHING_WRONG = 1e-6
 """Mean square of errors, in units of what is told, below which a run holds no noise to judge a covariance by."""
 COLOURED = (
@@ -115,16 +121,17 @@ def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
         larger = next((e for e in entries if e.observer == observer and _is_error(e, "overconfident")), None)
         if entry.kind == "NIS" and found.verdict == "underconfident" and larger is not None:
             yield (
-                f"{label(spec, observer)} leaves out an error that is not white: its {entry.name} is "
+                f"{label(spec, observer)} leaves out an error that lasts (is not white): its {entry.name} is "
                 f"{number(found.mean)} on average where {number(found.degrees)} is expected, yet its {larger.name} is "
-                f"{number(larger.found.mean)} where {number(larger.found.degrees)} is. {COLOURED}; see "
-                f"docs/consistency.md."
+                f"{number(larger.found.mean)} where {number(larger.found.degrees)} is ({entry.name}: "
+                f"{MEANING[entry.kind]}; {larger.name}: {MEANING[larger.kind]}). {COLOURED}; see docs/consistency.md."
             )
             continue
         yield (
             f"{label(spec, entry.observer)} is {found.verdict}: its {entry.name} is {number(found.mean)} on average "
             f"where {number(found.degrees)} is expected ({number(found.band.low)} to {number(found.band.high)} for 99 "
-            f"% of consistent filters): {ADVICE[found.verdict]}; see docs/consistency.md."
+            f"% of consistent filters; {entry.name}: {MEANING[entry.kind]}): {ADVICE[found.verdict]}; see "
+            f"docs/consistency.md."
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cosim.evaluation.consistency import FilterConsistency
+from cosim.evaluation.consistency import MEANING, FilterConsistency
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
@@ -12,6 +12,8 @@ from fmus.text_table import text_table
 
 HEADINGS = ("Judged by", "Expected", "Mean", "Band of the mean, 99 %", "Samples inside 95 % band [%]", "Verdict")
 SHORT = ("judged by", "expected", "mean", "band, 99 %", "inside [%]", "verdict")
+
+VERDICTS = "overconfident: errors are larger than told; underconfident: smaller; docs/consistency.md says what to do."
 
 
 def cells(entry: FilterConsistency) -> list[str]:
@@ -38,9 +40,11 @@ def consistency_text(entries: Sequence[FilterConsistency], spec: ReportSpec) -> 
         entries: from `filter_consistency`. spec: labels.
 
     Returns:
-        Lines of equal width; ends without a line break.
+        Lines, the meaning of the words below them; ends without a line break.
     """
     if not entries:
         return ""
     rows = [["filter consistency", *SHORT], *([label(spec, e.observer), *cells(e)] for e in entries)]
-    return "\n".join(text_table(rows, (0, 1, 6), heading=True))
+    told = dict.fromkeys(entry.kind for entry in entries)
+    meanings = [f"{'NEES of one quantity' if kind == 'error' else kind}: {MEANING[kind]}." for kind in told]
+    return "\n".join([*text_table(rows, (0, 1, 6), heading=True), *meanings, VERDICTS])

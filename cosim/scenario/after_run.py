@@ -15,7 +15,7 @@ from fmu_observer.annotated_variable import declared_warnings
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.output_warning import OutputWarning
 
-DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
+DOUBTS = {"doubted": "used", "ignored": "ignored"}  # what became of a telegram that was doubted, by its outcome
 NAMED_DOUBTS = 5
 
 
@@ -101,10 +101,14 @@ def _trespasses(components: Mapping[str, Component], in_steps: Set[str]) -> Iter
 
 def _doubted(name: str, telegrams: Sequence[BaliseRecord]) -> Iterator[str]:
     """Which telegrams an observer did not believe."""
+    parts, count = [], 0
     for outcome, what in DOUBTS.items():
         found = [e for e in telegrams if e.outcomes.get(name) == outcome]
         if found:
             first = ", ".join(f"{e.stamp:.6g} s" for e in found[:NAMED_DOUBTS])
             more = ", ..." if len(found) > NAMED_DOUBTS else ""
-            plural = "telegram" if len(found) == 1 else "telegrams"
-            yield f"{name} doubted {len(found)} {plural} (stamped {first}{more}) and {what}; see docs/telegram_gate.md."
+            parts.append(f"{len(found)} {what} (stamped {first}{more})")
+            count += len(found)
+    if parts:
+        plural = "telegram" if count == 1 else "telegrams"
+        yield f"{name} doubted {count} {plural}: {', '.join(parts)}; see docs/telegram_gate.md."

@@ -50,8 +50,8 @@ def check_certificates(
             continue  # it has no gain that a gap could make unstable
         if not hasattr(system, "certify"):
             warnings.append(
-                f"{name}: not checked against the gaps between its samples; an FMU or a model without certificate "
-                f"cannot tell its limit."
+                f"{name}: not known before the run whether it stays stable over the gaps between its samples: an FMU, "
+                f"or a model without a method certify, does not say. Watch its errors."
             )
             continue
         certificates[name], doubt = _known_judgement(name, table, system, gap)
@@ -90,6 +90,12 @@ def _judge(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> t
         return data | unknown | {"explanation": doubt}, [doubt]
     if certificate.holds:
         return data, []
+    if gap.never:
+        return data, [
+            f"{name}: {gap.reason}: it is on its own for all of {gap.seconds:.4g} s, and its gains are certified for "
+            f"gaps up to {certificate.certified_up_to:.3g} s. Connect what it waits for, or judge it by its errors and "
+            f"leave this out by certificates = 'ignore'."
+        ]
     advice = system.advise(gap.seconds, **in_use) if hasattr(system, "advise") else None
     instead = f" Instead: {advice}." if advice else ""
     return data, [f"{certificate.explain()} Expected: {gap.seconds:.3g} s ({gap.reason}).{instead}"]

@@ -34,12 +34,14 @@ class ExpectedGap:
         reason: where the number comes from.
         distance: longest way to a balise, from another one or from the start of the track [m]; None where time decides.
         spacings: shortest and longest way between two balises [m]; None where time decides, or there is but one.
+        never: no sample comes in the whole run.
     """
 
     seconds: float | None
     reason: str
     distance: float | None = None
     spacings: tuple[float, float] | None = None
+    never: bool = False
 
 
 NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
@@ -107,7 +109,7 @@ class Sources:
                 found.append(ExpectedGap(None, f"another component tells its event '{event}', at instants of its own"))
             elif event not in told:
                 whole = self.table.stop - self.table.start
-                found.append(ExpectedGap(whole, f"nothing tells its event '{event}' in this run"))
+                found.append(ExpectedGap(whole, f"nothing tells its event '{event}' in this run", never=True))
         if not sampled:
             periods = [float(getattr(values, event.period)) for event in system.periodic_events]
             found.append(ExpectedGap(max(periods), "it reads its measurements at this period"))

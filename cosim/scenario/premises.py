@@ -16,8 +16,8 @@ from cosim.scenario.tables import ComponentTable
 
 COUNT, TIME = "premise_violations", "premise_outside_time"
 ADVICE = (
-    "the nearest vertices stood in for it there. Widen the bounds and design the gains anew, or take this as a "
-    "model error."
+    "there the nearest of its linear models stood in. Widen the bounds and design the gains anew, or count this as an "
+    "error of the model."
 )
 
 
@@ -42,13 +42,14 @@ def premise_findings(
             findings[name] = counted
             samples = f"at {counted['samples']} sample(s) and " if "samples" in counted else ""
             text = f"{samples}for {counted['seconds_outside']:.3g} s; {ADVICE}"
-            warnings.append(f"{name}: a premise of its Takagi-Sugeno model was outside its bounds {text}")
+            what = "what its Takagi-Sugeno model mixes linear ones by (a premise)"
+            warnings.append(f"{name}: {what} was outside its bounds {text}")
         elif seen is not None and (seen["seconds_below"] or seen["seconds_above"]):
             findings[name] = seen
             if seen["seconds_above"]:
                 text = (
-                    f"its premise {seen['premise']} was above {seen['bounds'][1]:g} m/s for "
-                    f"{seen['seconds_above']:.3g} s"
+                    f"its Takagi-Sugeno model is made for {seen['premise']} values up to {seen['bounds'][1]:g} m/s; "
+                    f"they were above for {seen['seconds_above']:.3g} s"
                 )
                 warnings.append(f"{name}: {text}; {ADVICE}")
     return findings, warnings

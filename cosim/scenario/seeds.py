@@ -9,7 +9,7 @@ from cosim.components.component import Component
 from cosim.errors import CouplingError
 from cosim.scenario.schema import ScenarioTable
 from fmus.fmi.standard import OWN_TOOL
-from plant_models.hybrid.noise import FROM_NAME, SEED_EXPECTED, is_seed, seed_of
+from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED, is_seed, seed_of
 
 SEED = "seed"
 """Key of the tables, and name of the parameter of a component that draws."""
@@ -47,8 +47,7 @@ def component_seed(component: Component, parameters: Mapping[str, Any], run_seed
         return {}  # what a parameter of that name means is for its maker to say
     seed = parameters.get(SEED, float(variable.start or FROM_NAME))
     if isinstance(seed, bool) or not isinstance(seed, int | float) or not (is_seed(seed) or seed == FROM_NAME):
-        expected = f"{SEED_EXPECTED}, or {FROM_NAME}: it follows from the seed of the run and the name"
-        raise CouplingError(f"{component.name}.{SEED} = {seed!r}: expected {expected}.")
+        raise CouplingError(f"{component.name}.{SEED} = {seed!r}: expected {OWN_SEED_EXPECTED}.")
     return {SEED: seed_of(run_seed, component.name)} if seed == FROM_NAME else {}
 
 

@@ -14,7 +14,7 @@ from cosim.results.formats.catalogue import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.table import Name, OwnSeed, Table
 from fmu_observer.event_protocol import LatePolicy
-from plant_models.hybrid.noise import FROM_NAME
+from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED
 
 
 def _start(value: Any) -> Any:
@@ -68,6 +68,14 @@ Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]
 Backend = Literal["fmu3", "fmu2", "block3", "block2"]
 
 
+def _starts(given: Any) -> Any:
+    """A seed that is no number is told as what a seed is, before it is told as what a start value is."""
+    seed = given.get("seed") if isinstance(given, dict) else None
+    if isinstance(seed, float) and not math.isfinite(seed):
+        raise ValueError(f"seed = {seed!r}: expected {OWN_SEED_EXPECTED}")
+    return given
+
+
 class ComponentTable(Table):
     """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
 
@@ -80,7 +88,7 @@ class ComponentTable(Table):
     backend: Backend | None = Field(default=None, alias="as")
     preset: str | None = None
     options: dict[str, Option] = {}
-    parameters: dict[str, Start] = {}
+    parameters: Annotated[dict[str, Start], BeforeValidator(_starts)] = {}
     tolerance: Tolerance | None = None
     late_policy: LatePolicy = "replay"
     replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0

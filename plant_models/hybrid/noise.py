@@ -26,6 +26,7 @@ FROM_NAME = -1
 RUN_SEED = 0
 """Seed of a run that is given none, and of an FMU whose master knows of none."""
 SEED_EXPECTED = f"a whole number from 0 to {SEED_LIMIT - 1}"
+OWN_SEED_EXPECTED = f"{SEED_EXPECTED}, or {FROM_NAME}: it follows from the seed of the run and the name"
 
 
 class Purpose(IntEnum):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 from cosim import Scenario
 from cosim.errors import CosimError
+from cosim.scenario.after_run import _doubted
 
 STUDIES = Path(__file__).resolve().parents[3] / "docs" / "studies"
 OBSERVER = "takagi_sugeno_cdo"
@@ -51,10 +53,21 @@ def test_a_false_telegram_is_told_by_its_outcome(gate: float, outcome: str) -> N
     assert (abs(at_once) < 1e-9) == (outcome == "ignored")
     said = [text for text in run.warnings if "doubted" in text]
     assert said == ([] if gate == 0.0 else [said[0]])
-    assert all(text.startswith("observer doubted 1 telegram (stamped 10 s)") for text in said)
+    became = {"doubted": "used"}.get(outcome, outcome)
+    assert all(text.startswith(f"observer doubted 1 telegram: 1 {became} (stamped 10 s); see") for text in said)
     (counts,) = [c["events"] for c in run.result.summary["components"] if c["name"] == "observer"]
     assert counts["doubted"] == (outcome == "doubted")
     assert counts["ignored"] == (outcome == "ignored")
+
+
+def test_what_was_doubted_is_told_once_with_what_became_of_it() -> None:
+    outcomes = ["doubted", "accepted", "ignored", "doubted", "doubted", "doubted"]
+    telegrams: Any = [SimpleNamespace(stamp=float(i), outcomes={"obs": o}) for i, o in enumerate(outcomes)]
+    assert list(_doubted("obs", telegrams)) == [
+        "obs doubted 5 telegrams: 4 used (stamped 0 s, 3 s, 4 s, 5 s), 1 ignored (stamped 2 s); see "
+        "docs/telegram_gate.md."
+    ]
+    assert list(_doubted("other", telegrams)) == []
 
 
 @pytest.mark.parametrize(

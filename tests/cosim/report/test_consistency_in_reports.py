@@ -74,7 +74,7 @@ def test_small_innovations_beside_large_errors_are_not_answered_by_smaller_covar
     lasting = run(4.0)
     lasting.table["kf.nis"] /= 16.0
     (warning,) = [w for w in result_warnings(lasting, SPEC) if w.startswith("Filter")]
-    assert "leaves out an error that is not white" in warning
+    assert "leaves out an error that lasts" in warning
     assert "give it a state, or increase the covariance of the process noise" in warning
     assert "Decrease" not in warning
 
@@ -113,7 +113,20 @@ def test_the_report_shows_it() -> None:
     heading, _, row = text.splitlines()[:3]
     assert heading.startswith("filter consistency  judged by")
     assert (heading[0] == " ", row[0] == " ") == (False, False)  # words begin at the left, numbers end at the right
+    assert [line.partition(":")[0] for line in text.splitlines()[-4:]] == [
+        "NIS",
+        "NEES",
+        "NEES of one quantity",
+        "overconfident",
+    ]
     assert consistency_text([], SPEC) == ""
+
+
+def test_a_warning_says_what_its_words_mean() -> None:
+    (by_nis,) = [w for w in result_warnings(run(0.25), SPEC) if "confident" in w]
+    assert "; NIS: how far measurements are from what it expects, squared, over the variance" in by_nis
+    (by_nees,) = [w for w in result_warnings(run(4.0, nis=False), SPEC) if "confident" in w]
+    assert "; NEES: how far all its states are from the truth, squared, over the variances" in by_nees
 
 
 def test_sweeps_have_measures_that_are_one_for_a_consistent_filter() -> None:

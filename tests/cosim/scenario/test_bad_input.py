@@ -74,6 +74,10 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
         {"driver.can_be_missing": "odometer"},
         r"^[^\n]*driver\.can_be_missing: expected a list of names, such as \['effort'\] \(got .odometer.\)$",
     ),
+    "seed of a component that is no number": (
+        {"driver.seed": float("nan")},
+        r"driver\.parameters: seed = nan: expected a whole number from 0 to 9007199254740991, or -1: it follows from",
+    ),
     "balises unsorted": (
         {"balises.positions": [3.0, 1.0]},
         "increasing position.*number 2 at 1 m follows number 1 at 3 m",

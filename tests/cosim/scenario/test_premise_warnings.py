@@ -15,15 +15,16 @@ def run(speed: float) -> cosim.Outcome:
 
 
 def test_premises_outside_their_bounds_are_told() -> None:
-    (warning,) = [text for text in run(60.0).warnings if "premise" in text]  # the model is made for 5 to 50 m/s
+    (warning,) = [text for text in run(60.0).warnings if "Takagi-Sugeno" in text]  # the model is made for 5 to 50 m/s
     assert warning.startswith(
-        "observer: a premise of its Takagi-Sugeno model was outside its bounds at 2 sample(s) and for 1 s"
+        "observer: what its Takagi-Sugeno model mixes linear ones by (a premise) was outside its bounds at 2 sample(s) "
+        "and for 1 s"
     )
 
 
 @pytest.mark.parametrize("speed", [20.0])
 def test_inside_them_nothing_is_said(speed: float) -> None:
-    assert [text for text in run(speed).warnings if "premise" in text] == []
+    assert [text for text in run(speed).warnings if "Takagi-Sugeno" in text] == []
 
 
 def train_run(speed: float, observer: str = "takagi_sugeno_cdo", **parameters: float) -> cosim.Outcome:
@@ -38,8 +39,10 @@ def train_run(speed: float, observer: str = "takagi_sugeno_cdo", **parameters: f
 @pytest.mark.parametrize("observer", ["takagi_sugeno_cdo", "augmented_takagi_sugeno_cdo"])
 def test_a_train_faster_than_its_vertices_is_told_from_the_recorded_odometer(observer: str) -> None:
     outcome = train_run(60.0, observer)
-    (warning,) = [text for text in outcome.warnings if "premise" in text]
-    assert warning.startswith("observer: its premise odometer was above 50 m/s for 1 s; the nearest vertices")
+    (warning,) = [text for text in outcome.warnings if "Takagi-Sugeno" in text]
+    assert warning.startswith(
+        "observer: its Takagi-Sugeno model is made for odometer values up to 50 m/s; they were above for 1 s"
+    )
     found = outcome.result.summary["premises"]["observer"]
     assert (found["premise"], found["bounds"], found["seconds_below"]) == ("odometer", [5.0, 50.0], 0.0)
     assert found["seconds_above"] == pytest.approx(1.0)
@@ -48,7 +51,7 @@ def test_a_train_faster_than_its_vertices_is_told_from_the_recorded_odometer(obs
 def test_a_slow_train_is_counted_without_a_warning() -> None:
     outcome = train_run(2.0)
     assert outcome.result.summary["premises"]["observer"]["seconds_below"] == pytest.approx(1.0)
-    assert [text for text in outcome.warnings if "premise" in text] == []
+    assert [text for text in outcome.warnings if "Takagi-Sugeno" in text] == []
     assert train_run(20.0).result.summary["premises"] == {}
 
 
@@ -61,5 +64,5 @@ def test_an_observer_that_counts_time_only_is_told_of_too() -> None:
     s.add("train", model="locomotive", parameters={"train_speed": 60.0, "wheel_rate": 60.0 / 0.575})
     s.add("observer", observer="takagi_sugeno_luenberger", options={"model": "takagi_sugeno_train"})
     s.connect("train.position -> observer.measured_position", "train.wheel_speed -> observer.measured_odometer")
-    (warning,) = [text for text in s.run().warnings if "premise" in text]
+    (warning,) = [text for text in s.run().warnings if "Takagi-Sugeno" in text]
     assert warning.startswith("observer: a premise of its Takagi-Sugeno model was outside its bounds for 1 s")

@@ -278,3 +278,21 @@ def test_turns_of_nodes_against_products_of_exponentials() -> None:
         gap = certificate.aperiodic_limit * generator.choice([1.0, generator.uniform(0.01, 1.0)])
         error = resets[k % 2] @ scipy.linalg.expm(G * gap) @ error
     assert np.abs(error).max() < 1e-6
+
+
+def test_what_never_gets_a_sample_is_not_told_of_sequences_of_gaps() -> None:
+    s = Scenario(stop=700.0, step=1.0).add("train", model="locomotive", **{"as": "block3"})
+    s.add("obs", observer="discrete_measurement_observer", **{"as": "block3"})
+    s.connect("train.wheel_speed -> obs.odometer")
+    (told,) = [text for text in s.run(warn=lambda _: None).warnings if text.startswith("obs: nothing tells")]
+    assert told.startswith("obs: nothing tells its event 'balise' in this run: it is on its own for all of 700 s, and ")
+    assert "certified for gaps up to" in told
+    assert "sequences" not in told
+
+
+def test_what_has_no_certificate_is_told_in_words() -> None:
+    s = Scenario(stop=1.0, step=0.1).add("train", model="locomotive", **{"as": "block3"})
+    s.add("obs", observer="odometer_reset", **{"as": "block3"}).connect("train.wheel_speed -> obs.odometer")
+    s.balises(position="train.position", speed="train.speed", layout="instants", instants=[0.5])
+    (told,) = [text for text in s.run(warn=lambda _: None).warnings if "certify" in text]
+    assert told.startswith("obs: not known before the run whether it stays stable over the gaps between its samples")
