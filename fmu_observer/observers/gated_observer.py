@@ -16,9 +16,10 @@ from fmu_observer.observers.innovation_gate import (
     Told,
     judge,
 )
-from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal, vector, width
+from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal, vector
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.state_layout import StateLayout
 from plant_models.hybrid.system import Array
 
 GATED_EVENT = "balise"
@@ -39,7 +40,8 @@ class GatedObserver(HybridSystem):
     The contract:
 
     1. A subclass declares the event `balise` with the payload `balise_position`, and the position it believes is the
-       state `position_state`. It writes `update` in place of `jump`, and sees there its own states only.
+       state `position_state`, the first one unless it says so. It writes `update` in place of `jump`, and returns
+       there own states only.
     2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event
        gets `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
     3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what
@@ -53,13 +55,15 @@ class GatedObserver(HybridSystem):
         options: of the observer, see its `option_choices`.
     """
 
-    position_state: int = 0
+    position_state: str = ""
     gate_start: float = REJECT
     weighing: Weighing = "innovation"
-    weighed_states: ClassVar[tuple[int, ...]] = (0,)
+    weighed_states: ClassVar[tuple[str, ...]] = ("estimated_position",)
 
     def __init__(self, **options: Any) -> None:
-        self.own_count = width(self.states)
+        self.position_state = self.position_state or self.states[0].name
+        self._updated_places = StateLayout(self.states)
+        self.own_count = self._updated_places.width
         self.gated = any(_is_gated(event) for event in self.events)
         if self.gated:
             self.states = (*self.states, *GATE_MEMORY)
@@ -72,17 +76,15 @@ class GatedObserver(HybridSystem):
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Own states after an event, shape (own_count,), of the own states before it; a telegram here is one to be
-        used.
-        """
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
+        """New values of the own states that an event changes, by name; a telegram here is one to be used."""
         raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no update for it.")
 
     def odometer_of(self, u: Any) -> Array | None:
         """The odometer at the telegram [m/s]; None where the observer has none."""
         return None
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """What the observer itself says its position may be off [m], of a covariance, say; zero where it does not."""
         return 0.0
 
@@ -96,38 +98,50 @@ class GatedObserver(HybridSystem):
         """Bounds of the gate's parameters, see `HybridSystem.requirements`."""
         return super().requirements(p) | (within_bounds(GATE_PARAMETERS, p) if self.gated else {})
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """`update`, where the gate lets the telegram pass; shape (n,)."""
-        own, gate = [x[i] for i in range(self.own_count)], [x[i] for i in range(self.own_count, x.shape[0])]
-        if not self.gated or event != GATED_EVENT:
-            after = self.update(event, t, vector(*own), u, p)
-            return vector(*(after[i] for i in range(self.own_count)), *gate)
-        estimate = own[self.position_state]
-        before, odometer = GateMemory(*gate), self.odometer_of(u)
-        if odometer is not None:  # where it is missing, the one at the telegram before is the last that is known
-            odometer = or_else(odometer, before.last_odometer)
-        place, accuracy, own_bound = u.balise_position, u.balise_location_accuracy, self.own_bound(x, p)
-        judged = judge(before, Told(place, accuracy, estimate, own_bound, odometer, t), p)
-        listens = self.listens(p)
-        used = np.where(listens > 0.0, judged.used, 1.0)
-        kept = list(own)
-        kept[self.position_state] = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
-        after = self._weighed_update(t, kept, u, p, judged.weight)
-        return vector(
-            *(np.where(used > 0.0, after[i], own[i]) for i in range(self.own_count)),
-            *(np.where(listens > 0.0, new, old) for new, old in zip(judged.memory, gate, strict=True)),
-        )
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
+        """`update`, where the gate lets the telegram pass."""
+        if self.by_name:
+            return self._judged_update(event, t, x, self.own_bound(x, p), u, p)
+        places, named = self._own_places, self._own_places.named(x)
+        changed = self._judged_update(event, t, named, self.own_bound(x, p), u, p)
+        return places.flat(changed, f"{self.name}: jump({event!r})", x.shape[1:], x)
 
-    def _weighed_update(self, t: Array, own: list[Array], u: Any, p: Any, weight: Array) -> list[Array]:
-        """`update` at a telegram that weighs so much [1]; own states afterwards."""
-        estimate, told = own[self.position_state], u.balise_position
+    def _judged_update(self, event: str, t: Array, x: Any, bound: Array, u: Any, p: Any) -> dict[str, Array]:
+        if not self.gated or event != GATED_EVENT:
+            return self._update_of(event, t, x, u, p)
+        estimate = getattr(x, self.position_state)
+        gate = GateMemory(*(getattr(x, s.name) for s in GATE_MEMORY))
+        odometer = self.odometer_of(u)
+        if odometer is not None:  # where it is missing, the one at the telegram before is the last that is known
+            odometer = or_else(odometer, gate.last_odometer)
+        told = Told(u.balise_position, u.balise_location_accuracy, estimate, bound, odometer, t)
+        judged, listens = judge(gate, told, p), self.listens(p)
+        used = np.where(listens > 0.0, judged.used, 1.0)
+        begun = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
+        after = self._weighed_update(t, x._replace(**{self.position_state: begun}), u, p, judged.weight)
+        remembered = zip(GATE_MEMORY, judged.memory, gate, strict=True)
+        return {name: np.where(used > 0.0, value, getattr(x, name)) for name, value in after.items()} | {
+            s.name: np.where(listens > 0.0, new, old) for s, new, old in remembered
+        }
+
+    def _weighed_update(self, t: Array, x: Any, u: Any, p: Any, weight: Array) -> dict[str, Array]:
+        """`update` at a telegram that weighs so much [1]; at least the position afterwards."""
+        estimate, told = getattr(x, self.position_state), u.balise_position
         if self.weighing == "innovation":
             u = u._replace(balise_position=_towards(estimate, told, weight))
-        updated = self.update(GATED_EVENT, t, vector(*own), u, p)
-        after = [updated[i] for i in range(self.own_count)]
+        after = {self.position_state: estimate} | self._update_of(GATED_EVENT, t, x, u, p)
         if self.weighing == "position":
-            for i in self.weighed_states:
-                after[i] = _towards(own[i], after[i], weight)
+            after |= {name: _towards(getattr(x, name), after[name], weight) for name in self.weighed_states}
+        return after
+
+    def _update_of(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """`update`, of systems without `by_name` too."""
+        if self.by_name:
+            changed: dict[str, Array] = self.update(event, t, x, u, p)
+            return changed
+        own = [(getattr(x, s.name), s.size) for s in self._updated_places.signals]
+        flat = vector(*(v if n is None else v[i] for v, n in own for i in range(n or 1)))
+        after: dict[str, Array] = self._updated_places.named(self.update(event, t, flat, u, p))._asdict()
         return after
 
 

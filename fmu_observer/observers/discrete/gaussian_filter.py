@@ -359,7 +359,7 @@ class GaussianFilter(GatedObserver):
 
     def own_bound(self, x: Array, p: Any) -> Array:
         """Three standard deviations of the position [m], for the gate of balise telegrams."""
-        i = self.position_state
+        i = [s.name for s in self.states].index(self.position_state)
         return SIGMAS * np.sqrt(np.maximum(self.covariance_of(self.belief(x).spread)[i, i], 0.0))
 
     # -- internals --------------------------------------------------------------------------------------------------
@@ -413,13 +413,13 @@ class GaussianFilter(GatedObserver):
         known = Known(0.0, inputs, parameters)
         return np.asarray(noise_over(model, model.start, known, model.sample_period, density)), text
 
-    def _position_state(self) -> int:
+    def _position_state(self) -> str:
         """The state that the told position is: the one whose column in its row of the Jacobian is largest."""
         names = [s.name for s in self.model.measurements]
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
         inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
         H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
-        return int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))
+        return self.states[int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))].name
 
 
 def _matrix(name: str, values: np.ndarray, text: str) -> Signal:

@@ -95,7 +95,7 @@ class HeldOdometerObserver(TrainObserver):
     source = "Aguiar Cota 2019, (4.1)-(4.19), (4.40), 4.3.4, 5.4"
     frictions = (SPEED.name,)
     weighing = "position"
-    weighed_states = (0, POSITION_BOUND)
+    weighed_states = ("estimated_position", "integrated_bound")
     inputs = (
         *TrainObserver.inputs,
         input_signal(
