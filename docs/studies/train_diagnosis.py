@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,7 @@ from train_diagnosis_runs import (
     recorded,
     sensed,
 )
+from turned_faults import NONE, Error
 
 from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_isolation import FAULTS
@@ -124,51 +125,42 @@ class Case:
     """A fault of a size.
 
     Attributes:
-        title: of the row. fault: that is to be told. during: ``any``, ``brake`` or ``pull``: when it begins.
-        lasts: [s]; infinite for the rest of the run. change: of a reading and its mean before, to the faulty one.
-        signal: input of the diagnosis that it changes; empty for the balise. offset: of the balise [m].
+        title: of the row. fault: that is to be told. signal: input of the diagnosis that it changes; empty for the
+            balise. error: what the reading becomes; of a balise its offset [m]. during: ``any``, ``brake`` or ``pull``:
+            when it begins. lasts: [s]; infinite for the rest of the run. frozen: the reading stays what it was.
     """
 
     title: str
     fault: str
     signal: str
-    change: Callable[[np.ndarray], np.ndarray] | None = None
+    error: Error = NONE
     during: str = "any"
     lasts: float = np.inf
     frozen: bool = False
-    ramp: float = 0.0
-    offset: float = 0.0
-
-
-def _gain(factor: float) -> Callable[[np.ndarray], np.ndarray]:
-    return lambda y: factor * y
-
-
-def _plus(offset: float) -> Callable[[np.ndarray], np.ndarray]:
-    return lambda y: y + offset
 
 
 CASES = (
-    *(Case(f"odometer 1 reads {g:g} of it", "odometer_1", "odometer_1", _gain(g)) for g in (0.98, 0.95, 0.9, 0.8, 1.1)),
+    *(Case(f"odometer 1 reads {g:g} of it", "odometer_1", "odometer_1", Error(g)) for g in (0.98, 0.95, 0.9, 0.8, 1.1)),
     Case("odometer 1 frozen", "odometer_1", "odometer_1", frozen=True),
-    Case("odometer 2 reads 0.9 of it", "odometer_2", "odometer_2", _gain(0.9)),
+    Case("odometer 2 reads 0.9 of it", "odometer_2", "odometer_2", Error(0.9)),
     *(
-        Case(f"jam of wheel 1, {d:g}, 3 s", "odometer_1", "odometer_1", _gain(1 - d), "brake", 3.0)
+        Case(f"jam of wheel 1, {d:g}, 3 s", "odometer_1", "odometer_1", Error(1 - d), "brake", 3.0)
         for d in (0.1, 0.3, 1.0)
     ),
-    Case("skid of wheel 1, 0.3, 3 s", "odometer_1", "odometer_1", _gain(1.3), "pull", 3.0),
-    *(Case(f"radar reads {g:g} of it", "radar", "radar", _gain(g)) for g in (0.98, 0.95, 0.9)),
+    Case("skid of wheel 1, 0.3, 3 s", "odometer_1", "odometer_1", Error(1.3), "pull", 3.0),
+    *(Case(f"radar reads {g:g} of it", "radar", "radar", Error(g)) for g in (0.98, 0.95, 0.9)),
     Case("radar frozen", "radar", "radar", frozen=True),
-    *(Case(f"satellites jump by {d:g} m", "gps", "gps_position", _plus(d)) for d in (3.0, 6.0, 20.0)),
-    Case("satellites drift by 0.3 m/s", "gps", "gps_position", _plus(0.0), ramp=0.3),
+    *(Case(f"satellites jump by {d:g} m", "gps", "gps_position", Error(offset=d)) for d in (3.0, 6.0, 20.0)),
+    Case("satellites drift by 0.3 m/s", "gps", "gps_position", Error(drift=0.3)),
     Case("satellites frozen", "gps", "gps_position", frozen=True),
-    *(Case(f"balise off by {d:g} m", "balise", "", offset=d) for d in (3.0, 6.0, 12.0)),
+    *(Case(f"balise off by {d:g} m", "balise", "", Error(offset=d)) for d in (3.0, 6.0, 12.0)),
     *(
-        Case(f"pressure reads {g:g} of it", "pressure_sensor", "cylinder_pressure", _gain(g), "brake")
+        Case(f"pressure reads {g:g} of it", "pressure_sensor", "cylinder_pressure", Error(g), "brake")
         for g in (0.9, 0.8, 0.5)
     ),
-    Case("pressure reads zero", "pressure_sensor", "cylinder_pressure", _gain(0.0), "brake"),
+    Case("pressure reads zero", "pressure_sensor", "cylinder_pressure", Error(0.0), "brake"),
 )
+TURNED = tuple(replace(case, error=case.error.turned) for case in CASES if not case.frozen)
 ACTUATORS: tuple[tuple[str, str, Journey], ...] = tuple(
     (f"{title} {share:g} of it", fault, make(share))
     for title, fault, make in (
@@ -194,7 +186,7 @@ def injected(
     error = np.zeros((members, len(places)))
     if not case.signal:
         which = rng.integers(1, max(len(places) - 1, 2), members)
-        error[np.arange(members), which] = case.offset
+        error[np.arange(members), which] = case.error.offset
         return dict(read), np.interp(places[which], run["position"], t), error
     faulty = read[case.signal].copy()
     for member, start in enumerate(starts):
@@ -202,8 +194,9 @@ def injected(
         part = faulty[member, start:end]
         if case.frozen:
             faulty[member, start:end] = faulty[member, start - 1]
-        elif case.change is not None:
-            faulty[member, start:end] = case.change(part) + case.ramp * PERIOD * np.arange(1, len(part) + 1)
+        else:
+            drifted = case.error.drift * PERIOD * np.arange(1, len(part) + 1)
+            faulty[member, start:end] = case.error.gain * part + case.error.offset + drifted
     return {**read, case.signal: faulty}, t[starts], error
 
 
@@ -250,16 +243,18 @@ def score_row(title: str, s: Score, note: str = "") -> str:
     return f"| {title} | {s.faults} | {share} | {delays} | {told} | {note} |"
 
 
-def case_scores(runs: Runs, members: int, settings: Settings | None = None) -> list[Score]:
-    """What becomes of each of `CASES`, on journeys that made no threshold."""
+def case_scores(
+    runs: Runs, members: int, settings: Settings | None = None, cases: Sequence[Case] = CASES
+) -> list[Score]:
+    """What becomes of each case, on journeys that made no threshold."""
     reads = [sensed(run, members, 900 + i) for i, run in enumerate(runs)]
-    by_case: list[list[Score]] = [[] for _ in CASES]
+    by_case: list[list[Score]] = [[] for _ in cases]
     for i, (run, read) in enumerate(zip(runs, reads, strict=True)):
-        drawn = [injected(case, run, read, 1000 * number + i) for number, case in enumerate(CASES)]
+        drawn = [injected(case, run, read, 1000 * number + i) for number, case in enumerate(cases)]
         together = {name: np.concatenate([faulty[name] for faulty, _, _ in drawn]) for name in read}
         error = np.concatenate([error for _, _, error in drawn])
         out = diagnosed(run, together, settings, error, [f"{fault}_fault" for fault in FAULTS])
-        for number, (case, (_, onsets, _)) in enumerate(zip(CASES, drawn, strict=True)):
+        for number, (case, (_, onsets, _)) in enumerate(zip(cases, drawn, strict=True)):
             own = {name: values[number * members : (number + 1) * members] for name, values in out.items()}
             by_case[number].append(scored(own, case.fault, run["time"], onsets))
     return [joined(scores) for scores in by_case]
@@ -285,6 +280,30 @@ def fault_table(found: list[Score], members: int) -> str:
     return "\n".join(lines)
 
 
+def turned_table(found: list[Score], turned: list[Score]) -> str:
+    """The faults that have a sign beside those of the other one: detection, delay and isolation.
+
+    Args:
+        found: of all `CASES`. turned: of `TURNED`.
+    """
+    heads = ("detected [%]", "delay, median; 95 % within [s]", "isolated rightly [%]", "wrongly [%]")
+    lines = ["| fault | turned | " + " | ".join(f"{head}, {sign}" for head in heads for sign in ("as above", "turned"))]
+    lines = [f"{lines[0]} |", "|---|---|" + "---|" * (2 * len(heads))]
+    signed = [(case, score) for case, score in zip(CASES, found, strict=True) if not case.frozen]
+    for (case, one), other, two in zip(signed, TURNED, turned, strict=True):
+        cells = [[f"{100 * s.detected / s.faults:.0f}" for s in (one, two)]]
+        cells += [[_delays(s) for s in (one, two)]]
+        cells += [[f"{100 * getattr(s, name) / s.faults:.0f}" for s in (one, two)] for name in ("right", "wrong")]
+        e = other.error
+        how = f"{e.gain:g} of it" if e.gain != 1.0 else f"{e.offset:g} m" if e.offset else f"{e.drift:g} m/s"
+        lines.append(f"| {case.title} | {how} | " + " | ".join(" | ".join(c) for c in cells) + " |")
+    return "\n".join(lines)
+
+
+def _delays(s: Score) -> str:
+    return f"{np.median(s.delays):.1f}; {np.quantile(s.delays, 0.95):.1f}" if s.delays.size else "-"
+
+
 def wet_cost_table(dry: list[Score], wet: list[Score]) -> str:
     """What the wider thresholds cost, on the same dry journeys: faults that compare wheels."""
     lines = [
@@ -300,7 +319,7 @@ def wet_cost_table(dry: list[Score], wet: list[Score]) -> str:
     for case, *both in zip(CASES, dry, wet, strict=True):
         if case.fault in ("odometer_1", "odometer_2", "radar"):
             cells = [[f"{100 * s.detected / s.faults:.0f}" for s in both]]
-            cells += [[f"{np.median(s.delays):.1f}; {np.quantile(s.delays, 0.95):.1f}" for s in both]]
+            cells += [[_delays(s) for s in both]]
             cells += [[f"{100 * s.right / s.faults:.0f}" for s in both]]
             lines.append(f"| {case.title} | {both[0].faults} | " + " | ".join(" | ".join(c) for c in cells) + " |")
     return "\n".join(lines)
@@ -331,6 +350,7 @@ def tables(seeds: int = SEEDS, members: int = FAULTY) -> dict[str, str]:
         "thresholds": threshold_table(free),
         "alarms": alarm_table(free),
         "faults": fault_table(scores, members),
+        "turned": turned_table(scores, case_scores(dry, members, cases=TURNED)),
         "wet thresholds": threshold_table(rail, WET),
         "wet alarms": alarm_table(alarms),
         "wet cost": wet_cost_table(scores, case_scores(dry, members, WET)),

@@ -17,6 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from train_diagnosis_runs import PERIOD, Journey, balise_places, diagnosed, recorded, sensed
+from turned_faults import Error
 
 from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_isolation import FAULTS
@@ -32,14 +33,14 @@ WET = (
 MEMBERS, SETTLED, WHEEL = 20, 50, 2.0
 COLOUR, HUM = 2.0, 0.1  # [s] correlation, [m/s] deviation of what is added to the radar
 Change = Callable[[dict[str, np.ndarray], slice], None]
-Faults = dict[str, tuple[str, float, float]]
-OFF: Faults = {  # by fault: input of the diagnosis, gain, offset; of a balise its offset
-    "odometer_1": ("odometer_1", 0.9, 0.0),
-    "odometer_2": ("odometer_2", 0.9, 0.0),
-    "radar": ("radar", 0.95, 0.0),
-    "gps": ("gps_position", 1.0, 6.0),
-    "pressure_sensor": ("cylinder_pressure", 0.8, 0.0),
-    "balise": ("", 1.0, 6.0),
+Faults = dict[str, tuple[str, Error]]
+OFF: Faults = {  # by fault: input of the diagnosis, what becomes of it; of a balise its offset
+    "odometer_1": ("odometer_1", Error(0.9)),
+    "odometer_2": ("odometer_2", Error(0.9)),
+    "radar": ("radar", Error(0.95)),
+    "gps": ("gps_position", Error(offset=6.0)),
+    "pressure_sensor": ("cylinder_pressure", Error(0.8)),
+    "balise": ("", Error(offset=6.0)),
 }
 PAIRS = (
     ("odometer_1", "pressure_sensor"),
@@ -62,11 +63,11 @@ def told(run: dict[str, np.ndarray], faults: Faults, settings: Mapping[str, floa
     read, places = sensed(run, MEMBERS, seed), balise_places(run)
     first = len(run["time"]) // 3
     error = np.zeros((MEMBERS, len(places)))
-    for signal, gain, offset in faults.values():
+    for signal, off in faults.values():
         if signal:
-            read[signal][:, first:] = gain * read[signal][:, first:] + offset
+            read[signal][:, first:] = off.gain * read[signal][:, first:] + off.offset
         else:
-            error[:, np.flatnonzero(places > run["position"][first])[:1]] = offset
+            error[:, np.flatnonzero(places > run["position"][first])[:1]] = off.offset
     found = diagnosed(run, read, settings, error, NAMES)
     return {name: rows[:, first - 1 :] for name, rows in found.items()}
 
@@ -93,11 +94,13 @@ def fault_table(dry: list[dict[str, np.ndarray]], wet: list[dict[str, np.ndarray
     head = ("faults", "rails", "detected [%]", "no single fault [%]", "isolated, each [%]", "another isolated [%]")
     rows = [head, ("---",) * len(head)]
     wanted = [(" and ".join(pair), {fault: OFF[fault] for fault in pair}) for pair in PAIRS]
-    wanted += [(f"{fault} reads {gain} of it", {fault: (OFF[fault][0], gain, 0.0)}) for fault, gain in SIZES]
+    wanted += [(f"{fault} reads {gain} of it", {fault: (OFF[fault][0], Error(gain))}) for fault, gain in SIZES]
     for title, faults in wanted:
+        other = {fault: (signal, off.turned) for fault, (signal, off) in faults.items()}
         for rails, runs in (("dry", dry), ("wet", wet)):
             settings = TrainDiagnosis.presets["wet_rails" if rails == "wet" else "swept"]
-            rows.append((title.replace("_", " "), rails, *counted(runs, faults, settings, 7000)))
+            for sign, acting in (("", faults), (", turned", other)):
+                rows.append((title.replace("_", " ") + sign, rails, *counted(runs, acting, settings, 7000)))
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 

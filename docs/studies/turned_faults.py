@@ -24,6 +24,9 @@ class Error(NamedTuple):
         return Error(2.0 - self.gain, -self.offset, -self.drift)
 
 
+NONE = Error()
+
+
 def turned(chosen: Scenario) -> Scenario:
     """The scenario with all given faults of its wheels and signals turned: jams are skids, what is low is high.
 

@@ -109,6 +109,13 @@ def main() -> None:
     sheet.add(f"detected in every run, of {len(faults)} faults", "1", None, float(always), SMALL)
     sheet.add("isolated rightly in 98 % of the runs and more", "1", None, float(alone), SMALL)
     sheet.add("isolated wrongly, largest share", "%", None, max(number(row[6]) for row in faults), STUDY)
+    turned = stored("turned")
+    whole = sum(number(row[3]) == WHOLE for row in turned)
+    sheet.add(f"of the other sign: detected in every run, of {len(turned)} faults", "1", None, float(whole), SMALL)
+    least = sum(number(row[7]) >= WHOLE - 2.0 for row in turned)
+    sheet.add("of the other sign: isolated rightly in 98 % of the runs and more", "1", None, float(least), SMALL)
+    wrong = max(number(row[9]) for row in turned)
+    sheet.add("of the other sign: isolated wrongly, largest share", "%", None, wrong, STUDY)
     quick = [row for row in faults if number(row[2]) > SHARE]
     sheet.add("delay, median over faults", "s", None, float(np.median([number(row[3]) for row in quick])), STUDY)
     for row in quick:
