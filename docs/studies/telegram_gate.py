@@ -127,12 +127,29 @@ def follow(
 ) -> list[Telegram]:
     """Run an observer beside the recording, its gate rejecting, and note every telegram."""
     stamps, places = crossings(recording, spacing, start)
-    observer = OBSERVERS[name]()
     preset, values = settings(name, float(np.diff(stamps, prepend=0.0).max()), model)
+    return beside(name, preset, values | gate, recording, stamps, places)
+
+
+def beside(
+    name: str,
+    preset: str | None,
+    values: Mapping[str, Any],
+    recording: Recording,
+    stamps: np.ndarray,
+    places: np.ndarray,
+    step: float | None = None,
+) -> list[Telegram]:
+    """Run an observer beside the recording, its gate rejecting, and note the telegrams of balises at `places` [m],
+    passed at `stamps` [s]; in internal steps of its own, or of `step` [s].
+    """
+    observer = OBSERVERS[name]()
     starts = {s.name for s in observer.states}
     runtime = Runtime(observer)
     own = {key: value for key, value in values.items() if key not in starts and key != "internal_step"}
-    runtime.p[:] = parameter_values(observer, {**own, "gate": 2.0, **gate}, preset)
+    runtime.p[:] = parameter_values(observer, {"gate": 2.0, **own}, preset)
+    if step is not None:
+        runtime.p[scalar_names(observer.parameter_signals).index("internal_step")] = step
     p, inputs = observer.unpack_parameters(runtime.p.copy()), scalar_names(observer.input_signals)
     for key, value in values.items():
         if key in starts:

@@ -78,14 +78,32 @@ def test_a_gate_that_cannot_be_is_refused_by_name(name: str, value: float) -> No
         scenario(**{name: value}).run(warn=lambda _text: None)
 
 
-def test_a_part_of_the_study_comes_out_again() -> None:
+def study_of(name: str) -> Any:
+    """A study of the pages, which leaves no trace among the modules."""
     sys.path.insert(0, str(STUDIES))
     try:
-        study = import_module("telegram_gate")
+        return import_module(name)
     finally:
         sys.path.remove(str(STUDIES))
-        sys.modules.pop("telegram_gate", None)
+        for known in (name, "telegram_gate"):
+            sys.modules.pop(known, None)
+
+
+def test_a_part_of_the_study_comes_out_again() -> None:
+    study = study_of("telegram_gate")
     telegrams = study.follow(OBSERVER, study.record("wet", stop=120.0), 100.0, 0.5, "wrong")
     assert len(telegrams) > 30
     assert study.ignored_true(telegrams) == 0.0
     assert np.interp((1.0, 100.0), study.OFFSETS, study.accepted_false(telegrams)).tolist() == [1.0, 0.0]
+
+
+def test_a_journey_that_no_threshold_saw_comes_out_again() -> None:
+    """Of the second table: nothing true is ignored, though slopes are not told and the model is wrong."""
+    study = study_of("telegram_gate_journeys")
+    journey = study.draw_journey(5)
+    laid = study.lay(journey, 300.0)
+    for name in ("odometer_reset", "quasi_lpv_uio"):
+        telegrams = study.follow(name, journey, 300.0, "wrong", laid)
+        assert len(telegrams) > 15
+        assert study.ignored_true(telegrams) == 0.0
+        assert float(np.interp(100.0, study.OFFSETS, study.accepted_false(telegrams))) < 0.05
