@@ -17,12 +17,19 @@ from fmu_observer.event_protocol import LatePolicy
 from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED
 
 
+class _Seed(float):
+    """A number that was given as a seed."""
+
+
 def _start(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_start(entry) for entry in value]
     if isinstance(value, bool | int | str) or (isinstance(value, float) and math.isfinite(value)):
         return value
-    raise ValueError(f"expected a finite number, true or false, a text, or a list of them (got {value!r})")
+    expected = (
+        OWN_SEED_EXPECTED if isinstance(value, _Seed) else "a finite number, true or false, a text, or a list of them"
+    )
+    raise ValueError(f"expected {expected} (got {value!r})")
 
 
 Start = Annotated[Any, PlainValidator(_start)]
@@ -69,11 +76,9 @@ Backend = Literal["fmu3", "fmu2", "block3", "block2"]
 
 
 def _starts(given: Any) -> Any:
-    """A seed that is no number is told as what a seed is, before it is told as what a start value is."""
+    """Start values, of which a seed that is no number says that it is one."""
     seed = given.get("seed") if isinstance(given, dict) else None
-    if isinstance(seed, float) and not math.isfinite(seed):
-        raise ValueError(f"seed = {seed!r}: expected {OWN_SEED_EXPECTED}")
-    return given
+    return {**given, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else given
 
 
 class ComponentTable(Table):

@@ -57,6 +57,12 @@ def test_a_limit_is_found_by_runs() -> None:
     assert survives(told, [0.1, 0.45, 0.55]).tolist() == [True, True, False]
 
 
+def test_the_step_in_which_the_first_failure_lies_is_tried_anew() -> None:
+    """Of four values 0.333 s is kept and 0.617 s lost; of four between them 0.428 s is, and 0.522 s not."""
+    told = trial(varied="delay", delay_parameter="period", low=0.05, high=0.9, period=0.2)
+    assert practical_limit(told, 4) == pytest.approx(0.05 + 5.0 * 0.85 / 9.0, rel=1e-12)
+
+
 def test_ends_of_the_range() -> None:
     told = trial(varied="delay", delay_parameter="period", period=0.2)
     assert practical_limit(trial(varied="delay", delay_parameter="period", period=0.2, high=0.4)) == np.inf
