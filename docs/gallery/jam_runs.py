@@ -6,7 +6,7 @@ Runge-Kutta of order four in NumPy; the observers run as one batch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,6 +66,11 @@ class Jams:
     onset: np.ndarray
     length: np.ndarray
     depth: np.ndarray
+
+    @property
+    def turned(self) -> Jams:
+        """The same faults with the other sign: a wheel that is as much too fast as it was too slow."""
+        return replace(self, depth=-self.depth)
 
 
 def trains(case: Case, members: int, rng: np.random.Generator | None = None) -> Trains:

@@ -28,6 +28,10 @@ LATE = (
     "which then latches. The same rules without that delay give the numbers of the independent run: it had none"
 )
 AT_ONCE = "the printed rules without their delay, other noise than in the independent run"
+TURNED = (
+    "ours: the thesis has jams only. A brake does not make a wheel too fast: after 1.2 s the odometer is followed, and "
+    "its way is believed, so that a long skid costs what it costs the odometer"
+)
 DELAY = "the onsets lie on a sample here, which shows the jam at once; the printed rules act one sample later"
 RULES: dict[str, tuple[str, dict[str, float]]] = {
     "repaired rules": ("repaired", {}),
@@ -79,6 +83,17 @@ def main() -> None:
                 DELAY,
                 independent="0.2 to 0.4",
             )
+    fast = readings(run, jams.turned, NOISE, np.random.default_rng(0), False)
+    out, sensed = (
+        observe(CASE, run, fast, aggregated=False, estimated_speed=44.1),
+        odometer_error(position, fast, 200.0),
+    )
+    for member, (onset, length) in enumerate(JAMS):
+        rows = before_balises(position[member])
+        row, what = rows[t[rows] > onset + length][0], f"a skid of 10 % at {onset:g} s of {length:g} s"
+        sheet.add(f"true minus odometer position, {what}", "m", None, -sensed[member, row], TURNED, repeats=0.05)
+        off = position[member, row] - out["position"][member, row]
+        sheet.add(f"true minus estimated position, {what}, repaired rules", "m", None, float(off), TURNED, repeats=0.2)
     axis.plot(t, alone[1], label="odometer")
     for label, out in told.items():
         shown = np.clip(out["position"][1] - position[1], -12.0, 12.0)

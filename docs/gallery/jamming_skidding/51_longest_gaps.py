@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 from shared.sheet import Sheet
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
+
+from turned_faults import turned
 
 from cosim import Scenario
 from cosim.drawing.style import new_figure
@@ -40,6 +47,10 @@ def main() -> None:
         sheet.add(f"largest of {len(found.gaps)} gaps: {told}", "m", None, largest(errors), WHY, repeats=0.05)
         in_time = largest(seconds[~np.isnan(seconds)])
         sheet.add(f"largest running time: {told}", "s", None, in_time, WHY, repeats=0.05)
+    other = turned(Scenario.load("amsterdam_utrecht")).run(warn=lambda _text: None)
+    for name, errors in gap_errors(other.result, other.spec).errors.items():
+        what = f"jams and skids turned, largest of {len(found.gaps)} gaps: {found.labels[name]}"
+        sheet.add(what, "m", None, largest(errors), WHY, repeats=0.05)
     figure = new_figure((9.0, 4.6))
     gap_error_figure(outcome.result, outcome.spec, figure.add_subplot())
     sheet.finish(figure)
