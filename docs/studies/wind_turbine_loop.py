@@ -33,15 +33,20 @@ PEAKS = (
     ("pitch_brief", 3),
     ("pitch_long", 3),
     ("speed", 4),
+    ("shaft_angle", 1),
     ("torque", 1),
     ("efficiency", 1),
 )
 """Residuals whose limits are parameters of the diagnosis, ``NAME_limit``, and over how many sensors."""
 
-OWN_ALARM = {1: 4, 2: 3, 3: 6, 4: 7, 5: 8, 6: 9, 7: 10, 8: 12, 9: 13, 10: 14}
+NOT_ISOLATED = len(ALARM_NAMES)
+"""Place behind `ALARM_NAMES` of a fault that is detected and not isolated; as own alarm: that any is detected."""
+SPEED_SENSORS = 11
+"""Number of the fault of the four sensors of rotor and generator speed, each off by its own share `off`."""
+OWN_ALARM = {1: 4, 2: 3, 3: 6, 4: 7, 5: 8, 6: 9, 7: 10, 8: 12, 9: 13, 10: 14, SPEED_SENSORS: NOT_ISOLATED}
 """Place of the alarm of each fault in `ALARM_NAMES`."""
 
-_ALARMS = len(ALARM_NAMES)
+_ALARMS = NOT_ISOLATED + 1
 _LOG = (
     memory("first_raised", "s", -1.0, "Own alarm first raised during the fault"),
     memory("first_clear", "s", -1.0, "Own alarm first clear after the fault"),
@@ -93,6 +98,9 @@ class WindTurbineLoop(HybridSystem):
         parameter("onset", "s", 0.0, "Begin of the fault"),
         parameter("end", "s", 0.0, "End of the fault"),
         parameter("size", "1", 1.0, "Its size, in that of the benchmark"),
+        parameter(
+            "off", "1", 0.0, "Shares by which fault 11 makes rotor sensors 1, 2, generator sensors 1, 2 read", size=4
+        ),
         parameter("own", "1", 0.0, "Place of its alarm"),
         parameter("mean_from", "m/s", 9.0, "Mean wind at the start"),
         parameter("mean_to", "m/s", 14.0, "Mean wind at the end"),
@@ -200,6 +208,10 @@ class WindTurbineLoop(HybridSystem):
         rotor[1] = rotor[1] * (1.0 + 4.0 * p.size * self._is(p, 4) * acts)
         generator[0] = self._stuck(generator[0], 50.0, self._is(p, 5) * acts)
         generator[1] = generator[1] * (1.0 + 4.0 * p.size * self._is(p, 6) * acts)
+        shares = [1.0 + p.off[i] * self._is(p, SPEED_SENSORS) * acts for i in range(4)]
+        rotor, generator = (
+            [value * shares[first + i] for i, value in enumerate(pair)] for first, pair in ((0, rotor), (2, generator))
+        )
         single = {"wind": held("wind")[0], "torque": held("torque")[0], "power": held("power")[0]}
         return {"pitch": pitch, "rotor": rotor, "generator": generator, **single}
 
@@ -220,11 +232,12 @@ class WindTurbineLoop(HybridSystem):
         log = {s.name: x[LAYOUT[s.name].start] if s.size is None else x[LAYOUT[s.name]] for s in _LOG}
         acts = self._acts(t, p)
         own = 0.0 * t
+        raised_before, raised = _told(was), _told(now)
         mine = [np.where(np.abs(p.own - i) < 0.5, np.where(p.fault > 0.0, 1.0, 0.0), 0.0) for i in range(_ALARMS)]
         for i in range(_ALARMS):
-            own = own + mine[i] * now.raised[i]
+            own = np.maximum(own, np.maximum(mine[i], mine[NOT_ISOLATED]) * raised[i])
         over = np.where(p.fault > 0.0, np.where(t >= p.end - 1e-6, 1.0, 0.0), 0.0)
-        rises = [now.raised[i] * (1.0 - was.raised[i]) for i in range(_ALARMS)]
+        rises = [raised[i] * (1.0 - raised_before[i]) for i in range(_ALARMS)]
         values = (
             np.where(log["first_raised"] < 0.0, np.where(own * acts > 0.0, t, -1.0), log["first_raised"]),
             np.where(log["first_clear"] < 0.0, np.where((1.0 - own) * over > 0.0, t, -1.0), log["first_clear"]),
@@ -237,6 +250,11 @@ class WindTurbineLoop(HybridSystem):
         return vector(*values, *peaks)
 
 
+def _told(m: Any) -> list[Array]:
+    """The alarms, and behind them whether a fault is detected that is not isolated."""
+    return [*(m.raised[i] for i in range(NOT_ISOLATED)), m.undecided_alarm[0]]
+
+
 def _largest(now: Any, name: str, p: Any) -> Array:
     if name == "efficiency":
         return np.abs(now.held_efficiency_estimate - p.nominal_efficiency)
@@ -244,6 +262,8 @@ def _largest(now: Any, name: str, p: Any) -> Array:
         return now.held_speed_difference[0 if name == "rotor_difference" else 1]
     if name == "torque":
         return now.held_torque_residual
+    if name == "shaft_angle":
+        return np.abs(now.held_shaft_angle)
     values = now.held_speed_residual if name == "speed" else getattr(now, f"held_{name}")
     count = dict(PEAKS)[name]
     largest = values[0]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_observer.detection.pitch_residuals import BLOCKS
 from fmu_observer.diagnosis.actuator_residual import centred, first_order_residual, rate_residual
 from fmu_observer.diagnosis.finite_window_observer import finite_window_observer, sampled
 from fmu_observer.diagnosis.redundancy import disagreement
@@ -85,6 +86,9 @@ DRIVE_MEMORY = (
     memory("speed_squares", "rad2/s2", 0.0, "Square of the sample before, of each speed sensor", size=4),
     memory("torque_filter", "N.m", 0.0, "Filter of the generator torque", size=2),
     memory("torque_squares", "N2.m2", 0.0, "Squares of the two samples before", size=2),
+    memory("shaft_partial", "rad", 0.0, "Angle between rotor and generator by their speeds, in the block that runs"),
+    memory("shaft_blocks", "rad", 0.0, "The same in the last blocks", size=BLOCKS),
+    memory("held_shaft_angle", "rad", 0.0, "The same over the long window"),
     memory("held_speed_difference", "rad/s", 0.0, "Difference of the sensors of rotor and of generator", size=2),
     memory("held_speed_residual", "rad2/s2", 0.0, "Residual of rotor sensors 1, 2, generator sensors 1, 2", size=4),
     memory("held_torque_residual", "N2.m2", 0.0, "Residual of the generator torque"),
@@ -159,6 +163,21 @@ def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array
     out = first_order_residual(coefficients, before, late, reference, p.converter_time, starts)
     window = windowed_square(m.torque_squares, out.value)
     return {"torque_filter": out.memory, "torque_squares": window.memory, "held_torque_residual": window.value}
+
+
+def end_shaft_block(m: Any) -> dict[str, Any]:
+    """The long window of the angle between rotor and generator moves on by a block [ours].
+
+    A shaft twists by some 1e-3 rad and no further: an angle that grows is an error of a speed, or of the gear's ratio.
+
+    Args:
+        m: named memory with `DRIVE_MEMORY`.
+
+    Returns:
+        New values of the memory by name.
+    """
+    kept = [m.shaft_blocks[i] for i in range(1, BLOCKS)] + [m.shaft_partial]
+    return {"shaft_blocks": kept, "shaft_partial": 0.0 * m.shaft_partial, "held_shaft_angle": sum(kept[1:], kept[0])}
 
 
 def _weighted(gain: Array, values: Sequence[Array]) -> Array:

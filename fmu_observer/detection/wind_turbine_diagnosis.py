@@ -12,6 +12,7 @@ import numpy as np
 from fmu_observer.detection.drive_train_residuals import (
     DRIVE_MEMORY,
     DRIVE_PARAMETERS,
+    end_shaft_block,
     sample_speeds,
     sample_torque,
 )
@@ -86,6 +87,7 @@ _LIMITS = (
     ("pitch_brief_limit", "deg2/s4", 45.0, "Residual of a pitch actuator, one sample"),
     ("pitch_long_limit", "deg2/s4", 4.5e3, "Residual of a pitch actuator, long window"),
     ("speed_limit", "rad2/s2", 8.5e-3, "Residual of a sensor of rotor or generator speed"),
+    ("shaft_angle_limit", "rad", 0.02, "Angle between rotor and generator by their speeds, long window"),
     ("torque_limit", "N2.m2", 1.2e5, "Residual of the generator torque"),
     ("efficiency_limit", "1", 0.1, "Deviation of the efficiency from the nominal one"),
 )
@@ -93,6 +95,7 @@ _RATIOS = (
     ("ratio_pitch_sensors", BLADES, "Difference of the two pitch sensors of each blade over its limit"),
     ("ratio_rotor_sensors", None, "Difference of the sensors of the rotor speed over its limit"),
     ("ratio_generator_sensors", None, "Difference of the sensors of the generator speed over its limit"),
+    ("ratio_shaft_angle", None, "Angle between rotor and generator by their speeds over its limit"),
     ("ratio_torque", None, "Residual of the generator torque over its limit"),
     ("ratio_pitch_actuators", BLADES, "Larger residual of each pitch actuator over its limit"),
     ("ratio_efficiency", None, "Deviation of the efficiency over its limit"),
@@ -139,8 +142,10 @@ class WindTurbineDiagnosis(HybridSystem):
     (7.7.5). Where a pair agrees and both contradict the model, the actuator is at fault (7.6.14). The torque of the
     generator is compared with its reference (7.8.1). The efficiency of the drive train comes from a window of 30
     updates, 300 s (7.7.7): before it is full the efficiency is nominal. At most one fault at a time is assumed.
-    `fault` is 1 while any is detected: also where a pair disagrees and the model does not tell which sensor it is; such
-    pairs are counted by `undecided`.
+    `fault` is 1 while any is detected: also where a pair disagrees and the model does not tell which sensor it is, and
+    where the sensors of each speed agree, but their speeds turn rotor and generator against each other by more than the
+    shaft can twist (the angle of five seconds): one speed or the gear's ratio is off. `undecided` counts these. Speeds
+    that are all off by one share contradict nothing, and are not detected.
 
     The torque of the wind is estimated from measured wind, rotor speed and pitch with the rotor's formula. Wind that is
     measured with a bias ruins the efficiency: `wind_bias` is subtracted.
@@ -187,12 +192,14 @@ class WindTurbineDiagnosis(HybridSystem):
         output_signal(
             "undecided",
             "1",
-            "Pairs of sensors of which one is at fault, not known which",
+            "Pairs of sensors of which one is at fault, not known which, or speeds of rotor and generator apart",
             variability="discrete",
             warning=OutputWarning(
                 "detected a fault that it could not isolate: two sensors of one quantity disagree by more than their "
-                "limit, and neither contradicts the model by more than its own. Compare both with a third",
-                ("fault", "ratio_rotor_sensors", "ratio_generator_sensors"),
+                "limit, and neither contradicts the model by more than its own, compare both with a third; or the two "
+                "of each speed agree, but turn the shaft by more than it can twist (ratio_shaft_angle), check the "
+                "scales of both pairs and gear_ratio",
+                ("fault", "ratio_rotor_sensors", "ratio_generator_sensors", "ratio_shaft_angle"),
             ),
         ),
         *(
@@ -250,7 +257,7 @@ class WindTurbineDiagnosis(HybridSystem):
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""
         m = MEMORY.unpack(x)
         if event == "block_end":
-            return MEMORY.pack(m, **end_block(m))
+            return MEMORY.pack(m, **end_block(m), **end_shaft_block(m))
         if event == "efficiency_update":
             return MEMORY.pack(m, **update_efficiency(m, p))
         starts = np.where(m.samples > 0.0, 0.0, 1.0)
@@ -268,6 +275,7 @@ class WindTurbineDiagnosis(HybridSystem):
             *_pair(u.generator_speed, 0), p.generator_difference_limit, *_pair(m.held_speed_residual, 2)
         )
         new |= sample_torques(m, generator, driving, u.torque)
+        new |= {"shaft_partial": m.shaft_partial + p.sample_period * (rotor - generator / p.gear_ratio)}
         settled = _settled(m, p)
         exceeds, undecided = _judged(m, t, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
@@ -313,6 +321,8 @@ def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
         found = larger(told, sizes[2 * i], sizes[2 * i + 1])
         sensors += [found.first, found.second]
         undecided = undecided + found.undecided
+    turned = np.where(np.abs(m.held_shaft_angle) > p.shaft_angle_limit, 1.0, 0.0)
+    undecided = undecided + turned * (1.0 - disagree[BLADES]) * (1.0 - disagree[BLADES + 1])
     torque = np.where(m.held_torque_residual > p.torque_limit, 1.0, 0.0)
     actuators = [
         np.where(
@@ -336,6 +346,7 @@ def _ratios(m: Any, p: Any) -> dict[str, Array]:
         m.held_pitch_difference / p.pitch_difference_limit,
         m.held_speed_difference[0] / p.rotor_difference_limit,
         m.held_speed_difference[1] / p.generator_difference_limit,
+        np.abs(m.held_shaft_angle) / p.shaft_angle_limit,
         m.held_torque_residual / p.torque_limit,
         vector(*actuators),
         np.abs(m.held_efficiency_estimate - p.nominal_efficiency) / p.efficiency_limit,

@@ -143,6 +143,27 @@ def test_a_sensor_that_is_off_by_more_than_its_limit_is_told_although_it_is_not_
         assert noise > 0.0 or above[:-1, round(12.0 / PERIOD) + 2 :].all()
 
 
+@pytest.mark.parametrize("speed", ["rotor_speed", "generator_speed"])
+def test_sensors_that_agree_and_are_both_off_are_told_although_they_are_not_isolated(
+    batch: fmus.Batch, speed: str
+) -> None:
+    """Detected is told: both sensors of a speed read 0.5 to 10 % too much or too little, in noise: five seconds of it
+    turn the shaft by 0.04 rad and more, and it twists by 1e-3. All four off alike turn nothing, and are not told."""
+    members = []
+    for seed, share in enumerate([0.005, -0.01, 0.02, -0.03, 0.1, 0.0]):
+        readings = steady(1.0, 22.0, seed)
+        for i in (1, 2):
+            readings[f"{speed}[{i}]"][round(15.0 / PERIOD) :] *= 1.0 + share
+        members.append(readings)
+    members.append({n: v * (1.03 if "_speed[" in n else 1.0) for n, v in steady(1.0, 22.0, 9).items()})
+    found = diagnosed(batch, members, ["fault", "undecided", *ALARM_NAMES]) > 0.0
+    late = found[:, round(20.5 / PERIOD) :]  # five seconds, and the block of half a second that was running
+    assert late[1:5, :, :2].all()
+    assert found[0, :, :2].any(axis=0).all()  # twice its limit, which noise may hide for a block
+    assert not found[5:].any()
+    assert not found[:, :, 2:].any()
+
+
 def test_without_a_fault_there_is_no_alarm(sensor_faults: np.ndarray) -> None:
     assert not sensor_faults[-1].any()
 
