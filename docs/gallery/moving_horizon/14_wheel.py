@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 import wheel_records
-from shared.jam_runs import CASES, PERIOD, Case, Trains, Verdicts, observe, random_jams, readings, trains, verdicts
+from shared.jam_runs import CASES, PERIOD, Case, Verdicts, observe, random_jams, readings, trains, verdicts
 from shared.sheet import Sheet
 
 import fmus
@@ -30,17 +31,18 @@ def by_signature(read: np.ndarray) -> np.ndarray:
     return np.asarray(found[:, :, 0])
 
 
-def judged(case: Case) -> dict[tuple[str, float], Verdicts]:
-    """Verdicts of both at each noise, on the same trains and jams."""
+def judged(case: Case, *, skids: bool = False) -> dict[tuple[str, float], Verdicts]:
+    """Verdicts of both at each noise, on the same trains and jams, or on skids of their size."""
     rng = np.random.default_rng(HELD_OUT_SEED)
     run = trains(case, MEMBERS, rng)
     jams = random_jams(rng, MEMBERS, case, wheel_records.LENGTHS, wheel_records.DEPTHS)
-    read = np.concatenate([readings(run, jams, noise, deepcopy(rng), True) for noise in NOISES])
-    twice = Trains(run.t, *(np.concatenate([values] * len(NOISES)) for values in run[1:]))
-    told = {
-        "signature": by_signature(read),
-        "rules": observe(case, twice, read, with_balises=case.speed > 20.0)["odometer_fault"],
-    }
+    jams = jams.turned if skids else jams
+    parts = {noise: readings(run, jams, noise, deepcopy(rng), True) for noise in NOISES}
+    by_rules = [
+        observe(case, run, read, with_balises=case.speed > 20.0, noise=noise)["odometer_fault"]
+        for noise, read in parts.items()
+    ]
+    told = {"signature": by_signature(np.concatenate([*parts.values()])), "rules": np.concatenate(by_rules)}
     return {
         (which, noise): verdicts(run, jams, part)
         for which, both in told.items()
@@ -58,14 +60,13 @@ def main() -> None:
         sheet.add(f"records told right, {label}", "%", None, share, WINDOWS)
     why = OURS.format(seed=HELD_OUT_SEED)
     shown: dict[str, list[tuple[float, float]]] = {"signature": [], "rules": []}
-    by_case = [judged(case) for case in CASES.values()]
-    for noise in NOISES:
-        for which, bars in shown.items():
-            all_of = [verdict[which, noise] for verdict in by_case]
-            missed = np.array([(~v.found).sum() for v in all_of])
-            count, hours = int(sum(v.false.sum() for v in all_of)), sum(v.moving.sum() for v in all_of) / 3600.0
-            add_rates(sheet, f"{which}, noise {noise:g} m/s", missed, (count, hours), all_of, why)
-            bars.append((100.0 * missed.sum() / (len(CASES) * MEMBERS), count / hours))
+    for sign in ("", ", skids"):
+        by_case = [judged(case, skids=bool(sign)) for case in CASES.values()]
+        for noise, (which, bars) in product(NOISES, shown.items()):
+            verdicts_of = [verdict[which, noise] for verdict in by_case]
+            rates = add_rates(sheet, f"{which}{sign}, noise {noise:g} m/s", verdicts_of, why)
+            if not sign:
+                bars.append(rates)
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
     for axis, i, name in ((axes[0], 0, "missed jams [%]"), (axes[1], 1, "false alarms per hour")):
         for k, (which, values) in enumerate(shown.items()):
@@ -76,23 +77,23 @@ def main() -> None:
     sheet.finish(figure)
 
 
-def add_rates(
-    sheet: Sheet, name: str, missed: np.ndarray, false: tuple[int, float], verdicts_of: list[Verdicts], why: str
-) -> None:
-    """Lines of one detector at one noise."""
-    total = len(CASES) * MEMBERS
+def add_rates(sheet: Sheet, name: str, verdicts_of: list[Verdicts], why: str) -> tuple[float, float]:
+    """Lines of one detector at one noise; missed [%] and false alarms [1/h]."""
+    missed, total = np.array([(~v.found).sum() for v in verdicts_of]), len(CASES) * MEMBERS
+    false, hours = int(sum(v.false.sum() for v in verdicts_of)), sum(v.moving.sum() for v in verdicts_of) / 3600.0
     low, high = clopper_pearson(int(missed.sum()), total)
     text = f"{100.0 * missed.sum() / total:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
     sheet.add(f"missed jams, {name}", "%", None, text, why)
     sheet.add(f"of them from 17 m/s, {name}", "%", None, 100.0 * missed[-1] / MEMBERS, why)
-    few, many = garwood(false[0], false[1])
-    sheet.add(f"false alarms, {name}", "1/h", None, f"{false[0] / false[1]:.1f} ({few:.1f} to {many:.1f})", why)
+    few, many = garwood(false, hours)
+    sheet.add(f"false alarms, {name}", "1/h", None, f"{false / hours:.1f} ({few:.1f} to {many:.1f})", why)
     delays = np.concatenate([v.delay for v in verdicts_of])
     late = np.concatenate([v.late for v in verdicts_of])
     sheet.add(f"mean delay, {name}", "s", None, float(np.nanmean(delays)), why)
     sheet.add(f"median of the end after the jam's, {name}", "s", None, float(np.median(late[~np.isnan(late)])), why)
     still = float(100.0 * np.concatenate([v.on for v in verdicts_of]).mean())
     sheet.add(f"still told when the train stands, {name}", "%", None, still, why)
+    return 100.0 * float(missed.sum()) / total, false / hours
 
 
 main()
