@@ -20,7 +20,6 @@ from telegram_gate import FAMILIES, OFFSETS, Recording, Telegram, accepted_false
 from cosim import Scenario
 from fmu_observer import OBSERVERS
 from fmu_observer.design.certified_gains import certified_gains
-from plant_models.hybrid import HybridSystem
 
 PAGE = Path(__file__).parents[1] / "telegram_gate.md"
 JOURNEYS = range(20)
@@ -137,10 +136,10 @@ def settings(name: str, journey: Journey, model: str, spacing: float, longest: f
     """Parameters and start values of an observer: those of the train, true or wrong, the rest its own but for gains
     that must fit the gaps: certified for the longest [s], or for the spacing [m].
     """
-    system: HybridSystem = OBSERVERS[name]()
+    system: Any = OBSERVERS[name]()
     known = {s.name for s in (*system.parameter_signals, *system.states)}
     mass, drag = journey.wrong if model == "wrong" else (1.0, 1.0)
-    values = {key: value * (mass if key == "mass" else drag) for key, value in journey.train.items()}
+    values: dict[str, Any] = {key: value * (mass if key == "mass" else drag) for key, value in journey.train.items()}
     values |= {key: journey.train[key] for key in ("wheel_radius", "wheel_inertia", "n_axles")}
     values |= {"odometer_period": STEP, "estimated_speed": 0.0, "odometer_speed": 0.0}
     if name in FAMILIES:

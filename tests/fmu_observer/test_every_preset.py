@@ -44,25 +44,28 @@ def certified(name: str, preset: str | None, gap: float) -> Any:
     return None if certify is None else certify(gap, preset=preset)
 
 
-class OwnTrain(SteadyMotion):
+class OwnTrain:
     """The train that a preset believes in, and how its observer hears it."""
 
     def __init__(self, system: HybridSystem, preset: str | None) -> None:
-        super().__init__(speed=12.0, acceleration=0.05)
+        self.motion = SteadyMotion(speed=12.0, acceleration=0.05)
         self.system, values = system, parameter_values(system, {}, preset)
         p = dict(zip(scalar_names(system.parameter_signals), values, strict=True))
         wheels = p.get("n_axles", 0.0) * p.get("wheel_inertia", 0.0) / p.get("wheel_radius", 1.0) ** 2
-        drag = [p.get(f"davis_{key}", 0.0) for key in "abc"]
-        self.force = lambda v: (p.get("mass", 1.0) + wheels) * 0.05 + drag[0] + drag[1] * v + drag[2] * v * v
+        self.inertia, self.drag = p.get("mass", 1.0) + wheels, [p.get(f"davis_{key}", 0.0) for key in "abc"]
         self.runtime = Runtime(system)
         self.runtime.p[:] = values
         self._place = {name: i for i, name in enumerate(scalar_names(system.input_signals))}
         for i, state in enumerate(scalar_names(system.states)):
             if state in ("estimated_speed", "odometer_speed", "wheel_speed_estimate", "held_speed"):
-                self.runtime.x[i] = self.speed
+                self.runtime.x[i] = self.motion.speed
+
+    def force(self, v: float) -> float:
+        """The effort that gains 0.05 m/s2 at a speed [N]."""
+        return float(self.inertia * self.motion.acceleration + np.polynomial.Polynomial(self.drag)(v))
 
     def hear(self, t: float, *events: str) -> None:
-        v, place = self.v(t), self.position(t)
+        v, place = self.motion.v(t), self.motion.position(t)
         told = {"odometer": v, "gps_position": place, "balise_position": place}
         for name, value in (told | {"effort": self.force(v)}).items():
             if name in self._place:
@@ -81,7 +84,7 @@ class OwnTrain(SteadyMotion):
             self.runtime.advance(t)
             self.hear(t, "gps", *(["balise"] if np.isclose(balises, t, rtol=0.0, atol=1e-8).any() else []))
         y = dict(zip(scalar_names(self.system.outputs), self.runtime.update_outputs(), strict=True))
-        return y["speed"] - self.v(self.runtime.t), y["position"] - self.position(self.runtime.t)
+        return y["speed"] - self.motion.v(self.runtime.t), y["position"] - self.motion.position(self.runtime.t)
 
 
 @pytest.mark.parametrize(("name", "preset"), TRAINS)

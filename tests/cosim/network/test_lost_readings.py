@@ -95,7 +95,7 @@ def test_a_gap_begins_when_the_reading_is_read_or_its_packet_would_arrive_and_en
 
 # -- samples between two packets ---------------------------------------------------------------------------------------
 
-FASTER = {"period": 0.1, "jitter": 0.03, "seed": 4}
+FASTER: dict[str, Any] = {"period": 0.1, "jitter": 0.03, "seed": 4}
 SAMPLING = sorted(
     name for name, system in OBSERVERS.items() if any(getattr(e, "samples", ()) for e in system().periodic_events)
 )
