@@ -152,6 +152,8 @@ def test_many_events_in_one_step_and_events_announced_on_the_way(reference: Call
         (lambda b: b.advance(1.0), "Time has not begun"),
         (lambda b: (b.start(), b.start()), "begun already"),
         (lambda b: (b.start(), b.run([0.2, 0.1])), "rise from now"),
+        (lambda b: (b.start(), b.run([0.1, 0.1])), "rise from now"),
+        (lambda b: (b.start(), b.run([0.0, 0.1])), "rise from now"),
         (lambda b: b.notify("bell", 0, 0.1), "no triggered event 'bell'; it has: balise, telegram"),
         (lambda b: b.notify("balise", 0, 0.1, place=1.0), "no payload 'place'; it has: position"),
         (lambda b: b.notify("balise", 2, 0.1), "no member 2; the last one is 1"),
