@@ -41,6 +41,7 @@ SEEDS, FAULTY = 120, 20
 WET_SEEDS = 60
 SETTLED = 50  # samples left out at the start
 WHEEL = 2.0  # smallest code of an isolated fault
+CODES = ["several_faults", *(f"{fault}_fault" for fault in FAULTS)]
 IN_SAMPLE = "in sample"
 SHARED = {
     "threshold_wheels": ("odometers",),
@@ -202,12 +203,14 @@ def injected(
 
 @dataclass(frozen=True)
 class Score:
-    """What became of the faults of one kind: numbers of faults, detected, isolated rightly and wrongly, delays [s]."""
+    """What became of the faults of one kind: numbers of faults, detected, isolated rightly and wrongly, told as
+    several; delays [s]."""
 
     faults: int
     detected: int
     right: int
     wrong: int
+    several: int
     delays: np.ndarray
     last_codes: np.ndarray
 
@@ -216,7 +219,7 @@ def scored(out: Mapping[str, np.ndarray], fault: str, t: np.ndarray, onsets: np.
     """Which faults were told, and how soon: the first alarm behind the onset, and the first fault that is isolated."""
     codes = np.stack([out[f"{name}_fault"] for name in FAULTS])
     own = FAULTS.index(fault)
-    detected = right = wrong = 0
+    detected = right = wrong = several = 0
     delays, last = [], []
     for member, onset in enumerate(onsets):
         after = t >= onset - 1e-9
@@ -224,6 +227,7 @@ def scored(out: Mapping[str, np.ndarray], fault: str, t: np.ndarray, onsets: np.
         if own_code.max() > 0.0:
             detected += 1
             delays.append(float(t[np.flatnonzero(own_code > 0.0)[0]] - onset))
+        several += bool((out["several_faults"][member][after] > 0.0).any())
         isolated = np.where(after, codes[:, member], 0.0) >= WHEEL
         if isolated.any():
             first = int(np.flatnonzero(isolated.any(axis=0))[0])
@@ -231,7 +235,7 @@ def scored(out: Mapping[str, np.ndarray], fault: str, t: np.ndarray, onsets: np.
             wrong += not isolated[own, first]
             told = own_code[own_code >= WHEEL]
             last.append(float(told[-1]) if told.size else 0.0)
-    return Score(len(onsets), detected, right, wrong, np.array(delays), np.array(last))
+    return Score(len(onsets), detected, right, wrong, several, np.array(delays), np.array(last))
 
 
 def score_row(title: str, s: Score, note: str = "") -> str:
@@ -239,7 +243,7 @@ def score_row(title: str, s: Score, note: str = "") -> str:
     low, high = proportion_interval(s.detected, s.faults)
     delays = f"{np.median(s.delays):.1f} | {np.quantile(s.delays, 0.95):.1f}" if s.delays.size else "- | -"
     share = f"{100 * s.detected / s.faults:.0f} ({100 * low:.0f} to {100 * high:.0f})"
-    told = f"{100 * s.right / s.faults:.0f} | {100 * s.wrong / s.faults:.0f}"
+    told = " | ".join(f"{100 * count / s.faults:.0f}" for count in (s.right, s.wrong, s.several))
     return f"| {title} | {s.faults} | {share} | {delays} | {told} | {note} |"
 
 
@@ -253,7 +257,7 @@ def case_scores(
         drawn = [injected(case, run, read, 1000 * number + i) for number, case in enumerate(cases)]
         together = {name: np.concatenate([faulty[name] for faulty, _, _ in drawn]) for name in read}
         error = np.concatenate([error for _, _, error in drawn])
-        out = diagnosed(run, together, settings, error, [f"{fault}_fault" for fault in FAULTS])
+        out = diagnosed(run, together, settings, error, CODES)
         for number, (case, (_, onsets, _)) in enumerate(zip(cases, drawn, strict=True)):
             own = {name: values[number * members : (number + 1) * members] for name, values in out.items()}
             by_case[number].append(scored(own, case.fault, run["time"], onsets))
@@ -264,8 +268,8 @@ def fault_table(found: list[Score], members: int) -> str:
     """Detection, delay and isolation by fault and size."""
     lines = [
         "| fault | cases | detected [%], 95 % | delay, median [s] | 95 % of them within [s] | isolated rightly [%] | "
-        "wrongly [%] | told as wheel / wrong / stuck [%] |",
-        "|---|---|---|---|---|---|---|---|",
+        "wrongly [%] | as several [%] | told as wheel / wrong / stuck [%] |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for case, total in zip(CASES, found, strict=True):
         of = max(total.last_codes.size, 1)
@@ -275,7 +279,7 @@ def fault_table(found: list[Score], members: int) -> str:
         run = recorded(journey)
         acts = run["effort"] > 30e3 if fault == "traction" else run["demand"] > 0.2
         onset = run["time"][np.flatnonzero(acts & (run["speed"] > 1.0))[0]]
-        out = diagnosed(run, sensed(run, members, 990))
+        out = diagnosed(run, sensed(run, members, 990), results=CODES)
         lines.append(score_row(title, scored(out, fault, run["time"], np.full(members, onset)), "-"))
     return "\n".join(lines)
 
@@ -286,14 +290,15 @@ def turned_table(found: list[Score], turned: list[Score]) -> str:
     Args:
         found: of all `CASES`. turned: of `TURNED`.
     """
-    heads = ("detected [%]", "delay, median; 95 % within [s]", "isolated rightly [%]", "wrongly [%]")
+    heads = ("detected [%]", "delay, median; 95 % within [s]", "isolated rightly [%]", "wrongly [%]", "as several [%]")
     lines = ["| fault | turned | " + " | ".join(f"{head}, {sign}" for head in heads for sign in ("as above", "turned"))]
     lines = [f"{lines[0]} |", "|---|---|" + "---|" * (2 * len(heads))]
     signed = [(case, score) for case, score in zip(CASES, found, strict=True) if not case.frozen]
     for (case, one), other, two in zip(signed, TURNED, turned, strict=True):
         cells = [[f"{100 * s.detected / s.faults:.0f}" for s in (one, two)]]
         cells += [[_delays(s) for s in (one, two)]]
-        cells += [[f"{100 * getattr(s, name) / s.faults:.0f}" for s in (one, two)] for name in ("right", "wrong")]
+        told = ("right", "wrong", "several")
+        cells += [[f"{100 * getattr(s, name) / s.faults:.0f}" for s in (one, two)] for name in told]
         e = other.error
         how = f"{e.gain:g} of it" if e.gain != 1.0 else f"{e.offset:g} m" if e.offset else f"{e.drift:g} m/s"
         lines.append(f"| {case.title} | {how} | " + " | ".join(" | ".join(c) for c in cells) + " |")
@@ -327,7 +332,7 @@ def wet_cost_table(dry: list[Score], wet: list[Score]) -> str:
 
 def joined(scores: list[Score]) -> Score:
     """The scores of several journeys as one."""
-    numbers = (sum(getattr(s, name) for s in scores) for name in ("faults", "detected", "right", "wrong"))
+    numbers = (sum(getattr(s, name) for s in scores) for name in ("faults", "detected", "right", "wrong", "several"))
     arrays = (np.concatenate([getattr(s, name) for s in scores]) for name in ("delays", "last_codes"))
     return Score(*numbers, *arrays)
 

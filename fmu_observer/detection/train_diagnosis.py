@@ -59,11 +59,14 @@ class TrainDiagnosis(HybridSystem):
     of traction and of brake force that arrives. Each residual is divided by its threshold and raises an alarm above 1;
     `MOTION`, `BRAKE` and `TRACTION` say which fault moves which, and the fault that explains the alarms and asks for
     least is told. One fault at a time in each of the three groups; the second odometer must be on another axle. While
-    any alarm is raised `fault` is 1, whether it is isolated, suspected or, as `several_faults` says, explained by none.
+    any alarm is raised `fault` is 1, whether it is isolated, suspected or, as `several_faults` says, explained by none,
+    or not by the one that is isolated and stays so. Satellites and balises are compared with every source of speed: a
+    fault explains their residuals where it moves all sources that they contradict.
 
     An odometer that is off while an effort acts that can make its wheel slip or jam is put down to the wheel; where it
     is off for `contrary_time` without such an effort, or to the other side, to the sensor. A wheel that is locked and a
-    sensor that reads zero are not told apart before the brake is released.
+    sensor that reads zero are not told apart before the brake is released. Slip of all wheels is no explanation either
+    where an odometer is off so: two that are off alike are told as several, and as the rail under an effort that slips.
 
     Sensors that are not connected are not fitted: less can be told apart then (`isolability`), and `isolation_limited`
     says so. While speeds disagree, and a window after, no share of force is found.
@@ -177,7 +180,8 @@ class TrainDiagnosis(HybridSystem):
         raised = m.each("raised")
         m.put(voted_speed=voted_speed(read, raised[:SPEED_PAIRS]), samples=m["samples"] + 1.0)
         count = np.where(read.has_gps > 0.0, m["gps_samples"] + 1.0, 0.0)
-        can = availability(read, np.where(count > m["lead_first"].shape[0] + 0.5, 1.0, 0.0), m["telegrams"])
+        gps_full = np.where(count > m["lead_first"].shape[0] + 0.5, 1.0, 0.0)
+        can = availability(read, gps_full, m["telegrams"], m.each("disagree"))
         before = SpeedWindows(
             m["squares_odometers"],
             m["squares_first_radar"],
@@ -268,7 +272,9 @@ class TrainDiagnosis(HybridSystem):
         ways = [way - mark for way, mark in zip(m.each("way"), m.each("way_mark"), strict=True)]
         known = np.where(m["telegrams"] > 0.5, 1.0, 0.0)
         sound = [there * (1.0 - bad) for there, bad in zip(read.fitted, m.each("faulty"), strict=True)]
-        ratios, balise = way_ratios([distance - way for way in ways], sound, distance, p)
+        errors, limit = [distance - way for way in ways], p.balise_floor + p.balise_share * np.abs(distance)
+        ratios, balise = way_ratios(errors, sound, limit)
+        gaps = [np.where(np.abs(error) > limit, 1.0, 0.0) for error in errors]
         held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
         held |= {f"way_{name}": known * r for name, r in zip(("1", "2", "radar"), ratios, strict=True)}
         held["balise"] = known * balise
@@ -283,6 +289,7 @@ class TrainDiagnosis(HybridSystem):
             telegrams=m["telegrams"] + 1.0,
             refused=refused,
             faulty=[0.0, 0.0, 0.0],
+            disagree=[known * there * gap for there, gap in zip(read.fitted, gaps, strict=True)],
             telegram_verdict=np.where(used > 0.0, float(USED), float(IGNORED)),
             mark=np.where(used > 0.0, u.balise_position, m["mark"]),
             way_mark=marks,

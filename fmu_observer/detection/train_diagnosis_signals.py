@@ -53,7 +53,8 @@ OUTPUTS = (
     output_signal(
         "several_faults",
         "1",
-        "1 while no single fault explains the alarms",
+        "1 while no single fault explains the alarms, or not that which is isolated; two odometers that are off alike "
+        "under an effort that may slip both are told as the rail",
         variability="discrete",
         warning=OutputWarning(
             "detected faults that it could not isolate: no single fault of its table moves all the residuals that are "

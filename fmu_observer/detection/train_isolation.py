@@ -42,12 +42,15 @@ MOTION = IsolationTable(
         "odometer_2": ("balise", "gps_position"),
         "radar": ("balise", "gps_position"),
         "gps": ("odometer_1_gps", "odometer_2_gps", "radar_gps"),
-        "balise": (),
+        "balise": ("gps_position",),
         "adhesion": ("odometers", "balise", "gps_position"),
     },
     together=(("odometer_1_gps", "odometer_2_gps", "radar_gps"), ("way_1", "way_2", "way_radar")),
 )
 """What is measured of the motion: five kinds of sensors, and rails on which both wheels slip."""
+MOVED_SOURCES = {"odometer_1": (0,), "odometer_2": (1,), "radar": (2,), "adhesion": (0, 1)}
+"""Sources of speed (first odometer, second odometer, radar) that a fault moves. Residuals of satellites and balises are
+what no source agrees with: a fault explains them where it moves all sources that were asked."""
 
 BRAKE = IsolationTable(
     residuals=("pressure", "brake_measured", "brake_demanded"),

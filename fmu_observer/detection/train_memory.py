@@ -46,6 +46,7 @@ def remembered(speed_window: int, gps_window: int, force_window: int) -> tuple[S
         memory("mark", "m", 0.0, "Position of the last balise that was used"),
         memory("way_mark", "m", 0.0, "Ways at that balise", size=3),
         memory("faulty", "1", 0.0, "1 where odometers and radar were at fault since the last balise", size=3),
+        memory("disagree", "1", 0.0, "1 for odometers and radar whose ways the last balise contradicts", size=3),
         memory("against_wheel", "s", 0.0, "Time for which no wheel explains the odometers", size=2),
         memory(
             "last_reading", "1", 0.0, "Readings of odometers, radar, satellites, pressure at the last sample", size=5

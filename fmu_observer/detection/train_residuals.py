@@ -132,19 +132,18 @@ def voted_speed(read: Readings, raised: list[Array]) -> Array:
     return speed
 
 
-def way_ratios(errors: list[Array], fitted: list[Array], distance: Array, p: Any) -> tuple[list[Array], Array]:
+def way_ratios(errors: list[Array], fitted: list[Array], limit: Array) -> tuple[list[Array], Array]:
     """Residuals of the ways from the last balise to this one over their thresholds.
 
     Where the ways of all sources are off by much the same, the balise is; else the sources that are off.
 
     Args:
         errors: distance of the balises less the way of each source [m]. fitted: 1 for those that are there and have
-            shown no fault on the way. distance: between the balises [m]. p: parameters.
+            shown no fault on the way. limit: of an error [m].
 
     Returns:
         Ratios of the ways, and that of the balise.
     """
-    limit = p.balise_floor + p.balise_share * np.abs(distance)
     ratios = [f * np.abs(error) / limit for error, f in zip(errors, fitted, strict=True)]
     most = largest(ratios)
     least: Array = HUGE

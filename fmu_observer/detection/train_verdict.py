@@ -14,6 +14,7 @@ from fmu_observer.detection.train_isolation import (
     FAULTS,
     LOSS,
     MOTION,
+    MOVED_SOURCES,
     RESIDUALS,
     SENSOR,
     STUCK,
@@ -23,11 +24,12 @@ from fmu_observer.detection.train_isolation import (
 )
 from fmu_observer.detection.train_memory import Memory
 from fmu_observer.detection.train_residuals import Readings, tolerance
-from fmu_observer.diagnosis.isolation_table import IsolationTable, largest
+from fmu_observer.diagnosis.isolation_table import IsolationTable, Verdict, largest
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.hybrid.system import Array
 
 GROUPS = (MOTION, BRAKE, TRACTION)
+UNPROVED = 3.0  # telegrams
 OF_ODOMETER = (("odometers", "odometer_1_radar", "odometer_1_gps"), ("odometers", "odometer_2_radar", "odometer_2_gps"))
 
 
@@ -35,11 +37,13 @@ class Availability(NamedTuple):
     """Which residuals and which faults there can be, 1 or 0, in the order of `RESIDUALS` and `FAULTS`.
 
     Attributes:
-        residuals: one for each. faults: one for each.
+        residuals: one for each. faults: one for each. apart: by residual and fault, 1 where the residual was made
+            without what the fault moves.
     """
 
     residuals: list[Array]
     faults: list[Array]
+    apart: dict[str, dict[str, Array]]
 
 
 class Wheels(NamedTuple):
@@ -53,11 +57,12 @@ class Wheels(NamedTuple):
     fast: Array
 
 
-def availability(read: Readings, gps_full: Array, telegrams: Array) -> Availability:
-    """Which residuals can be computed, and what can fail.
+def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Sequence[Array]) -> Availability:
+    """Which residuals can be computed, what can fail, and which residuals were made without it.
 
     Args:
         read: of the sensors. gps_full: 1 where the window of satellite positions is full. telegrams: balises so far.
+        disagree: 1 for each source of speed whose way the last balise contradicts.
     """
     first, second, radar = read.fitted
     gps, some, two = gps_full, np.where(telegrams > 0.5, 1.0, 0.0), np.where(telegrams > 1.5, 1.0, 0.0)
@@ -77,7 +82,16 @@ def availability(read: Readings, gps_full: Array, telegrams: Array) -> Availabil
     ]
     faults = [first, second, radar, read.has_gps, some, first]
     brake = [read.has_pressure, read.has_pressure * source, source]
-    return Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source])
+    apart = {
+        residual: {
+            fault: largest([used for k, used in enumerate(asked) if k not in moved])
+            for fault, moved in MOVED_SOURCES.items()
+        }
+        for residual, asked in (("gps_position", read.fitted), ("balise", disagree))
+    }
+    # A first balise that is false misplaces the train until two others have said so.
+    apart["gps_position"]["balise"] = np.where(telegrams > UNPROVED + 0.5, 1.0, 0.0)
+    return Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source], apart)
 
 
 def alarms_after(m: Memory, t: Array, ratios: Sequence[Array], p: Any) -> None:
@@ -168,28 +182,33 @@ def codes_after(
     """Fault codes, instant of the detection, confidence.
 
     Until `isolation_delay` after the first alarm of a group a fault is suspected only: residuals are not equally quick.
-    Nor are they to clear: an isolated fault is kept while alarms only go.
+    Nor are they to clear: an isolated fault is kept while alarms only go. It is kept, too, where further alarms come
+    beside its own that it does not explain: there are several. Wheels that turn against what the efforts can do are no
+    slip of all wheels.
 
     Args:
         m: memory, changed in place. t: time [s]. can: what there can be. wrong: odometers that no wheel explains.
         stuck: sensors that stand still. before: alarms of the sample before. p: parameters.
     """
     raised, ratios = m.each("raised"), m.each("ratio")
+    there = dict(zip(FAULTS, can.faults, strict=True))
+    there["adhesion"] = there["adhesion"] * (1.0 - largest(wrong))
     codes: list[Array] = []
     begun, unexplained, trusts, counted, named = [], [], [], [], []
     place = first = 0
     for group, since in zip(GROUPS, m.each("group_since"), strict=True):
         own = slice(place, place + len(group.residuals))
-        possible = can.faults[first : first + len(group.faults)]
+        possible = [there[fault] for fault in group.faults]
         any_alarm = largest([a * b for a, b in zip(raised[own], can.residuals[own], strict=True)])
         start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
-        said = group.judge(raised[own], can.residuals[own], possible)
+        said = group.judge(raised[own], can.residuals[own], possible, can.apart)
         sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
         known = m.each("code")[first : first + len(group.faults)]
         fresh = largest([now * (1.0 - old) for now, old in zip(raised[own], before[own], strict=True)])
-        kept = any_alarm * (1.0 - fresh) * np.where(largest(known) >= WHEEL, 1.0, 0.0)
-        for fault, isolated, suspected, code in zip(group.faults, said.isolated, said.suspected, known, strict=True):
-            told = np.where(kept > 0.0, np.where(code >= WHEEL, 1.0, 0.0), isolated * sure)
+        stays, several = _stays(group, known, said, raised[own], possible, fresh)
+        kept = largest(stays)
+        for fault, isolated, suspected, stay in zip(group.faults, said.isolated, said.suspected, stays, strict=True):
+            told = np.where(kept > 0.0, stay, isolated * sure)
             maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
             codes.append(told * _isolated_code(fault, wrong) + SUSPECTED * maybe)
             named.append(told + maybe)
@@ -197,7 +216,7 @@ def codes_after(
             trusts.append(named[-1] * seen * margin)
             counted.append(named[-1] * seen)
         begun.append(start)
-        unexplained.append(said.unexplained)
+        unexplained.append(several)
         place, first = own.stop, first + len(group.faults)
     for fault, still in zip(("odometer_1", "odometer_2", "radar", "gps", "pressure_sensor"), stuck, strict=True):
         k = FAULTS.index(fault)
@@ -214,6 +233,22 @@ def codes_after(
     faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(m.each("faulty"), bad, strict=True)]
     m.put(faulty=faulty)
     m.put(code=codes, group_since=begun, several=largest(unexplained), trust=trust, detected_at=newest)
+
+
+def _stays(
+    group: IsolationTable, known: list[Array], said: Verdict, alarms: list[Array], possible: list[Array], fresh: Array
+) -> tuple[list[Array], Array]:
+    """For each fault 1 where it was isolated and stays so: alarms only go, or others come beside its own, which it does
+    not explain; and 1 where there are several: no single fault explains the alarms, or not the one that is isolated.
+    """
+    by_name = dict(zip(group.residuals, alarms, strict=True))
+    stays, several = [], said.unexplained
+    for fault, code, cover, there in zip(group.faults, known, said.covers, possible, strict=True):
+        on = np.where(code >= WHEEL, there, 0.0)
+        beside = on * (1.0 - cover) * largest([by_name[residual] for residual in group.must[fault]])
+        stays.append(np.maximum(on * cover * (1.0 - fresh), beside))
+        several = np.maximum(several, beside)
+    return stays, several
 
 
 def _isolated_code(fault: str, wrong: list[Array]) -> Array:

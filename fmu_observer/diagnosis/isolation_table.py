@@ -13,17 +13,21 @@ import numpy as np
 
 from plant_models.hybrid.system import Array
 
+_NOWHERE: Mapping[str, Mapping[str, Array]] = {}
+
 
 class Verdict(NamedTuple):
     """What a set of alarms says, each 1 or 0.
 
     Attributes:
         isolated: for each fault, whether it alone explains the alarms best. suspected: whether it does so as well as
-            others. unexplained: whether there are alarms that no single fault explains.
+            others. covers: whether it explains them at all. unexplained: whether there are alarms that no single fault
+            explains.
     """
 
     isolated: list[Array]
     suspected: list[Array]
+    covers: list[Array]
     unexplained: Array
 
 
@@ -62,12 +66,20 @@ class IsolationTable:
         """Names of the faults, in order."""
         return tuple(self.must)
 
-    def judge(self, alarms: Sequence[Array], available: Sequence[Array], possible: Sequence[Array]) -> Verdict:
+    def judge(
+        self,
+        alarms: Sequence[Array],
+        available: Sequence[Array],
+        possible: Sequence[Array],
+        apart: Mapping[str, Mapping[str, Array]] = _NOWHERE,
+    ) -> Verdict:
         """Which faults explain the alarms, one at a time.
 
         Args:
             alarms: for each residual 1 where it is above its threshold, else 0. available: for each residual 1 where it
                 can be computed, else 0. possible: for each fault 1 where there is what can fail, else 0.
+            apart: by residual and fault, 1 where this residual was made without what the fault moves: then the fault
+                does not explain it, although it may move it at other times.
         """
         counted = [alarm * there for alarm, there in zip(alarms, available, strict=True)]
         any_alarm = largest(counted)
@@ -76,7 +88,7 @@ class IsolationTable:
             moved = {*self.must[fault], *self.may.get(fault, ())}
             cover = any_alarm * there
             for name, alarm in zip(self.residuals, counted, strict=True):
-                cover = cover if name in moved else cover * (1.0 - alarm)
+                cover = cover * (1.0 - alarm * (apart.get(name, {}).get(fault, 0.0) if name in moved else 1.0))
             covers.append(cover)
             named = zip(self.residuals, counted, strict=True)
             seen_of_must.append(largest([alarm for name, alarm in named if name in self.must[fault]]))
@@ -95,6 +107,7 @@ class IsolationTable:
         return Verdict(
             [one * told for one, told in zip(bests, sure, strict=True)],
             [one * (1.0 - told) for one, told in zip(bests, sure, strict=True)],
+            covers,
             any_alarm * (1.0 - largest(covers)),
         )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -72,17 +74,20 @@ def test_fewer_sensors_tell_less() -> None:
         isolability(("odometer_1", "sonar"))
 
 
-def told(stop: float, signals: Signals) -> list[dict[str, float]]:
-    """Outputs at each sample; signals are functions of time."""
+def told(stop: float, signals: Signals, balises: dict[int, float] | None = None) -> list[dict[str, float]]:
+    """Outputs at each sample; signals are functions of time, balises positions by the number of the sample."""
     system = TrainDiagnosis()
     runtime = Runtime(system)
-    inputs = [s.name for s in system.inputs]
+    inputs = [s.name for s in runtime.system.input_signals]
     runtime.start(0.0)
-    rows = []
+    rows, passed = [], balises or {}
     for k in range(1, round(stop / 0.1) + 1):
         for name, signal in signals.items():
             runtime.u[inputs.index(name)] = signal(0.1 * (k - 1))
         runtime.advance(0.1 * k)
+        if k in passed:
+            runtime.u[inputs.index("balise_position")] = passed[k]
+            runtime.trigger("balise")
         values = runtime.update_outputs()
         rows.append(dict(zip((s.name for s in system.outputs), map(float, values), strict=True)))
     return rows
@@ -148,6 +153,50 @@ def test_what_is_detected_is_told_although_it_is_not_isolated(seed: int) -> None
         assert lasting < 3 or row["fault"] == 1.0
         assert row["fault"] >= min(row["fault_count"] + row["several_faults"], 1.0)
     assert any(row["fault"] for row in rows) == bool(begins)
+
+
+def faulty(healthy: Callable[[float], float], share: float, offset: float) -> Callable[[float], float]:
+    """A signal that is off from 30 s on."""
+    return lambda t: healthy(t) * (1.0 + share) + offset if t > 30.0 else healthy(t)
+
+
+OF_MOTION = ("odometer_1", "odometer_2", "radar", "gps", "balise")
+WAYS = [*[(a,) for a in OF_MOTION], *itertools.combinations(OF_MOTION, 2)]
+
+
+@pytest.mark.parametrize("faults", WAYS, ids="_and_".join)
+def test_two_faults_of_motion_are_told_and_one_is_not_told_as_several(faults: tuple[str, ...]) -> None:
+    """A law: of sensors of the motion two that are at fault while no effort slips a wheel are told: as several, or one
+    after the other, both signs of each; nothing else is isolated. One alone is isolated, and never told as several."""
+    for signs in itertools.product((-1.0, 1.0), repeat=len(faults)):
+        off = dict(zip(faults, signs, strict=True))
+        signals = cruise(gps_position=faulty(lambda t: 12.0 * t, 0.0, 9.0 * off.get("gps", 0.0)))
+        for name in ("odometer_1", "odometer_2", "radar"):  # a reading that never changes would be stuck
+            signals[name] = faulty(lambda t: 12.0 + 0.02 * math.sin(40.0 * t), 0.1 * off.get(name, 0.0), 0.0)
+        balises = {100 * i: 120.0 * i + (6.0 * off.get("balise", 0.0) if i == 4 else 0.0) for i in range(1, 6)}
+        rows = told(55.0, signals, balises)
+        named = {fault for fault in FAULTS if any(row[f"{fault}_fault"] >= WHEEL for row in rows)}
+        several = any(row["several_faults"] for row in rows)
+        assert named <= set(faults), off
+        assert several or named == set(faults), off
+        assert len(faults) > 1 or not several, off
+
+
+def test_an_isolated_fault_is_not_replaced_by_another_while_it_lasts() -> None:
+    """A radar that was isolated, then a balise that is off by just what the radar is: against both wheels, as if the
+    rail were slippery. The radar stays told, and that it is not all."""
+    signals = cruise(gps_position=lambda t: 12.0 * t)
+    for name, share in (("odometer_1", 0.0), ("odometer_2", 0.0), ("radar", 1.0)):
+        signals[name] = lambda t, share=share: (
+            (12.0 + 0.02 * math.sin(40.0 * t))
+            * (1.0 + share * (0.1 if 30.0 < t < 34.0 else 0.045 if t > 30.0 else 0.0))
+        )
+    way = 120.0 + 12.0 * (4.0 * 0.1 + 6.0 * 0.045)  # [m] of the radar from 30 to 40 s
+    rows = told(50.0, signals, {100 * i: 120.0 * i + (way - 120.0 if i == 4 else 0.0) for i in range(1, 5)})
+    after = rows[405:]
+    assert {row["radar_fault"] for row in rows[340:]} == {SENSOR}
+    assert {row["adhesion_fault"] for row in after} == {NONE}
+    assert {row["several_faults"] for row in after} == {1.0}
 
 
 def test_without_a_third_source_both_are_suspected() -> None:
