@@ -171,11 +171,12 @@ def beside(
 
 
 def _told(observer: TrainObserver, runtime: Runtime, place: float, p: Any, odometer: float) -> Telegram:
-    first = scalar_names(observer.states).index(VERDICT)
+    names = scalar_names(observer.states)
+    first = names.index(VERDICT)
     memory = GateMemory(*runtime.x[first : first + len(GATE_MEMORY)].tolist())
-    estimate = float(runtime.x[observer.position_state])
+    estimate = float(runtime.x[names.index(observer.position_state)])
     offsets = np.concatenate([[0.0], OFFSETS, -OFFSETS])
-    bound = float(observer.own_bound(runtime.x, p))
+    bound = float(observer.own_bound(observer.unpack_states(runtime.x) if observer.by_name else runtime.x, p))
     used = np.asarray(judge(memory, Told(place + offsets, 0.0, estimate, bound, odometer, runtime.t), p).used)
     settled = memory.settled >= p.gate_recover
     return Telegram(estimate - place, settled, used[0] == 0.0, used[1:].reshape(2, -1).mean(axis=0))
