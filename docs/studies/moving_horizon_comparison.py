@@ -22,7 +22,7 @@ from cosim.evaluation.numbers import error_number, number
 from cosim.observer_benchmark.observers import benchmark_observers
 from fmu_observer.filtering.square_root import factor
 from fmu_observer.models.filter_model import FilterModel, Known
-from fmu_observer.moving_horizon.real_time_iteration import TOLD, Iterated
+from fmu_observer.moving_horizon.real_time_iteration import TOLD, WINDOW_MEMORY, Iterated
 from fmu_observer.moving_horizon.robust_loss import SCALES
 from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon
@@ -96,8 +96,8 @@ class FactorGraphSmoother(BaliseMovingHorizon):
         self._smoother.update(graph, values, stamps)
         self._count = key
         estimate = np.asarray(self._smoother.calculateEstimate().atVector(key))
-        last = [float(name == "rows_in_window") for name in TOLD]
-        remembered = np.hstack([arrival, row_flat, estimate, last])
+        last = np.array([float(name == "rows_in_window") for name in TOLD])
+        remembered = dict(zip(WINDOW_MEMORY, (arrival, row_flat, estimate, last), strict=True))
         return Iterated(estimate, arrival[2 * ORDER :], remembered)
 
 

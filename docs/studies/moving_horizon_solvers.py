@@ -131,7 +131,7 @@ def window_rows(count: int) -> tuple[np.ndarray, np.ndarray]:
         x, t = moved.state + np.asarray(factor(moved.noise)) @ rng.standard_normal(ORDER), stamp
         seen = problem.seen(x, row, shared)
         y = seen.measured + np.sqrt(seen.noise.diagonal()) * rng.standard_normal(1)
-        rows.append([float(value) for value in LAYOUT.packed(row._replace(measured=y))])
+        rows.append(LAYOUT.packed(row._replace(measured=y)).tolist())
         states.append(x)
     return np.array(rows), np.array(states)
 

@@ -21,6 +21,7 @@ from plant_models.hybrid.system import Array, vector
 MOST_ROWS, MOST_PASSES = 1000, 20
 MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within what is told of its error [ours]
 
+WINDOW_MEMORY = ("arrival_cost", "window", "window_estimates", "last_pass")
 TOLD = {
     "residual_norm": "Root of the mean square of the window's residuals, in their deviations",
     "last_step": "Largest change of an estimate in the last pass, in its standard deviations",
@@ -53,12 +54,12 @@ class Iterated(NamedTuple):
 
     Attributes:
         estimate: at the row, shape (n,). covariance: of it, row by row, shape (n * n,).
-        remembered: new values of `window_memory` in their order, one after the other.
+        remembered: new values of `window_memory` by name, and of what else is remembered.
     """
 
     estimate: Array
     covariance: Array
-    remembered: Array
+    remembered: dict[str, Array]
 
 
 def require_window(who: str, window: int, passes: int) -> None:
@@ -137,8 +138,8 @@ def iterate(
         row: the new one, flat. point: prediction of its state, shape (n,). shared: what all rows share, shape (s,).
     """
     arrays = (arrival, window, points, row, point, shared)
-    estimate, covariance, remembered = enclosed(_iteration(problem, passes), *arrays)
-    return Iterated(estimate, covariance, remembered)
+    estimate, covariance, *remembered = enclosed(_iteration(problem, passes), *arrays)
+    return Iterated(estimate, covariance, dict(zip(WINDOW_MEMORY, remembered, strict=True)))
 
 
 @lru_cache(maxsize=KEPT)
@@ -158,7 +159,7 @@ def _iteration(problem: WindowProblem, passes: int) -> Callable[..., tuple[Array
         ended = (found.broken, unsettled(moving, found.broken))
         last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds, against, *ended)
         kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
-        return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
+        return found.estimates[-1], found.covariance, np.hstack([*before]), *kept, np.hstack([*last])
 
     return iterated
 

@@ -7,10 +7,13 @@ not used in their row, or have no row. It knows no model.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from plant_models.hybrid import memory
+from plant_models.hybrid.state_layout import StateLayout
 from plant_models.hybrid.system import Array
 
 
@@ -34,7 +37,7 @@ class WindowRow(NamedTuple):
 
 @dataclass(frozen=True)
 class RowLayout:
-    """Where the values of a row stand in its flat form.
+    """The columns of a row: those of `WindowRow`, one after the other.
 
     Args:
         inputs: m, number of inputs. measurements: q, number of measurements.
@@ -46,7 +49,7 @@ class RowLayout:
     @property
     def width(self) -> int:
         """Numbers in a row."""
-        return 3 + self.inputs + 2 * self.measurements
+        return self._columns.width
 
     def unpacked(self, flat: Array) -> WindowRow:
         """A row from its flat form.
@@ -54,17 +57,20 @@ class RowLayout:
         Args:
             flat: shape (width,).
         """
-        m, q = self.inputs, self.measurements
-        return WindowRow(flat[0], flat[1], flat[2], flat[3 : 3 + m], flat[3 + m : 3 + m + q], flat[3 + m + q :])
+        return WindowRow._make(self._columns.named(flat))
 
-    def packed(self, row: WindowRow) -> list[Array]:
-        """The values of a row in their flat order, as scalars.
+    def packed(self, row: WindowRow) -> Array:
+        """The flat form of a row, shape (width,).
 
         Args:
             row: the row.
         """
-        vectors = (row.inputs, row.measured, row.used)
-        return [row.moves, row.period, row.time, *(v[i] for v in vectors for i in range(v.shape[0]))]
+        return self._columns.flat(row._asdict(), "a row")
+
+    @cached_property
+    def _columns(self) -> StateLayout:
+        sizes = {"inputs": self.inputs, "measured": self.measurements, "used": self.measurements}
+        return StateLayout([memory(name, "1", size=sizes.get(name)) for name in WindowRow._fields])
 
     def count(self, rows: Array) -> Array:
         """How many rows have a measurement, shape (1,).

@@ -16,10 +16,10 @@ import numpy as np
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.moving_horizon.full_solver import Effort, FullSolver
 from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed
-from fmu_observer.moving_horizon.real_time_iteration import Iterated, contradicted, unsettled
+from fmu_observer.moving_horizon.real_time_iteration import WINDOW_MEMORY, Iterated, contradicted, unsettled
 from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import OutputWarning, Signal, memory, output_signal, width
+from plant_models.hybrid import OutputWarning, memory, output_signal
 from plant_models.hybrid.option import is_number, require_whole
 from plant_models.hybrid.system import Array
 
@@ -93,9 +93,9 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
         """See `iterated_fully`."""
         return iterated_fully(problem, self.effort, *arrays)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What the observer tells, and how the last search ended."""
-        return super().output(t, x, u, p) | _ended(self.states, x)
+        return super().output(t, x, u, p) | _ended(x)
 
     def _declare(self) -> None:
         super()._declare()
@@ -144,9 +144,9 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
         """See `iterated_fully`."""
         return iterated_fully(problem, self.effort, *arrays)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What the observer tells, and how the last search ended."""
-        return super().output(t, x, u, p) | _ended(self.states, x)
+        return super().output(t, x, u, p) | _ended(x)
 
 
 def iterated_fully(
@@ -185,8 +185,9 @@ def iterated_fully(
     ]  # `converged` judges the step
     early = not found.converged and not found.timed_out
     ended = [float(said) for said in (found.converged, found.timed_out, early, found.feasible)]
-    remembered = np.hstack([*before, rows.ravel(), found.states.ravel(), last, ended])
-    return Iterated(found.estimate, found.covariance.ravel(), remembered)
+    remembered = (np.hstack([*before]), rows.ravel(), found.states.ravel(), np.array(last))
+    kept = dict(zip(WINDOW_MEMORY, remembered, strict=True)) | {LAST_SEARCH.name: np.array(ended)}
+    return Iterated(found.estimate, found.covariance.ravel(), kept)
 
 
 def checked_effort(who: str, tolerance: float, max_iterations: int, deadline: float | None) -> Effort:
@@ -217,9 +218,8 @@ def told_effort(effort: Effort) -> dict[str, Any]:
     return given if effort.deadline == inf else given | {"deadline": effort.deadline}
 
 
-def _ended(states: tuple[Signal, ...], x: Array) -> dict[str, Array]:
-    first = width(states[: states.index(LAST_SEARCH)])
-    return {s.name: x[first + i] for i, s in enumerate(ENDED)}
+def _ended(x: Any) -> dict[str, Array]:
+    return {s.name: x.last_search[i] for i, s in enumerate(ENDED)}
 
 
 @lru_cache(maxsize=8)

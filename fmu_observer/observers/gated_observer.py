@@ -100,15 +100,15 @@ class GatedObserver(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
         """`update`, where the gate lets the telegram pass."""
+        judges = self.gated and event == GATED_EVENT
+        bound = self.own_bound(x, p) if judges else None
         if self.by_name:
-            return self._judged_update(event, t, x, self.own_bound(x, p), u, p)
+            return self._judged_update(t, x, bound, u, p) if judges else self._update_of(event, t, x, u, p)
         places, named = self._own_places, self._own_places.named(x)
-        changed = self._judged_update(event, t, named, self.own_bound(x, p), u, p)
+        changed = self._judged_update(t, named, bound, u, p) if judges else self._update_of(event, t, named, u, p)
         return places.flat(changed, f"{self.name}: jump({event!r})", x.shape[1:], x)
 
-    def _judged_update(self, event: str, t: Array, x: Any, bound: Array, u: Any, p: Any) -> dict[str, Array]:
-        if not self.gated or event != GATED_EVENT:
-            return self._update_of(event, t, x, u, p)
+    def _judged_update(self, t: Array, x: Any, bound: Array, u: Any, p: Any) -> dict[str, Array]:
         estimate = getattr(x, self.position_state)
         gate = GateMemory(*(getattr(x, s.name) for s in GATE_MEMORY))
         odometer = self.odometer_of(u)

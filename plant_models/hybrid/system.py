@@ -210,6 +210,14 @@ class HybridSystem:
         seed = parameter("seed", "1", FROM_NAME, text, min=FROM_NAME, max=SEED_LIMIT - 1)
         return (*self.parameters, step, *((seed,) if self.noises else ()))
 
+    def handed(self, x: Array) -> Any:
+        """The states as the equations get them: by name, or flat without `by_name`.
+
+        Args:
+            x: flat, shape (n,) or (n, members).
+        """
+        return self.unpack_states(x) if self.by_name else x
+
     def unpack_states(self, values: Array) -> Any:
         """Named tuple `x` from the flat array, shape (n,) or (n, members)."""
         return self._all_places.named(values)
@@ -271,14 +279,14 @@ class HybridSystem:
         Args:
             held_switches: see `unpack_inputs`.
         """
-        derivative = self.flow(t, self._handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+        derivative = self.flow(t, self.handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
         if self.by_name:
             return self._flowing_places.flat(derivative, f"{self.name}: flow()", x.shape[1:])
         return self._checked("flow()", derivative, self.continuous_count)
 
     def output_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`output` on flat arrays, stacked in the declared order, shape (q,)."""
-        values = self.output(t, self._handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
+        values = self.output(t, self.handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
         if not isinstance(values, Mapping):
             raise TypeError(
                 f"{self.name}: output() returns a {type(values).__name__}; expected a dictionary of values by name."
@@ -317,24 +325,24 @@ class HybridSystem:
         Args:
             held_switches: see `unpack_inputs`.
         """
-        return self.friction(t, self._handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+        return self.friction(t, self.handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
 
     def switching_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`switching` on flat arrays, shape (len(switchings),)."""
-        values = self.switching(t, self._handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
+        values = self.switching(t, self.handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
         return self._checked("switching()", values, len(self.switchings))
 
     def requirement_vector(self, x: Array, p: Array) -> Array:
         """Values of `requirements`, then of `start_requirements`, in the declared order, stacked."""
         unpacked = self.unpack_parameters(p)
-        values = [*self.requirements(unpacked).values(), *self.start_requirements(self._handed(x), unpacked).values()]
+        values = [*self.requirements(unpacked).values(), *self.start_requirements(self.handed(x), unpacked).values()]
         return vector(*values) if values else np.zeros(0)
 
     def switch_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`switches` on flat arrays, now, shape (len(switchings),); None for a system without any."""
         if not self.switchings:
             return None
-        return self.switches(t, self._handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
+        return self.switches(t, self.handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
 
     def held_vector(self, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """What a solver holds between events, as it is now: signs of the states with friction, then the switches."""
@@ -359,10 +367,6 @@ class HybridSystem:
         return np.array([float(s.name in self.stiff) for s in continuous for _ in range(s.width)])
 
     # -- internals --------------------------------------------------------------------------------------------------
-
-    def _handed(self, x: Array) -> Any:
-        """The states as the equations get them."""
-        return self.unpack_states(x) if self.by_name else x
 
     def _jumped(self, event: str, t: Array, own: Array, u: Any, p: Any) -> Array:
         """`jump` on the states without the count of missed samples."""

@@ -125,7 +125,7 @@ def test_the_gate_of_telegrams_is_told_three_standard_deviations() -> None:
     bench = running()
     x = np.zeros(bench.runtime.system.state_count)
     x[4] = 7.0**2
-    assert bench.runtime.system.own_bound(x, None) == pytest.approx(21.0)
+    assert bench.runtime.system.own_bound(bench.runtime.system.unpack_states(x), None) == pytest.approx(21.0)
 
 
 def test_the_certificate_is_that_of_the_riccati_equation() -> None:

@@ -171,7 +171,7 @@ def test_standard_deviations_are_outputs() -> None:
     x = observer.start_state()
     x[:10] = [0.1, 0.2, 4.0, 1.0, 1.0, 9.0, 0.3, 16.0, 5.0, 6.0]
     p, u = observer.unpack_parameters(observer.start_parameters()), observer.unpack_inputs(np.zeros(2))
-    assert observer.output(0.0, x, u, p) == {
+    assert observer.output(0.0, observer.unpack_states(x), u, p) == {
         "angle": 0.1,
         "rate": 0.2,
         "angle_std": 2.0,

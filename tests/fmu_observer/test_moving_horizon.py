@@ -89,7 +89,8 @@ def compiled(
     symbols = [ca.SX.sym(f"a{i}", size) for i, size in enumerate(sizes)]
     arrays = [ca.ArrayInterface.SX(s, shape=(s.numel(),)) for s in symbols]
     found = iterate(problem(bounded, disturbed=disturbed), passes, *arrays)
-    return ca.Function("iterated", symbols, [ca.SX(value) for value in found])
+    values = (found.estimate, found.covariance, *found.remembered.values())
+    return ca.Function("iterated", symbols, [ca.SX(value) for value in values])
 
 
 def rows_of(seed: int, count: int) -> list[np.ndarray]:
@@ -135,10 +136,9 @@ def moved_through(
         if row[0]:
             F, _ = transition(row[1])
             point = F @ x + F[:, 1] * row[3]
-        x, P, kept = (np.asarray(v).ravel() for v in function(arrival, table, points, row, point, 0.0))
-        arrival, rest = kept[: len(arrival)], kept[len(arrival) :]
-        table, points, told = rest[: len(table)], rest[len(table) : len(table) + len(points)], rest[-5:]
-        found.append((x, P.reshape(N, N), points.reshape(window, N), told))
+        after = (np.asarray(v).ravel() for v in function(arrival, table, points, row, point, 0.0))
+        x, P, arrival, table, points, told = after
+        found.append((x, P.reshape(N, N), points.reshape(window, N), told[-5:]))
     return found
 
 
@@ -480,7 +480,7 @@ def test_bounds_that_most_measurements_contradict_are_told(loss: Any) -> None:
     counted = {}
     for measured in (0.0, 10.0):
         row = WindowRow(1.0, 0.5, 0.0, np.zeros(1), np.full(2, measured), np.ones(2))
-        rows, points = np.tile(vector(*LAYOUT.packed(row)), (4, 1)), np.zeros((4, N))
+        rows, points = np.tile(LAYOUT.packed(row), (4, 1)), np.zeros((4, N))
         judged = replace(problem((1,)), losses=(loss,) * 2, loss_scale=lambda _shared: 3.0)
         found = solve(judged, arrival_cost_at(START, 1e-3 * P0), rows, points, np.zeros(1), 3)
         counted[measured] = contradicted(found.bounds, found.far, found.broken)[0]

@@ -50,7 +50,7 @@ def test_three_balises_give_what_the_window_of_least_squares_gives(monkeypatch: 
             0.1, 0.0, 0.0, 0.0, 20.0, 27e3, 1.0, 0.0, 0.0
         )  # offsets, speed, effort, a balise of no accuracy
         row = WindowRow(float(k > 0), 1.5, 1.5 * k, inputs, vector(place), vector(1.0))
-        rows.append(vector(*LAYOUT.packed(row)))
+        rows.append(LAYOUT.packed(row))
         points.append(shaken(x, row, shared).state if k else START)
         graph_row = graph.iterate(None, 1, before, None, x, rows[-1], points[-1], shared)
         ours = replace(

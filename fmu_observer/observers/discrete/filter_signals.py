@@ -42,15 +42,16 @@ class SignalsOf:
         n, q = self.model.order, len(self.model.measurements)
         name = "estimate_covariance_factor" if self.rooted else "estimate_covariance"
         text = "Lower factor of the covariance P(k|k)" if self.rooted else "Covariance P(k|k)"
-        unit = tuple(map(float, np.eye(n).ravel()))
         found = [
             memory_signal(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}")
             for s in self.model.states
         ]
         found += [
-            memory_signal(name, "1", unit, f"{text}, row by row, SI units", size=n * n),
+            memory_signal(name, "1", np.eye(n), f"{text}, row by row, SI units", shape=(n, n)),
             memory_signal("last_innovation", "1", 0.0, "Last measured minus predicted, SI units", size=q),
-            memory_signal("last_innovation_covariance", "1", 0.0, "Covariance of it, row by row, SI units", size=q * q),
+            memory_signal(
+                "last_innovation_covariance", "1", 0.0, "Covariance of it, row by row, SI units", shape=(q, q)
+            ),
             memory_signal("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory_signal("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
         ]

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.condition import Condition
-from fmu_observer.filtering.kalman import Corrected, flattened, log_likelihood, normalised_square
+from fmu_observer.filtering.kalman import Corrected, log_likelihood, normalised_square
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
 from fmu_observer.models.process_noise import noise_over
@@ -29,7 +29,7 @@ from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, parameter, vector, width
+from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.missing import is_there
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -58,7 +58,7 @@ class GaussianFilter(GatedObserver):
        corrected by what has arrived, without measurements that are NaN. If all is periodic the first sample corrects
        the start; noise is given as `process_covariance` of one period. With events it is given as `process_density`,
        `sampling` predicts too, and its first instant begins the time.
-    4. The state is the estimates, the spread row by row, the last innovation and what is known of it. A measurement
+    4. The states are the estimates, the spread, the last innovation and what is known of it. A measurement
        ``position`` that arrives at the event ``balise`` passes the gate of balise telegrams, see `GatedObserver`.
 
     Args:
@@ -77,6 +77,7 @@ class GaussianFilter(GatedObserver):
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("joseph", "short", "square_root")
+    by_name = True
     internal_step = 0.1  # nothing flows between samples
     own_parameters: tuple[Signal, ...] = ()
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
@@ -194,14 +195,13 @@ class GaussianFilter(GatedObserver):
             values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
         return stacked(tuple(values))
 
-    def belief(self, x: Array) -> Belief:
+    def belief(self, x: Any) -> Belief:
         """What the filter believes.
 
         Args:
-            x: state, shape (k,).
+            x: states by name.
         """
-        n = self.model.order
-        return Belief(x[:n], as_matrix(x[n : n + n * n], n, n))
+        return Belief(stacked(tuple(getattr(x, name) for name in self._estimated)), getattr(x, self._spread))
 
     def covariance_of(self, spread: Array) -> Array:
         """The covariance that a spread stands for, shape (n, n).
@@ -235,79 +235,67 @@ class GaussianFilter(GatedObserver):
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Prediction over the time since the last event, then correction by what has arrived, shape (own_count,)."""
-        places = self._places
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Prediction over the time since the last event, then correction by what has arrived."""
         before, rows = self.belief(x), self.arrivals.rows(event)
-        primed = x[places["primed"]] > 0.5
+        belief = self._ahead(before, t, x, u, p)
+        kept = {"primed": 1.0, "covariance_lapsed": self._lapsed(x)}
+        kept |= {"last_time": t} if self.arrivals.timed else {}
+        if not rows:
+            return self._remembered(belief) | kept
+        y = self.arrivals.measured(event, u)
+        noise = self.reading_noise(self.told_accuracy(event, u), p)
+        after, error = self.corrected(belief, self.known(t, u, p), y, rows, noise, p)
+        there, found = is_there(y), after.innovation_covariance
+        count = there @ np.ones(len(rows))
+        share = LEFT if self.form == "short" else 0.0  # the other forms subtract nothing
+        lost = _lost(self._variances(belief.spread), self._variances(after.covariance), share)
+        kept["covariance_lapsed"] = np.maximum(kept["covariance_lapsed"], lost)
+        some = count > 0.5  # of nothing at all the prediction stays, to the last bit
+        belief = chosen(some, Belief(after.estimate, after.covariance), belief._replace(drawn=None))
+        kept["last_nis"] = np.where(some, normalised_square(error, found), x.last_nis)
+        kept["log_likelihood"] = x.log_likelihood + np.where(some, log_likelihood(error, found, count), 0.0)
+        if self.arrivals.several:
+            kept["last_count"] = np.where(some, count, x.last_count)
+        e, S = _replaced(x.last_innovation, x.last_innovation_covariance, rows, error, found, there)
+        return self._remembered(belief) | kept | {"last_innovation": e, "last_innovation_covariance": S}
+
+    def _ahead(self, before: Belief, t: Array, x: Any, u: Any, p: Any) -> Belief:
+        """The belief at an event before what arrives there; at the first one of a period it is the start."""
         if self.arrivals.timed:
-            period = np.where(primed, t - x[places["last_time"]], 0.0)
+            period = np.where(x.primed > 0.5, t - x.last_time, 0.0)
             known = self.known(t - period, u, p)
             noise = self._noise_of_density(before.estimate, known, period, p)
-            belief = self.predicted(before, known, period, noise, p)
-        else:
-            known, r = self.known(t - p.sample_period, u, p), self.model.noise_count
-            noise = as_matrix(p.process_covariance, r, r)
-            ahead = self.predicted(before, known, p.sample_period, noise, p)
-            belief = chosen(primed, ahead, self.unmoved(before, p))
-        kept = {name: x[first] for name, first in places.items()}
-        kept["covariance_lapsed"] = self._lapsed(x)
-        q = len(self.model.measurements)
-        first, second = places["last_innovation"], places["last_innovation_covariance"]
-        e, S = x[first : first + q], as_matrix(x[second : second + q * q], q, q)
-        if rows:
-            y = self.arrivals.measured(event, u)
-            noise = self.reading_noise(self.told_accuracy(event, u), p)
-            after, error = self.corrected(belief, self.known(t, u, p), y, rows, noise, p)
-            there, found = is_there(y), after.innovation_covariance
-            count = there @ np.ones(len(rows))
-            share = LEFT if self.form == "short" else 0.0  # the other forms subtract nothing
-            lost = _lost(self._variances(belief.spread), self._variances(after.covariance), share)
-            kept["covariance_lapsed"] = np.maximum(kept["covariance_lapsed"], lost)
-            some = count > 0.5  # of nothing at all the prediction stays, to the last bit
-            belief = chosen(some, Belief(after.estimate, after.covariance), belief._replace(drawn=None))
-            kept["last_nis"] = np.where(some, normalised_square(error, found), kept["last_nis"])
-            kept["log_likelihood"] = kept["log_likelihood"] + np.where(some, log_likelihood(error, found, count), 0.0)
-            if self.arrivals.several:
-                kept["last_count"] = np.where(some, count, kept["last_count"])
-            e, S = _replaced(e, S, rows, error, found, there)
-        timed = (t + 0.0 * kept["primed"],) if self.arrivals.timed else ()
-        counted = (kept["last_count"],) if self.arrivals.several else ()
-        return vector(
-            *(belief.estimate[i] for i in range(self.model.order)),
-            *flattened(belief.spread),
-            *(e[i] for i in range(q)),
-            *flattened(S),
-            kept["last_nis"],
-            kept["log_likelihood"],
-            kept["covariance_lapsed"],
-            *counted,
-            *timed,
-            1.0 + 0.0 * kept["primed"],
-        )
+            return self.predicted(before, known, period, noise, p)
+        known, r = self.known(t - p.sample_period, u, p), self.model.noise_count
+        noise = as_matrix(p.process_covariance, r, r)
+        return chosen(x.primed > 0.5, self.predicted(before, known, p.sample_period, noise, p), self.unmoved(before, p))
 
-    def _lapsed(self, x: Array) -> Array:
+    def _remembered(self, belief: Belief) -> dict[str, Array]:
+        estimates = {name: belief.estimate[i] for i, name in enumerate(self._estimated)}
+        return estimates | {self._spread: belief.spread}
+
+    def _lapsed(self, x: Any) -> Array:
         """Whether the covariance is none, or was none before; a correction may hide that."""
-        before = x[self._places["covariance_lapsed"]]
-        return before if self.rooted else np.maximum(before, 1.0 - is_positive(self.belief(x).spread))
+        if self.rooted:
+            return x.covariance_lapsed
+        return np.maximum(x.covariance_lapsed, 1.0 - is_positive(x.estimate_covariance))
 
     def _variances(self, spread: Array) -> list[Array]:
         n = self.model.order
         return [spread[i] @ spread[i] if self.rooted else spread[i, i] for i in range(n)]
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations, and what is known of the last innovation."""
-        n, q, places = self.model.order, len(self.model.measurements), self._places
+        n, q, states = self.model.order, len(self.model.measurements), self.model.states
         P = self.covariance_of(self.belief(x).spread)
-        first, second = places["last_innovation"], places["last_innovation_covariance"]
-        values = {s.name: x[i] for i, s in enumerate(self.model.states)}
-        values |= {f"{s.name}_std": np.sqrt(np.maximum(P[i, i], 0.0)) for i, s in enumerate(self.model.states)}
-        for i, s in enumerate(self.model.measurements):
-            values[f"innovation_{s.name}"] = x[first + i]
-        values["innovation_covariance"] = x[second : second + q * q]
-        values |= {"nis": x[places["last_nis"]], "innovation_likelihood": x[places["log_likelihood"]]}
+        values = {s.name: getattr(x, name) for s, name in zip(states, self._estimated, strict=True)}
+        values |= {f"{s.name}_std": np.sqrt(np.maximum(P[i, i], 0.0)) for i, s in enumerate(states)}
+        values |= {f"innovation_{s.name}": x.last_innovation[i] for i, s in enumerate(self.model.measurements)}
+        values["innovation_covariance"] = np.reshape(x.last_innovation_covariance, (q * q,))
+        values |= {"nis": x.last_nis, "innovation_likelihood": x.log_likelihood}
         if self.arrivals.several:
-            values["nis_degrees"] = x[places["last_count"]]
+            values["nis_degrees"] = x.last_count
         values[NOT_POSITIVE.name] = self._lapsed(x)
         if self.covariances:
             values["covariance"] = np.reshape(P, (n * n,))
@@ -321,13 +309,13 @@ class GaussianFilter(GatedObserver):
         needed |= positive(self._process_name, getattr(p, self._process_name), r, definite=False)
         return needed | positive("measurement_covariance", p.measurement_covariance, s, definite=True)
 
-    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+    def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """The covariance of the first estimate is one; of a factor every value is legal whose square is a number."""
-        n, last = self.model.order, self.model.order * (self.model.order + 1)
+        n, spread = self.model.order, getattr(x, self._spread)
         if not self.rooted:
-            return positive("estimate_covariance", x[n:last], n, definite=False)
-        text = f"estimate_covariance_factor: entries below {LARGEST_ENTRY:g}, whose squares are numbers"
-        return {text: np.where(np.max(np.abs(x[n:last])) < LARGEST_ENTRY, 1.0, 0.0)}
+            return positive(self._spread, np.reshape(spread, (n * n,)), n, definite=False)
+        text = f"{self._spread}: entries below {LARGEST_ENTRY:g}, whose squares are numbers"
+        return {text: np.where(np.max(np.abs(spread)) < LARGEST_ENTRY, 1.0, 0.0)}
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Whether the filter has a stable steady state with the gains of a preset, some replaced.
@@ -357,9 +345,9 @@ class GaussianFilter(GatedObserver):
         readings = as_matrix(np.asarray(p.measurement_covariance), s, s)
         return steady_condition(self.model, start, known, period, noise, readings, self.source)
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """Three standard deviations of the position [m], for the gate of balise telegrams."""
-        i = [s.name for s in self.states].index(self.position_state)
+        i = self._estimated.index(self.position_state)
         return SIGMAS * np.sqrt(np.maximum(self.covariance_of(self.belief(x).spread)[i, i], 0.0))
 
     # -- internals --------------------------------------------------------------------------------------------------
@@ -380,7 +368,8 @@ class GaussianFilter(GatedObserver):
         model = self.model
         told = SignalsOf(model, self.arrivals, rooted=self.rooted, covariances=self.covariances)
         self.states = (*told.memory(), PRIMED)
-        self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
+        self._estimated = tuple(s.name for s in self.states[: model.order])
+        self._spread = self.states[model.order].name
         self.inputs = (*model.inputs, *self.arrivals.inputs)
         self.events = self.arrivals.events
         self.outputs = told.outputs()
@@ -419,7 +408,7 @@ class GaussianFilter(GatedObserver):
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
         inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
         H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
-        return self.states[int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))].name
+        return self._estimated[int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))]
 
 
 def _matrix(name: str, values: np.ndarray, text: str) -> Signal:

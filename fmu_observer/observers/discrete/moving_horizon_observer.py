@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,9 +18,7 @@ from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, Window
 from fmu_observer.moving_horizon.real_time_iteration import (
     MOST_PASSES,
     MOST_ROWS,
-    TOLD,
     iterate,
-    joined,
     require_window,
     told,
     told_outputs,
@@ -30,6 +27,7 @@ from fmu_observer.moving_horizon.real_time_iteration import (
 from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
 from fmu_observer.moving_horizon.window_observability import window_observability
+from fmu_observer.observers.discrete.belief import Belief
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.discrete.gaussian_filter import Form
 from fmu_observer.observers.gated_observer import GATED_EVENT
@@ -39,11 +37,9 @@ from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
-REMEMBERED = ("arrival_cost", "window", "window_estimates")
 UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
 Bounds = Mapping[str, Sequence[float | None]]
 
@@ -117,37 +113,33 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         listed = loss if isinstance(loss, str) else list(loss)
         super().__init__(model, window=window, passes=passes, loss=listed, **given, **options)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The window with a row more, and the estimates that it gives, shape (own_count,)."""
-        n, places = self.model.order, self._places
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The window with a row more, and the estimates that it gives."""
+        n, before = self.model.order, self.belief(x)
         filtered = super().update(event, t, x, u, p)
-        arrival, window, points = (
-            x[places[name] : places[following]] for name, following in pairwise((*REMEMBERED, "last_pass"))
-        )
-        start = joined(x[:n], x[: n + n * n])
         row, shared = self._row(event, t, x, u, p), _flat(self, p)
+        start = np.hstack([before.estimate, before.estimate, np.reshape(before.spread, (n * n,))])
         found = self.iterate(
             self.problem,
             self.passes,
-            np.where(x[places["primed"]] > 0.5, arrival, start),
-            window,
-            points,
-            vector(*self.problem.layout.packed(row)),
-            self._predicted_point(x[:n], row, shared),
+            np.where(x.primed > 0.5, x.arrival_cost, start),
+            x.window,
+            x.window_estimates,
+            self.problem.layout.packed(row),
+            self._predicted_point(before.estimate, row, shared),
             shared,
         )
-        return joined(found.estimate, found.covariance, filtered[n + n * n :], found.remembered)
+        belief = Belief(found.estimate, as_matrix(found.covariance, n, n))
+        return filtered | self._remembered(belief) | found.remembered
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates within their bounds, what is known of the last innovation, and what the window looks like."""
-        shared, n = _flat(self, p), self.model.order
-        inside = self.problem.clipped(x[:n], shared)
+        inside = self.problem.clipped(self.belief(x).estimate, _flat(self, p))
         values = super().output(t, x, u, p)
         if self.robust:
             values.pop("nis")
         values |= {s.name: inside[i] for i, s in enumerate(self.model.states)}
-        first = self._places["last_pass"]
-        return values | told(x[first : first + len(TOLD)])
+        return values | told(x.last_pass)
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Those of the filter; no lowest value above the highest; the scale of the loss within its bounds."""
@@ -202,11 +194,11 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _row(self, event: str, t: Array, x: Array, u: Any, p: Any) -> WindowRow:
+    def _row(self, event: str, t: Array, x: Any, u: Any, p: Any) -> WindowRow:
         """The row that an event brings."""
-        places, arrived = self._places, self.arrivals.rows(event)
-        primed = np.where(x[places["primed"]] > 0.5, 1.0, 0.0)
-        period = primed * (t - x[places["last_time"]]) if self.arrivals.timed else p.sample_period + 0.0 * primed
+        arrived = self.arrivals.rows(event)
+        primed = np.where(x.primed > 0.5, 1.0, 0.0)
+        period = primed * (t - x.last_time) if self.arrivals.timed else p.sample_period + 0.0 * primed
         known, q = self.known(t, u, p), len(self.model.measurements)
         y = self.arrivals.measured(event, u) if arrived else np.zeros(0)
         place, there, y = {row: i for i, row in enumerate(arrived)}, is_there(y), or_else(y, 0.0)
@@ -281,7 +273,6 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         self.own_parameters = own
         super()._declare()
         self.states += window_memory(model.start, np.eye(model.order), self._layout.width, self.window)
-        self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
         self.outputs = (*(s for s in self.outputs if not (self.robust and s.name == "nis")), *told_outputs(self.window))
 
     def _limits(self, shared: Array) -> Limits:

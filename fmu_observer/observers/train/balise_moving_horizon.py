@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ from fmu_observer.moving_horizon.real_time_iteration import (
     MOST_ROWS,
     TOLD,
     iterate,
-    joined,
     require_window,
     told,
     told_outputs,
@@ -27,25 +25,21 @@ from fmu_observer.observers.innovation_gate import OFF, known_accuracy, place_de
 from fmu_observer.observers.train.balise_odometer_ekf import (
     BALISE_ROW,
     FIRST_DEVIATIONS,
-    INNOVATION,
-    LAST_TIME,
-    NIS,
     ODOMETER_ROW,
     ORDER,
     OWN_PARAMETERS,
-    PAIRS,
     BaliseOdometerEkf,
     D,
     P,
     V,
-    covariance_of,
+    estimate_of,
+    estimates,
     moving_speed,
     transition,
 )
 from fmu_observer.observers.train.train_observer import BALISE
 from plant_models.hybrid import OutputWarning, memory, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
@@ -68,20 +62,6 @@ RESTARTS = output_signal(
         "off by more than its deviation. Look at the first telegrams, and at the deviations",
     ),
 )
-
-
-class Refusals(NamedTuple):
-    """What is remembered of the balises that the window refused.
-
-    Attributes:
-        believed: balises believed since the position began. refused: in a row that agree. place: of the last balise, as
-            told [m]. restarts: of the position.
-    """
-
-    believed: Array
-    refused: Array
-    place: Array
-    restarts: Array
 
 
 REFUSALS = (
@@ -173,11 +153,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     def own_states(self) -> tuple[Any, ...]:
         """States of the filter, then what is remembered of the window."""
         covariance = np.diag(np.square(FIRST_DEVIATIONS))
-        filtered = (*super().own_states(), *REFUSALS)
         remembered = window_memory(np.zeros(ORDER), covariance, LAYOUT.width, self.window)
-        places = {s.name: width((*filtered, *remembered)[: len(filtered) + i]) for i, s in enumerate(remembered)}
-        self._places = (*places.values(), width((*filtered, *remembered)))
-        return (*filtered, *remembered)
+        return (*super().own_states(), *REFUSALS, *remembered)
 
     @cached_property
     def problem(self) -> WindowProblem:
@@ -197,67 +174,71 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(WINDOW_PARAMETERS, p)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The window with a row more, and the estimates that it gives, shape (own_count,)."""
-        filtered = super().update(event, t, x, u, p)
-        arrival, window, points, last = (x[first:end] for first, end in pairwise(self._places))
-        begun = last[list(TOLD).index("rows_in_window")] > 0.5
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The window with a row more, and the estimates that it gives."""
+        filtered, estimate = super().update(event, t, x, u, p), estimate_of(x)
+        begun = x.last_pass[list(TOLD).index("rows_in_window")] > 0.5
         shared = vector(*(getattr(p, name) for name in Shared._fields))
-        start = joined(x[:ORDER], x[:ORDER], np.reshape(covariance_of(x), (ORDER * ORDER,)))
-        known = self.problem.clipped(x[:ORDER], shared)
-        before = np.where(begun, points[-ORDER:], x[:ORDER])
+        start = np.hstack([estimate, estimate, np.reshape(x.estimate_covariance, (ORDER * ORDER,))])
+        before = np.where(begun, x.window_estimates[-ORDER:], estimate)
         refusals = self._refusals(event, x, u, p, filtered)
-        anew = refusals.restarts - x[self._places[0] - 1]
-        row = self._row(event, t, x, u, p, before, anew)
-        packed = vector(*LAYOUT.packed(row))
+        row = self._row(event, t, x, u, p, before, refusals["restart_count"] - x.restart_count)
         found = self.iterate(
-            self.problem, self.passes, np.where(begun, arrival, start), window, points, packed, known, shared
+            self.problem,
+            self.passes,
+            np.where(begun, x.arrival_cost, start),
+            x.window,
+            x.window_estimates,
+            LAYOUT.packed(row),
+            self.problem.clipped(estimate, shared),
+            shared,
         )
-        covariance = np.reshape(found.covariance, (ORDER, ORDER))
-        upper = vector(*(covariance[i, j] for i, j in PAIRS))
         now = [found.estimate[i] for i in range(ORDER)]
-        now[V] = moving_speed(now[V], x, u, p)
-        return joined(vector(*now), upper, filtered[LAST_TIME:], vector(*refusals), found.remembered)
+        now[V] = moving_speed(now[V], x.estimated_speed, u, p)
+        covariance = {"estimate_covariance": np.reshape(found.covariance, (ORDER, ORDER))}
+        return filtered | estimates(now) | covariance | refusals | found.remembered
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates now within their bounds, their deviations, how the last measurement fits, and the window."""
         shared = vector(*(getattr(p, name) for name in Shared._fields))
-        inside = self.problem.clipped(x[:ORDER], shared)
+        inside = self.problem.clipped(estimate_of(x), shared)
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
         if self.loss != "squares":
             values.pop("nis")
-        return values | told(x[self._places[3] : self._places[4]]) | {RESTARTS.name: x[self._places[0] - 1]}
+        return values | told(x.last_pass) | {RESTARTS.name: x.restart_count}
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _refusals(self, event: str, x: Array, u: Any, p: Any, filtered: Array) -> Refusals:
+    def _refusals(self, event: str, x: Any, u: Any, p: Any, filtered: Mapping[str, Array]) -> dict[str, Array]:
         """What is remembered of refused balises after an event, from the innovation of the filter's own step."""
-        old = Refusals(*(x[self._places[0] - len(REFUSALS) + i] for i in range(len(REFUSALS))))
+        old = {s.name: getattr(x, s.name) for s in REFUSALS}
         if event != BALISE.name or self.loss == "squares":
             return old
-        error, nis, before = filtered[INNOVATION], filtered[NIS], x[INNOVATION]
+        error, nis, before = filtered["last_innovation"], filtered["last_nis"], x.last_innovation
         doubt = p.loss_scale * p.loss_scale
         refused = np.where(nis > doubt, 1.0, 0.0)
         agrees = np.where(np.square(error - before) * nis <= 2.0 * doubt * np.square(error), 1.0, 0.0)
-        count = refused * (1.0 + agrees * old.refused)
-        anew = refused * np.where(count >= np.minimum(old.believed + 1.0, p.gate_recover), 1.0, 0.0)
-        believed = np.where(anew > 0.0, 1.0, old.believed + 1.0 - refused)
-        now = Refusals(believed, count * (1.0 - anew), u.balise_position, old.restarts + anew)
-        told = old.believed + old.refused > 0.0
-        again = np.where(
-            np.abs(u.balise_position - old.place) <= p.balise_deviation, told, False
-        )  # told twice, it is one
-        return Refusals(*(np.where(again, was, now_is) for was, now_is in zip(old, now, strict=True)))
+        count = refused * (1.0 + agrees * x.balises_refused)
+        anew = refused * np.where(count >= np.minimum(x.balises_believed + 1.0, p.gate_recover), 1.0, 0.0)
+        now = {
+            "balises_believed": np.where(anew > 0.0, 1.0, x.balises_believed + 1.0 - refused),
+            "balises_refused": count * (1.0 - anew),
+            "told_place": u.balise_position,
+            "restart_count": x.restart_count + anew,
+        }
+        told = x.balises_believed + x.balises_refused > 0.0
+        near = np.abs(u.balise_position - x.told_place) <= p.balise_deviation
+        again = np.where(near, told, False)  # told twice, it is one
+        return {name: np.where(again, old[name], now[name]) for name in now}
 
-    def _row(self, event: str, t: Array, x: Array, u: Any, p: Any, before: Array, anew: Array) -> WindowRow:
+    def _row(self, event: str, t: Array, x: Any, u: Any, p: Any, before: Array, anew: Array) -> WindowRow:
         """The row that an event brings: what the flow added to the linear transition, and the measurement."""
-        period, is_balise = t - x[LAST_TIME], float(event == BALISE.name)
-        offset = x[:ORDER] - transition(period, x[V], u.effort, p).F @ before
+        period, is_balise, speed = t - x.last_time, float(event == BALISE.name), x.estimated_speed
+        offset = estimate_of(x) - transition(period, speed, u.effort, p).F @ before
         measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
         told = known_accuracy(u.balise_location_accuracy) if event == BALISE.name else 0.0
-        others = (u.effort, is_balise, anew, told)
-        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], *(value + 0.0 * x[V] for value in others))
-        return WindowRow(1.0 + 0.0 * x[V], period, t + 0.0 * x[V], inputs, vector(measured), vector(1.0 + 0.0 * x[V]))
+        inputs = vector(*(offset[i] for i in range(ORDER)), speed, u.effort, is_balise, anew, told)
+        return WindowRow(1.0, period, t, inputs, vector(measured), np.ones(1))
 
 
 def _shared(flat: Array) -> Shared:

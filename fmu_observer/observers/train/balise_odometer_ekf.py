@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import inf
 from typing import Any, NamedTuple
 
@@ -30,11 +30,8 @@ from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4
-P, V, D, CREEP = range(ORDER)  # places of the estimates
-PAIRS = [(i, j) for i in range(ORDER) for j in range(i, ORDER)]  # the covariance as remembered, row by row
-COVARIANCE = ORDER
-VARIANCES = [f"estimate_covariance[{PAIRS.index((i, i)) + 1}]" for i in range(ORDER)]
-LAST_TIME, INNOVATION, NIS, LIKELIHOOD, REFUSED_TIME = (ORDER + len(PAIRS) + i for i in range(5))
+P, V, D, CREEP = range(ORDER)  # places of the estimates among themselves
+VARIANCES = [f"estimate_covariance[{k}]" for k in (1, 5, 8, 10)]  # of an upper triangle
 FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s], [m/s2], [m/s] [ours]
 ROUNDING = 1e-9  # of times that are sums of periods
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
@@ -115,6 +112,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     name = "balise_odometer_ekf"
     description = "Extended Kalman filter of odometer and balises, with disturbance and creep"
     source = "Allaoui 2024, section II.5; the train case is ours"
+    by_name = True
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "itself"
@@ -166,13 +164,13 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
 
     def own_states(self) -> tuple[Signal, ...]:
         """States of the observer itself, estimates first."""
-        start = tuple(FIRST_DEVIATIONS[i] ** 2 if i == j else 0.0 for i, j in PAIRS)
+        start, text = np.diag([d**2 for d in FIRST_DEVIATIONS]), "Covariance at the last event, upper triangle"
         return (
             POSITION,
             SPEED,
             state("estimated_disturbance", "m/s2", 0.0, "Unknown acceleration d"),
             state("estimated_creep", "m/s", 0.0, "Creep z of the wheel"),
-            memory("estimate_covariance", "1", start, "Covariance at the last event, upper triangle", size=len(PAIRS)),
+            memory("estimate_covariance", "1", start, text, shape=(ORDER, ORDER), symmetric=True),
             memory("last_time", "s", 0.0, "Time of the last event"),
             memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
             memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
@@ -184,82 +182,95 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(TUNABLE, p)
 
-    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+    def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """The covariance of the first estimate is one."""
-        return positive_matrix("estimate_covariance", covariance_of(x), VARIANCES)
+        return positive_matrix("estimate_covariance", x.estimate_covariance, VARIANCES)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Position, speed, disturbance and creep, shape (4,)."""
-        return vector(x[V], _free_acceleration(x, u, p), 0.0 * x[D], -x[CREEP] * _fading(x[V], p))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of position, speed, disturbance and creep."""
+        return {
+            "estimated_position": x.estimated_speed,
+            "estimated_speed": _free_acceleration(x, u, p),
+            "estimated_disturbance": 0.0,
+            "estimated_creep": -x.estimated_creep * _fading(x.estimated_speed, p),
+        }
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
         return vector((p.davis_a + np.maximum(-u.effort, 0.0)) / p.mass)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Covariance over the time since the last event, then correction by the reading or the balise."""
-        moved = transition(t - x[LAST_TIME], x[V], u.effort, p)
-        before = predicted_covariance(covariance_of(x), moved.F, moved.QN)
-        estimate = x[:ORDER]
-        if event == BALISE.name:
-            error, row = u.balise_position - x[P], BALISE_ROW
+        is_balise = event == BALISE.name
+        before, estimate = self.covariance_now(t, x, u, p), estimate_of(x)
+        if is_balise:
+            error, row = u.balise_position - x.estimated_position, BALISE_ROW
             deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
         else:
-            error, row, deviation = self.reading(t, x, u, p) - x[V] - x[CREEP], ODOMETER_ROW, p.odometer_deviation
+            error = self.reading(t, x, u, p) - x.estimated_speed - x.estimated_creep
+            row, deviation = ODOMETER_ROW, p.odometer_deviation
         innovation = vector(error)
         after = correct(estimate, before, innovation, row, np.reshape(deviation**2, (1, 1)))
         nis = normalised_square(innovation, after.innovation_covariance)
         told = log_likelihood(innovation, after.innovation_covariance)
-        refused = 0.0 * nis if event == BALISE.name else np.where(nis > p.odometer_gate**2, 1.0, 0.0)
+        refused = 0.0 * nis if is_balise else np.where(nis > p.odometer_gate**2, 1.0, 0.0)
         kept = [np.where(refused > 0.0, estimate[i], after.estimate[i]) for i in range(ORDER)]
-        kept[V] = moving_speed(kept[V], x, u, p)
-        covariance = [np.where(refused > 0.0, before[i, j], after.covariance[i, j]) for i, j in PAIRS]
-        refused_time = x[REFUSED_TIME] if event == BALISE.name else refused * (x[REFUSED_TIME] + p.odometer_period)
+        kept[V] = moving_speed(kept[V], x.estimated_speed, u, p)
+        covariance = np.where(refused > 0.0, before, after.covariance)
+        refused_time = x.refused_time if is_balise else refused * (x.refused_time + p.odometer_period)
         anew = refused * np.where(refused_time + ROUNDING >= p.odometer_recover, 1.0, 0.0)
         new = _anew(estimate, before, error, refused_time)
-        return vector(
-            *(np.where(anew > 0.0, new[0][i], kept[i]) for i in range(ORDER)),
-            *(np.where(anew > 0.0, new[1][k], covariance[k]) for k in range(len(PAIRS))),
-            t + 0.0 * nis,
-            -error if event == BALISE.name else x[INNOVATION],
-            np.where(refused > 0.0, x[NIS], nis),
-            x[LIKELIHOOD] + np.where(refused > 0.0, 0.0, told),
-            refused_time * (1.0 - anew),
-        )
+        return {
+            **estimates(np.where(anew > 0.0, new[0][i], kept[i]) for i in range(ORDER)),
+            "estimate_covariance": np.where(anew > 0.0, new[1], covariance),
+            "last_time": t,
+            "last_innovation": -error if is_balise else x.last_innovation,
+            "last_nis": np.where(refused > 0.0, x.last_nis, nis),
+            "log_likelihood": x.log_likelihood + np.where(refused > 0.0, 0.0, told),
+            "refused_time": refused_time * (1.0 - anew),
+        }
 
-    def reading(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def covariance_now(self, t: Array, x: Any, u: Any, p: Any) -> Array:
+        """The covariance a time after the last event, shape (4, 4).
+
+        Args:
+            t: [s]. x: states. u: inputs. p: parameters.
+        """
+        moved = transition(t - x.last_time, x.estimated_speed, u.effort, p)
+        return predicted_covariance(x.estimate_covariance, moved.F, moved.QN)
+
+    def reading(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """The reading of the odometer, brought from its age to now [m/s].
 
         Args:
-            t: [s]. x: state. u: inputs. p: parameters.
+            t: [s]. x: states. u: inputs. p: parameters.
         """
         rate = _free_acceleration(x, u, p) - self.friction(t, x, u, p)[0]
-        return u.odometer + p.reading_age * np.where(x[V] > 0.0, rate, 0.0)
+        return u.odometer + p.reading_age * np.where(x.estimated_speed > 0.0, rate, 0.0)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, their deviations now, and how the last measurement fits."""
-        moved = transition(t - x[LAST_TIME], x[V], u.effort, p)
-        now = predicted_covariance(covariance_of(x), moved.F, moved.QN)
+        now = self.covariance_now(t, x, u, p)
         return {
-            "position": x[P],
-            "speed": x[V],
-            "disturbance": x[D],
-            "creep": x[CREEP],
-            "innovation": x[INNOVATION],
+            "position": x.estimated_position,
+            "speed": x.estimated_speed,
+            "disturbance": x.estimated_disturbance,
+            "creep": x.estimated_creep,
+            "innovation": x.last_innovation,
             "position_std": np.sqrt(np.maximum(now[P, P], 0.0)),
             "speed_std": np.sqrt(np.maximum(now[V, V], 0.0)),
-            "nis": x[NIS],
-            "innovation_likelihood": x[LIKELIHOOD],
-            "odometer_fault": np.where(x[REFUSED_TIME] > 0.0, 1.0, 0.0),
+            "nis": x.last_nis,
+            "innovation_likelihood": x.log_likelihood,
+            "odometer_fault": np.where(x.refused_time > 0.0, 1.0, 0.0),
         }
 
     def odometer_of(self, u: Any) -> Array:
         """The odometer [m/s]."""
         return u.odometer
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """Three standard deviations of the position at the last event [m]."""
-        return SIGMAS * np.sqrt(np.maximum(x[COVARIANCE], 0.0))
+        return SIGMAS * np.sqrt(np.maximum(x.estimate_covariance[0, 0], 0.0))
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate by the filter's own function ``e' inv(P) e``, which falls over every sequence of gaps.
@@ -359,13 +370,13 @@ def _drift(speed: Array, effort: Array, p: Any) -> Array:
     return 2.0 * (by_gradient + np.square(p.effort_share * effort / p.mass) / p.effort_time)
 
 
-def _free_acceleration(x: Array, u: Any, p: Any) -> Array:
+def _free_acceleration(x: Any, u: Any, p: Any) -> Array:
     """Acceleration without dry friction [m/s2]."""
-    return (np.maximum(u.effort, 0.0) - rolling_drag(x[V], p)) / p.mass + x[D]
+    return (np.maximum(u.effort, 0.0) - rolling_drag(x.estimated_speed, p)) / p.mass + x.estimated_disturbance
 
 
-def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple[list[Array], list[Array]]:
-    """Estimate and upper triangle of the covariance where readings are believed again that were refused for long.
+def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple[list[Array], Array]:
+    """Estimate and covariance where readings are believed again that were refused for long.
 
     The speed is the reading's, what explained another speed is forgotten, and the position may be wrong by what the
     speed was wrong for that time.
@@ -377,31 +388,42 @@ def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple
     variances = [P[0, 0] + np.square(error * refused_time), *(d**2 + 0.0 * error for d in FIRST_DEVIATIONS[1:])]
     reading = estimate[V] + estimate[CREEP] + error
     found = [estimate[0], np.maximum(reading, 0.0), 0.0 * error, 0.0 * error]
-    return found, [variances[i] if i == j else 0.0 * error for i, j in PAIRS]
+    rows = [np.hstack([variances[i] if i == j else 0.0 * error for j in range(ORDER)]) for i in range(ORDER)]
+    return found, np.vstack(rows)
 
 
-def covariance_of(x: Array) -> Array:
-    """Covariance as remembered, shape (4, 4).
+def estimate_of(x: Any) -> Array:
+    """The estimates, shape (4,).
 
     Args:
-        x: state of the observer.
+        x: states.
     """
-    place = {pair: COVARIANCE + k for k, pair in enumerate(PAIRS)}
-    return np.vstack([np.hstack([x[place[min(i, j), max(i, j)]] for j in range(ORDER)]) for i in range(ORDER)])
+    return vector(x.estimated_position, x.estimated_speed, x.estimated_disturbance, x.estimated_creep)
 
 
-def moving_speed(speed: Array, x: Array, u: Any, p: Any) -> Array:
+def estimates(values: Iterable[Array]) -> dict[str, Array]:
+    """The estimates by name.
+
+    Args:
+        values: four, in the order of `estimate_of`.
+    """
+    names = ("estimated_position", "estimated_speed", "estimated_disturbance", "estimated_creep")
+    return dict(zip(names, values, strict=True))
+
+
+def moving_speed(speed: Array, before: Array, u: Any, p: Any) -> Array:
     """A corrected speed, zero where the train stands before and after it, and below zero only where the wheel turns
     backwards by more than its noise [m/s].
 
     A speed above zero, however small, would be friction's to stop, and would move the position on the way.
 
     Args:
-        speed: after a correction [m/s]. x: state before it. u: inputs. p: parameters of `BaliseOdometerEkf`.
+        speed: after a correction [m/s]. before: the one before it [m/s]. u: inputs.
+        p: parameters of `BaliseOdometerEkf`.
     """
     noise = SIGMAS * p.odometer_deviation
     forward = np.where(u.odometer < -noise, speed, np.maximum(speed, 0.0))
-    return np.where(stands(x[V], u.odometer, noise) > 0.0, 0.0, forward)
+    return np.where(stands(before, u.odometer, noise) > 0.0, 0.0, forward)
 
 
 class Settled(NamedTuple):
