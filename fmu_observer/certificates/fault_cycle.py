@@ -252,7 +252,10 @@ def smallest_effort(error_matrix: np.ndarray, effort_column: np.ndarray, thresho
     k = int(np.argmax(sizes))
     low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
     found = scipy.optimize.minimize_scalar(
-        lambda t: -_shown(error_matrix, effort_column, row, t), bounds=(low, high), method="bounded"
+        lambda t: -_shown(error_matrix, effort_column, row, t),
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-6 * high},  # of its square is the error of the peak
     )
     return threshold / max(-float(found.fun), sizes[k])
 

@@ -18,7 +18,7 @@ import pytest
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.disk_cache import files, identity
-from plant_models.disk_cache.description import Description
+from plant_models.disk_cache.description import Description, NoIdentityError
 from plant_models.disk_cache.entries import entry_path, recall, remembered
 from plant_models.disk_cache.identity import folder_digest
 from plant_models.hybrid import HybridSystem, kernel
@@ -224,3 +224,9 @@ def test_a_kernel_from_the_cache_is_the_traced_one(name: str, monkeypatch: pytes
     monkeypatch.setattr(kernel, "_trace", never)
     functions = kernel._traced_functions(make())
     assert {n: f.serialize() for n, f in functions.items()} == traced
+
+
+@pytest.mark.parametrize("name", ["no_such_package_anywhere", "__future__"])
+def test_what_is_no_folder_on_disk_has_no_digest(name: str) -> None:
+    with pytest.raises(NoIdentityError, match=f"files of {name} are not on disk"):
+        folder_digest(name)
