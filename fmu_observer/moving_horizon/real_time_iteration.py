@@ -16,7 +16,7 @@ from fmu_observer.moving_horizon.gauss_newton import FAR, KEPT, WindowProblem, p
 from plant_models.hybrid import OutputWarning, Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
-from plant_models.hybrid.system import Array, vector
+from plant_models.hybrid.system import Array
 
 MOST_ROWS, MOST_PASSES = 1000, 20
 MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within what is told of its error [ours]
@@ -182,12 +182,3 @@ def unsettled(step: Array, broken: Array) -> Array:
         step: by which the last pass has moved an estimate, shape (1,) [1]. broken: `Solution.broken`, shape (1,) [1].
     """
     return np.where(np.maximum(step, broken) > MUCH, 1.0, 0.0)
-
-
-def joined(*parts: Array) -> Array:
-    """Vectors one after the other, shape (k,).
-
-    Args:
-        parts: shape (n,) each.
-    """
-    return vector(*(part[i] for part in parts for i in range(part.shape[0])))

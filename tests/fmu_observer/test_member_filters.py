@@ -176,9 +176,8 @@ def test_a_plant_is_a_model_and_noise_may_enter_by_its_input() -> None:
     assert found.model.noise_count == 1
     p = found.unpack_parameters(found.start_parameters())
     u = found.unpack_inputs(np.concatenate([np.zeros(1), np.random.default_rng(0).normal(size=30)]))
-    x = found.start_state()
-    x[-1] = 1.0  # members stand at zero
-    members = found.jump("sampling", 0.0, x, u, p)[5:25].reshape(10, 2)
+    x = found.unpack_states(found.start_state())._replace(primed=1.0)  # members stand at zero
+    members = found.jump("sampling", 0.0, x, u, p)["drawn_members"]
     assert np.ptp(members[:, 0]) == pytest.approx(0.5 * float(p.sample_period) * np.ptp(members[:, 1]), rel=0.2)
     with pytest.raises(ValueError, match="expected additive noise"):
         EnsembleKalmanFilter(system_model(Pendulum(), ["angle"], [], measurement_noises=["torque"]))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from fmu_observer.filtering.ensemble import correct_members, inflated, mean_of, variances_of
-from fmu_observer.observers.discrete.member_filter import MemberFilter, Sample
+from fmu_observer.observers.discrete.member_filter import CorrectedMembers, MemberFilter, Sample
 from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 
@@ -34,9 +33,9 @@ class EnsembleKalmanFilter(MemberFilter):
         """Members moved apart, see `MemberFilter.spread`."""
         return inflated(members, p.inflation)
 
-    def corrected(self, members: Array, more: Array, sample: Sample, u: Any, p: Any) -> Sequence[Array]:
+    def corrected(self, members: Array, x: Any, sample: Sample, u: Any, p: Any) -> CorrectedMembers:
         """Estimate, NIS, variances and members after the gain of the ensemble, see `MemberFilter.corrected`."""
         draws = np.reshape(u.measurement_normal, (len(self.model.measurements), self.members))
         found = correct_members(self.spread(members, p), sample.seen, sample.y, sample.noise, draws)
         after = np.where(sample.count > 0.5, found.members, members)
-        return mean_of(after), found.nis, variances_of(after), after
+        return CorrectedMembers(mean_of(after), found.nis, variances_of(after), after)

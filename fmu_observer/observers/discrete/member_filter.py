@@ -28,8 +28,6 @@ from plant_models.hybrid import (
     memory,
     output_signal,
     parameter,
-    vector,
-    width,
 )
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.noise import Purpose
@@ -55,6 +53,21 @@ class Sample(NamedTuple):
     count: Array
 
 
+class CorrectedMembers(NamedTuple):
+    """What a sample makes of the members.
+
+    Attributes:
+        estimate: shape (n,). nis: normalised innovation squared. variances: shape (n,). members: shape (n, M).
+        more: values of `own_memory` by name.
+    """
+
+    estimate: Array
+    nis: Array
+    variances: Array
+    members: Array
+    more: Mapping[str, Array] = {}
+
+
 class MemberFilter(HybridSystem):
     """Base of filters of any `FilterModel` whose belief is a number of members.
 
@@ -65,8 +78,8 @@ class MemberFilter(HybridSystem):
     2. At the first sample members are drawn around the start of the estimates with `start_covariance`; at later ones
        each runs through the model over the period and feels process noise of its own. Noises are of (seed, signal,
        index), so that block, FMU and a run that is done again draw the same.
-    3. The state is the estimates, NIS, standard deviations, the members one after the other, what the subclass adds,
-       how many measurements there were last, and whether a sample has come. What is missing (NaN) is left out.
+    3. The states are the estimates, NIS, standard deviations, the members, what the subclass adds, how many
+       measurements there were last, and whether a sample has come. What is missing (NaN) is left out.
 
     Args:
         model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
@@ -77,6 +90,7 @@ class MemberFilter(HybridSystem):
         ValueError: an option is not legal, or the model does not suit; the message says which.
     """
 
+    by_name = True
     internal_step = 0.1  # nothing flows between samples
     purpose = Purpose.MEMBERS
     perturbs: ClassVar[bool] = False
@@ -122,16 +136,12 @@ class MemberFilter(HybridSystem):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def corrected(self, members: Array, more: Array, sample: Sample, u: Any, p: Any) -> Sequence[Array]:
+    def corrected(self, members: Array, x: Any, sample: Sample, u: Any, p: Any) -> CorrectedMembers:
         """What a sample makes of the members; where all of it is missing they stay as they are.
 
         Args:
-            members: predictions, shape (n, M). more: values of `own_memory`, flat. sample: what was measured, and what
-                each member measures. u: inputs. p: parameters.
-
-        Returns:
-            Estimate of shape (n,), NIS, variances of shape (n,), members of shape (n, M), and the values of
-            `own_memory`, one array each.
+            members: predictions, shape (n, M). x: states. sample: what was measured, and what each member measures.
+            u: inputs. p: parameters.
         """
 
     # -- what follows -----------------------------------------------------------------------------------------------
@@ -168,32 +178,32 @@ class MemberFilter(HybridSystem):
         noise = decoupled(as_matrix(p.measurement_covariance, q, q), there)
         return Sample(or_else(y, 0.0), seen * there.reshape(q, 1), noise, there @ np.ones(q))
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Members drawn at the first sample, or moved over the period, then corrected; shape of the state."""
-        n, count = self.model.order, self.members
-        first = 2 * n + 1
-        before = np.reshape(x[first : first + n * count], (count, n))
-        start = x[:n].reshape(n, 1) + drawn(
-            as_matrix(p.start_covariance, n, n), np.reshape(u.process_normal, (-1, count))[:n]
-        )
-        members = np.where(x[x.shape[0] - 1] > 0.5, self._moved(before, t, u, p), start)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Members drawn at the first sample, or moved over the period, then corrected."""
+        n, names = self.model.order, self._estimated
+        estimate = stacked(tuple(getattr(x, name) for name in names))
+        normal = np.reshape(u.process_normal, (-1, self.members))[:n]
+        start = estimate.reshape(n, 1) + drawn(as_matrix(p.start_covariance, n, n), normal)
+        members = np.where(x.primed > 0.5, self._moved(x.drawn_members, t, u, p), start)
         y = stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.model.measurements))
-        more, last = x[first + n * count : x.shape[0] - 2], x[x.shape[0] - 2]
         sample = self.sample(self.spread(members, p), y, self.known(t, u, p), p)
-        estimate, nis, variances, after, *others = self.corrected(members, more, sample, u, p)
-        nis, degrees = np.where(sample.count > 0.5, nis, x[n]), np.where(sample.count > 0.5, sample.count, last)
-        deviations = np.sqrt(np.maximum(variances, 0.0))
-        columns = [after[i, j] for j in range(count) for i in range(n)]
-        told = [*(estimate[i] for i in range(n)), nis, *(deviations[i] for i in range(n))]
-        added = [other[i] for other in others for i in range(other.shape[0])]
-        return vector(*told, *columns, *added, degrees, 1.0 + 0.0 * nis)
+        found = self.corrected(members, x, sample, u, p)
+        return {
+            **{name: found.estimate[i] for i, name in enumerate(names)},
+            "last_nis": np.where(sample.count > 0.5, found.nis, x.last_nis),
+            "deviations": np.sqrt(np.maximum(found.variances, 0.0)),
+            "drawn_members": found.members.T,
+            **found.more,
+            "last_count": np.where(sample.count > 0.5, sample.count, x.last_count),
+            "primed": 1.0,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations and NIS."""
-        n, names = self.model.order, [s.name for s in self.model.states]
-        values = {name: x[i] for i, name in enumerate(names)}
-        values |= {f"{name}_std": x[n + 1 + i] for i, name in enumerate(names)}
-        return values | {"nis": x[n], "nis_degrees": x[width(self.states) - 3]}
+        names = [s.name for s in self.model.states]
+        values = {name: getattr(x, own) for name, own in zip(names, self._estimated, strict=True)}
+        values |= {f"{name}_std": x.deviations[i] for i, name in enumerate(names)}
+        return values | {"nis": x.last_nis, "nis_degrees": x.last_count}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Covariances are symmetric and positive; other parameters within their bounds."""
@@ -238,6 +248,10 @@ class MemberFilter(HybridSystem):
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
         return Known(0.0, inputs, parameters)
 
+    @property
+    def _estimated(self) -> tuple[str, ...]:
+        return tuple(f"estimated_{s.name}" for s in self.model.states)
+
     def _declare(self) -> None:
         model, count, normal = self.model, self.members, "Standard normal numbers of this sample"
         n, q, r = model.order, len(model.measurements), model.noise_count
@@ -245,7 +259,7 @@ class MemberFilter(HybridSystem):
             *(memory(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in model.states),
             memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory("deviations", "1", (1.0,) * n, "Standard deviations of the estimates, SI units", size=n),
-            memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", size=n * count),
+            memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", shape=(count, n)),
             *self.own_memory,
             memory("last_count", "1", float(q), "How many measurements there were last"),
             PRIMED,

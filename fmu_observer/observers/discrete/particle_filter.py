@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from fmu_observer.filtering.particles import effective_size, innovation_square, moments, resampled, reweighted
 from fmu_observer.models.system_model import Source
-from fmu_observer.observers.discrete.member_filter import DEFAULT, MemberFilter, Sample
-from plant_models.hybrid import memory, output_signal, parameter, width
+from fmu_observer.observers.discrete.member_filter import DEFAULT, CorrectedMembers, MemberFilter, Sample
+from plant_models.hybrid import memory, output_signal, parameter
 from plant_models.hybrid.system import Array
 
 
@@ -53,23 +52,23 @@ class ParticleFilter(MemberFilter):
         )
         super().__init__(model, members, **options)
 
-    def corrected(self, members: Array, more: Array, sample: Sample, u: Any, p: Any) -> Sequence[Array]:
+    def corrected(self, members: Array, x: Any, sample: Sample, u: Any, p: Any) -> CorrectedMembers:
         """Estimate, NIS, variances, particles, weights and effective size, see `MemberFilter.corrected`."""
         n, count, some = self.model.order, self.members, sample.count > 0.5
-        before, (y, seen, RN) = more[:count], sample[:3]
+        before, (y, seen, RN) = x.weights, sample[:3]
         weights = np.where(some, reweighted(before, seen, y, RN), before)
         found, size = moments(members, weights), effective_size(weights)
         poor = np.where(some, size, float(count)) < p.resampling_threshold * count
         variances = np.stack([found.covariance[i, i] for i in range(n)])
-        return (
+        weights_after = np.where(poor, np.full(count, 1.0 / count), weights)
+        return CorrectedMembers(
             found.mean,
             innovation_square(seen, before, y, RN),
             variances,
             np.where(poor, resampled(members, weights), members),
-            np.where(poor, np.full(count, 1.0 / count), weights),
-            np.reshape(size, (1,)),
+            {"weights": weights_after, "effective": size},
         )
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations, NIS and the effective sample size."""
-        return super().output(t, x, u, p) | {"effective_members": x[width(self.states) - 4]}
+        return super().output(t, x, u, p) | {"effective_members": x.effective}
