@@ -41,5 +41,5 @@ def cart_double_pendulum() -> ObserverModel:
 
 
 def _remainder(x: Array, u: Array) -> Array:
-    rates = double_pendulum_flow(x, u[0], SECTION_IV_2_2_3)
-    return vector(0.0 * x[0], rates[1], 0.0 * x[0], rates[3], 0.0 * x[0], rates[5])
+    _, cart, _, first, _, second = double_pendulum_flow(x, u[0], SECTION_IV_2_2_3)
+    return vector(0.0, cart, 0.0, first, 0.0, second)

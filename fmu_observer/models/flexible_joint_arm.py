@@ -60,9 +60,10 @@ def flexible_joint_arm_as_printed() -> ObserverModel:
 
 
 def _remainder(at: int, x: Array, _u: Array) -> Array:
-    twist = x[0] - x[1]
-    spring, weight = -STIFFNESS_MOTOR * twist - DAMPING * x[2], WEIGHT * np.sin(x[at])
-    return vector(0.0 * x[0], 0.0 * x[0], spring, STIFFNESS_LINK * twist - weight)
+    motor_angle, link_angle, motor_speed, _ = x
+    twist = motor_angle - link_angle
+    spring, weight = -STIFFNESS_MOTOR * twist - DAMPING * motor_speed, WEIGHT * np.sin(x[at])
+    return vector(0.0, 0.0, spring, STIFFNESS_LINK * twist - weight)
 
 
 def _slope(at: int, cosine: float) -> np.ndarray:

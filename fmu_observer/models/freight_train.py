@@ -42,6 +42,7 @@ def freight_train() -> ObserverModel:
 
 def _remainder(x: Array, u: Array) -> Array:
     """Resistance, and what a brake near rest is less than the effort that B lets act in full."""
-    forward = np.clip(x[1] / REST, -1.0, 1.0)
-    resistance = DAVIS_A * forward + DAVIS_B * x[1] + DAVIS_C * x[1] * np.abs(x[1])
-    return vector(0.0 * x[0], -(resistance + (1.0 - forward) * np.minimum(u[0], 0.0)) / MASS)
+    _, speed = x
+    forward = np.clip(speed / REST, -1.0, 1.0)
+    resistance = DAVIS_A * forward + DAVIS_B * speed + DAVIS_C * speed * np.abs(speed)
+    return vector(0.0, -(resistance + (1.0 - forward) * np.minimum(u[0], 0.0)) / MASS)

@@ -20,7 +20,8 @@ def networked_train() -> ObserverModel:
     slopes = tuple(turned + slope for slope in train.slopes)
 
     def remainder(x: Array, u: Array) -> Array:
-        return vector(x[1], train.remainder(x, u)[1])
+        (_, speed), (_, acceleration) = x, train.remainder(x, u)
+        return vector(speed, acceleration)
 
     return ObserverModel(
         name="networked_train",

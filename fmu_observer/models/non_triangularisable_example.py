@@ -45,8 +45,10 @@ def non_triangularisable_example() -> TakagiSugenoModel:
 
 
 def _ratio(x: Array, _u: Array) -> Array:
-    return 1.0 / (1.0 + x[3] * x[3])
+    _, _, _, x4, _ = x
+    return 1.0 / (1.0 + x4 * x4)
 
 
 def _first(x: Array, _u: Array) -> Array:
-    return x[0]
+    first, *_ = x
+    return first

@@ -39,4 +39,5 @@ def pendulum() -> ObserverModel:
 
 
 def _remainder(x: Array, _u: Array) -> Array:
-    return vector(0.0 * x[0], -STIFFNESS * np.sin(x[0]) - DAMPING * x[1])
+    angle, rate = x
+    return vector(0.0, -STIFFNESS * np.sin(angle) - DAMPING * rate)

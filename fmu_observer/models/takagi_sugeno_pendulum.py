@@ -37,6 +37,6 @@ def takagi_sugeno_pendulum() -> TakagiSugenoModel:
 
 
 def _sine_ratio(x: Array, _u: Array) -> Array:
-    angle = x[0]
+    angle, _ = x
     safe = np.where(np.abs(angle) < SMALL, 1.0, angle)
     return np.where(np.abs(angle) < SMALL, 1.0 - angle * angle / 6.0, np.sin(safe) / safe)

@@ -47,4 +47,5 @@ def takagi_sugeno_train(
 
 
 def _speed(x: Array, _u: Array) -> Array:
-    return x[1]
+    _, speed = x
+    return speed

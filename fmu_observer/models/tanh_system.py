@@ -47,4 +47,5 @@ def tanh_system(reading: Reading = "minus") -> ObserverModel:
 
 
 def _remainder(reading: Reading, x: Array, _u: Array) -> Array:
-    return vector(0.0 * x[0], -STIFFNESS * x[0] + tanh_term(x, reading))
+    x1, _ = x
+    return vector(0.0, -STIFFNESS * x1 + tanh_term(x, reading))

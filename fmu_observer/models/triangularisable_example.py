@@ -71,9 +71,11 @@ def triangularisable_chain() -> ObserverModel:
 
 
 def _damping(x: Array, _u: Array) -> Array:
-    return np.sin(x[0]) + x[1] * x[1]
+    x1, x2, *_ = x
+    return np.sin(x1) + x2 * x2
 
 
 def _remainder(x: Array, _u: Array) -> Array:
-    damping = 3.3 * (np.sin(x[0]) + x[1] * x[1])
-    return vector(-1.25 * x[0] - 48.6 * x[1], 1.0 * x[0], 1.0 * x[1], -19.5 * x[1] - 19.5 * x[2] - damping * x[3])
+    x1, x2, x3, x4 = x
+    damping = 3.3 * _damping(x, _u)
+    return vector(-1.25 * x1 - 48.6 * x2, 1.0 * x1, 1.0 * x2, -19.5 * x2 - 19.5 * x3 - damping * x4)

@@ -41,7 +41,7 @@ def with_unknown(model: FilterModel, names: Sequence[str]) -> FilterModel:
 
     def split(x: Array, known: Known) -> Known:
         """Inputs and parameters in the model's order, the unknown ones from the state."""
-        values = {name: x[n + i] for i, name in enumerate(names)}
+        values = dict(zip(names, x[n:], strict=True))
         return Known(known.t, _filled(model.inputs, known.u, values), _filled(model.parameters, known.p, values))
 
     def moved(x: Array, w: Array, known: Known, period: Array) -> Array:
