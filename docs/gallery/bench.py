@@ -23,7 +23,6 @@ from plant_models.hybrid import (
     scalar_names,
     vector,
 )
-from plant_models.hybrid.missing import MISSED_SAMPLES
 
 Seen = Callable[[Mapping[str, Any], Any], Mapping[str, Any]]
 
@@ -99,39 +98,35 @@ class Together(HybridSystem):
     ) -> None:
         self.plant, self.observer, self.seen, self.order = plant, observer, seen, plant.state_count
         self.internal_step = step
-        values = parameter_values(observer, overrides, preset)
-        self._p = observer.unpack_parameters(values)
-        self._plant_u = plant.unpack_inputs(plant.start_inputs())
-        self._plant_p = plant.unpack_parameters(plant.start_parameters())
-        self.states = (*plant.states, *(s for s in observer.states if s.name != MISSED_SAMPLES))
+        self._p = parameter_values(observer, overrides, preset)
+        self._plant_values = plant.start_inputs(), plant.start_parameters()
+        self.states = (*plant.states, *observer.states)
         self.outputs = tuple(output_signal(f"error_{i + 1}", "1") for i in range(self.order))
         periods = [e.period for e in observer.events if isinstance(e, PeriodicEvent)]
-        self.parameters = tuple(parameter(name, "s", float(getattr(self._p, name))) for name in periods)
+        values = observer.unpack_parameters(self._p)
+        self.parameters = tuple(parameter(name, "s", float(getattr(values, name))) for name in periods)
         self.events = tuple(
             replace(e, samples=()) if isinstance(e, PeriodicEvent) else TriggeredEvent(e.name) for e in observer.events
         )
         super().__init__()
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        n, follows = self.order, self.observer.continuous_count
-        moved = self.plant.flow(t, x[:n], self._plant_u, self._plant_p)
-        followed = self.observer.flow(t, x[n:], self._inputs(t, x, u), self._p)
-        return vector(*(moved[i] for i in range(n)), *(followed[i] for i in range(follows)))
+        n = self.order
+        moved = self.plant.state_derivative(t, x[:n], *self._plant_values)
+        return np.hstack([moved, self.observer.state_derivative(t, x[n:], self._inputs(t, x, u), self._p)])
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
         n = self.order
-        after = self.observer.jump(event, t, x[n:], self._inputs(t, x, u), self._p)
-        return vector(*(x[i] for i in range(n)), *(after[i] for i in range(self.state_count - n)))
+        return np.hstack([x[:n], self.observer.jump_vector(event, t, x[n:], self._inputs(t, x, u), self._p)])
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        named = self.observer.output(t, x[self.order :], self._inputs(t, x, u), self._p)
-        estimates = list(named.values())[: self.order]
-        return {f"error_{i + 1}": estimate - x[i] for i, estimate in enumerate(estimates)}
+        told = self.observer.output_vector(t, x[self.order :], self._inputs(t, x, u), self._p)
+        return {f"error_{i + 1}": told[i] - x[i] for i in range(self.order)}
 
     def _inputs(self, t: Any, x: Any, u: Any) -> Any:
-        values = self.plant.output(t, x[: self.order], self._plant_u, self._plant_p)
-        named = self.seen(values, u.noise)
-        return self.observer.unpack_inputs(vector(*(named[s.name] for s in self.observer.input_signals)))
+        told = self.plant.output_vector(t, x[: self.order], *self._plant_values)
+        named = self.seen({s.name: told[i] for i, s in enumerate(self.plant.outputs)}, u.noise)
+        return vector(*(named[s.name] for s in self.observer.input_signals))
 
 
 def errors(

@@ -5,10 +5,11 @@ It knows signals and arrays; it does not move by itself and holds no gain.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -175,3 +176,21 @@ def stacked(values: tuple[Array, ...]) -> Array:
         values: numbers or arrays of shape (members,).
     """
     return vector(*values) if values else np.zeros(0)
+
+
+def stacked_of(values: Any, signals: Sequence[Signal], prefix: str = "") -> Array:
+    """Values by name as a vector, in the order of scalar signals, shape (k,).
+
+    Args:
+        values: named tuple, of states or inputs. signals: which ones. prefix: before each name.
+    """
+    return stacked(tuple(getattr(values, f"{prefix}{s.name}") for s in signals))
+
+
+def named_as(signals: Sequence[Signal], values: Iterable[Array], prefix: str = "") -> dict[str, Array]:
+    """The way back: values by the names of scalar signals.
+
+    Args:
+        signals: k of them. values: shape (k,), or a list. prefix: before each name.
+    """
+    return {f"{prefix}{s.name}": value for s, value in zip(signals, values, strict=True)}

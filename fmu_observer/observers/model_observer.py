@@ -6,14 +6,14 @@ It knows models and hybrid systems, and nothing of how an observer corrects itse
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from fmu_observer.condition import Condition
 from fmu_observer.models import MODELS, ObserverModel, find_model
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
     HybridSystem,
@@ -40,9 +40,9 @@ class ModelObserver(HybridSystem):
 
     1. A subclass sets `timing`: measurements are ``continuous`` inputs ``measured_<y>``; or such inputs read at a
        ``periodic`` event `sampling`; or the payload ``<event>_<y>`` of a triggered ``event``, the model's own.
-    2. The state begins with the estimates ``estimated_<x>``, n of them, which flow; behind them stand `extra_states`,
-       continuous too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind
-       `extra_states`. A subclass sets both before ``super().__init__``.
+    2. The estimates are the states ``estimated_<x>``, n of them, which flow: as a vector by `estimates`, and back by
+       `named_estimates`. Behind them stand `extra_states`, continuous too, then `extra_memory`. Where `discrete` is set
+       the estimates are memory and stand behind `extra_states`. A subclass sets both before ``super().__init__``.
     3. A measurement of an event may be missing (NaN): the event does not occur then, unless `leaves_out` is set and the
        jump leaves it out itself, by `innovation` for instance.
     4. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in
@@ -59,9 +59,11 @@ class ModelObserver(HybridSystem):
         ValueError: the model is unknown, or it does not suit the observer.
     """
 
+    by_name = True
     timing: ClassVar[Timing] = "continuous"
     discrete: ClassVar[bool] = False
     leaves_out: ClassVar[bool] = False
+    estimate_prefix: ClassVar[str] = "estimated_"
     extra_states: tuple[Signal, ...] = ()
     extra_memory: tuple[Signal, ...] = ()
     gain_parameters: tuple[Signal, ...] = ()
@@ -98,19 +100,25 @@ class ModelObserver(HybridSystem):
 
     # -- what it may use --------------------------------------------------------------------------------------------
 
-    def estimates(self, x: Array) -> Array:
+    def estimates(self, x: Any) -> Array:
         """The estimates within the state, shape (n,)."""
-        first = sum(s.width for s in self.extra_states) if self.discrete else 0
-        return x[first : first + self.model.order]
+        return stacked_of(x, self.model.states, self.estimate_prefix)
+
+    def named_estimates(self, values: Iterable[Array]) -> dict[str, Array]:
+        """The way back: estimates, or their derivatives, by name of the state.
+
+        Args:
+            values: shape (n,), or a list.
+        """
+        return named_as(self.model.states, values, self.estimate_prefix)
 
     def known(self, u: Any) -> Array:
         """The model's inputs, shape (m,)."""
-        return stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        return stacked_of(u, self.model.inputs)
 
     def measured(self, u: Any) -> Array:
         """The measurements, shape (q,); at a triggered event only in its jump."""
-        prefix = f"{self.model.event}_" if self.timing == "event" else "measured_"
-        return stacked(tuple(getattr(u, f"{prefix}{s.name}") for s in self.model.measurements))
+        return stacked_of(u, self.model.measurements, f"{self.model.event}_" if self.timing == "event" else "measured_")
 
     def gain_parameter(self, name: str, start: np.ndarray, description: str, unit: str = "1") -> Signal:
         """A gain as a parameter, flat, row by row; a single number where it has only one element and one dimension.
@@ -123,17 +131,16 @@ class ModelObserver(HybridSystem):
             return parameter(name, unit, float(values), description)
         return parameter(name, unit, tuple(map(float, values.ravel())), description, size=values.size)
 
-    def innovation(self, x: Array, u: Any) -> Array:
+    def innovation(self, x: Any, u: Any) -> Array:
         """``C xh - y``, shape (q,); zero where a measurement is missing."""
         expected = self.model.measured(self.estimates(x))
         return expected - or_else(self.measured(u), expected)
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates."""
-        estimates = self.estimates(x)
-        return {s.name: estimates[i] for i, s in enumerate(self.model.states)}
+        return named_as(self.model.states, self.estimates(x))
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Existence or stability condition, as numbers, for the gains of a preset with some replaced.
@@ -148,7 +155,8 @@ class ModelObserver(HybridSystem):
     def _estimates(self) -> tuple[Signal, ...]:
         kind = memory if self.discrete else state
         return tuple(
-            kind(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states
+            kind(f"{self.estimate_prefix}{s.name}", s.unit, s.start, f"Estimate: {s.description}")
+            for s in self.model.states
         )
 
     def _events(self) -> tuple[Any, ...]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.models import ObserverModel
+from fmu_observer.models.model import named_as
 from plant_models.hybrid import Signal, output_signal, parameter
 from plant_models.hybrid.system import Array
 
@@ -41,5 +42,4 @@ def residuals(model: ObserverModel, difference: Array, p: Any) -> dict[str, Arra
         model: whose measurements. difference: ``y - C xh``, shape (q,). p: parameters with `residual_gain`.
     """
     q = len(model.measurements)
-    r = np.reshape(p.residual_gain, (q, q)) @ difference
-    return {f"residual_{s.name}": r[i] for i, s in enumerate(model.measurements)}
+    return named_as(model.measurements, np.reshape(p.residual_gain, (q, q)) @ difference, "residual_")

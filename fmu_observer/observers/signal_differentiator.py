@@ -24,8 +24,8 @@ class SignalDifferentiator(HybridSystem):
     """Base of the differentiators of one scalar signal f with ``|f^(n+1)| <= L``.
 
     The contract: a subclass sets `discrete` where the estimates are memory, gives the filter states and further signals
-    to ``super().__init__``, and writes `flow` or `jump`, and `accuracy`. The state begins with the filter states, then
-    the estimates of f and its n derivatives.
+    to ``super().__init__``, and writes `flow` or `jump`, and `accuracy`. The filter states are `filters`, the estimates
+    of f and its n derivatives `estimates`.
 
     Between communication points the signal is held. Evaluations more frequent than the signal is renewed see a
     staircase: keep the interval between evaluations (internal step or sampling period) equal to the interval at which
@@ -41,6 +41,7 @@ class SignalDifferentiator(HybridSystem):
         ValueError: no gains are tabulated for n + nf, or an order is not a whole number.
     """
 
+    by_name = True
     discrete: ClassVar[bool] = False
 
     def __init__(
@@ -62,12 +63,12 @@ class SignalDifferentiator(HybridSystem):
         self.order, self.filtering_order = order, filtering_order
         kind = memory if self.discrete else state
         units = [rate_unit(unit, i) for i in range(-filtering_order, order + 1)]
-        filters = [kind(f"filter_{i + 1}", units[i], 0.0, f"Filter state {i + 1}") for i in range(filtering_order)]
+        self.filters = [kind(f"filter_{i + 1}", units[i], 0.0, f"Filter state {i + 1}") for i in range(filtering_order)]
         names = ["value", *(f"derivative_{i}" for i in range(1, order + 1))]
         words = ["the signal", *(f"its derivative {i}" for i in range(1, order + 1))]
         described = list(zip(names, units[filtering_order:], words, strict=True))
-        estimates = [kind(f"estimated_{name}", u, 0.0, f"Estimate of {text}") for name, u, text in described]
-        self.states = (*filters, *estimates, *extra_memory)
+        self.estimates = [kind(f"estimated_{name}", u, 0.0, f"Estimate of {text}") for name, u, text in described]
+        self.states = (*self.filters, *self.estimates, *extra_memory)
         self.inputs = (input_signal("signal", unit, 0.0, "Signal to differentiate"),)
         moves: Variability = "discrete" if self.discrete else "continuous"
         self.outputs = tuple(
@@ -84,9 +85,9 @@ class SignalDifferentiator(HybridSystem):
     def interval(self, p: Any) -> float:
         """Time between two evaluations [s]: the internal step, or the sampling period."""
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The signal and its derivatives, as estimated."""
-        return {s.name: x[self.filtering_order + i] for i, s in enumerate(self.outputs)}
+        return {s.name: getattr(x, f"estimated_{s.name}") for s in self.outputs}
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """What the differentiator asks of its signal, and how well it can do, for the parameters in use.

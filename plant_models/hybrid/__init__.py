@@ -8,6 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from plant_models.hybrid.arrays import matrix, vector
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.resource import Resource
@@ -21,7 +22,7 @@ from plant_models.hybrid.signal import (
     state,
     width,
 )
-from plant_models.hybrid.system import HybridSystem, vector
+from plant_models.hybrid.system import HybridSystem
 
 if TYPE_CHECKING:
     from plant_models.hybrid.kernel import NumpyKernel, TracedKernel, make_kernel
@@ -46,6 +47,7 @@ __all__ = [
     "TriggeredEvent",
     "input_signal",
     "make_kernel",
+    "matrix",
     "memory",
     "output_signal",
     "parameter",

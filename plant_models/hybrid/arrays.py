@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,3 +25,15 @@ def vector(*components: Array) -> Array:
     if all(getattr(c, "ndim", 0) == 0 for c in components):
         return np.stack([np.asarray(c) if isinstance(c, int | float) else c for c in components])
     return np.stack(np.broadcast_arrays(*components))
+
+
+def matrix(*rows: Sequence[Array]) -> Array:
+    """Stack rows of scalars (or batches of them) into a matrix.
+
+    Args:
+        rows: n of them, of m entries each; in a batch each row has one entry at least of shape ``(members,)``.
+
+    Returns:
+        Array of shape (n, m), or (n, m, members) for a batch.
+    """
+    return np.stack([vector(*row) for row in rows])

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from fmu_observer.models import ObserverModel
 from fmu_observer.observers.model_observer import ModelObserver
+from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import Runtime, scalar_names
 
 
@@ -25,12 +26,12 @@ def joint_errors(
     continuous.
     """
     model, n = observer.model, observer.model.order
-    p = observer.unpack_parameters(observer.start_parameters())._replace(**gains)
+    p = parameter_values(observer, gains)
 
     def flow(t: float, x: np.ndarray) -> np.ndarray:
         known = np.array([torque(t)])
-        u = observer.unpack_inputs(np.concatenate([known, model.measured(x[:n])]))
-        return np.concatenate([model.flow(x[:n], known), observer.flow(t, x[n:], u, p)])
+        u = np.concatenate([known, model.measured(x[:n])])
+        return np.concatenate([model.flow(x[:n], known), observer.state_derivative(t, x[n:], u, p)])
 
     first = np.concatenate([start, observer.start_state()])
     solution = solve_ivp(flow, (0.0, max(times)), first, method="DOP853", rtol=1e-12, atol=1e-14, t_eval=times)

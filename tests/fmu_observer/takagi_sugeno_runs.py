@@ -28,7 +28,8 @@ class Together(HybridSystem):
 
     def __init__(self, plant: HybridSystem, observer: HybridSystem, overrides: dict[str, Any] | None = None) -> None:
         self.plant, self.observer = plant, observer
-        self._parameters = observer.unpack_parameters(parameter_values(observer, overrides))
+        self._parameters = parameter_values(observer, overrides)
+        self._plant_values = plant.start_inputs(), plant.start_parameters()
         self.order = plant.state_count
         self.states = (*plant.states, *observer.states)
         self.outputs = tuple(output_signal(f"error_{i + 1}", "1") for i in range(self.order))
@@ -38,30 +39,21 @@ class Together(HybridSystem):
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         plant, behind = x[: self.order], x[self.order :]
-        moved = self.plant.flow(t, plant, self._nothing, self._plant_parameters)
-        followed = self.observer.flow(t, behind, self._seen(t, plant, u.noise), self._parameters)
-        return vector(
-            *(moved[i] for i in range(self.order)), *(followed[i] for i in range(self.observer.continuous_count))
-        )
+        moved = self.plant.state_derivative(t, plant, *self._plant_values)
+        followed = self.observer.state_derivative(t, behind, self._seen(t, plant, u.noise), self._parameters)
+        return np.hstack([moved, followed])
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
         plant, behind = x[: self.order], x[self.order :]
-        after = self.observer.jump(event, t, behind, self._seen(t, plant, u.noise), self._parameters)
-        return vector(*(plant[i] for i in range(self.order)), *(after[i] for i in range(self.observer.state_count)))
+        after = self.observer.jump_vector(event, t, behind, self._seen(t, plant, u.noise), self._parameters)
+        return np.hstack([plant, after])
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {f"error_{i + 1}": x[self.order + i] - x[i] for i in range(self.order)}
 
-    @property
-    def _nothing(self) -> Any:
-        return self.plant.unpack_inputs(self.plant.start_inputs())
-
-    @property
-    def _plant_parameters(self) -> Any:
-        return self.plant.unpack_parameters(self.plant.start_parameters())
-
     def _seen(self, t: Any, plant: Any, noise: Any) -> Any:
-        values = self.plant.output(t, plant, self._nothing, self._plant_parameters)
+        told = self.plant.output_vector(t, plant, *self._plant_values)
+        values = {s.name: told[i] for i, s in enumerate(self.plant.outputs)}
         model = self.observer.model  # type: ignore[attr-defined]
         named = {"drive": values["total_drive"]}
         if isinstance(model, TakagiSugenoModel):
@@ -69,7 +61,7 @@ class Together(HybridSystem):
             named |= {f"sample_{s.name}": values[s.name] for s in model.sampled}
         else:  # every output sampled, the noise on the second one
             named |= {"sample_x1": values["x1"], "sample_x2": values["x2"] + noise}
-        return self.observer.unpack_inputs(vector(*(named[s.name] for s in self.observer.input_signals)))
+        return vector(*(named[s.name] for s in self.observer.input_signals))
 
 
 def sampling(tau: float, stop: float, seed: int, loss: float = np.inf) -> np.ndarray:

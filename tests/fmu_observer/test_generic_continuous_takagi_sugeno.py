@@ -17,12 +17,12 @@ POLES = np.array([-2.0, -2.5])
 def joint(observer: TakagiSugenoLuenberger, start: np.ndarray, times: list[float]) -> np.ndarray:
     """Estimate minus state of the model at the times, the torque sin(t)."""
     model, n = observer.model, observer.model.order
-    p = observer.unpack_parameters(observer.start_parameters())
+    p = observer.start_parameters()
 
     def flow(t: float, x: np.ndarray) -> np.ndarray:
         known = np.sin(t) * np.ones(len(model.inputs))
-        u = observer.unpack_inputs(np.concatenate([known, model.C @ x[:n]]))
-        return np.concatenate([model.flow(x[:n], known), observer.flow(t, x[n:], u, p)])
+        u = np.concatenate([known, model.C @ x[:n]])
+        return np.concatenate([model.flow(x[:n], known), observer.state_derivative(t, x[n:], u, p)])
 
     solution = solve_ivp(
         flow, (0.0, times[-1]), np.append(start, observer.start_state()), rtol=1e-11, atol=1e-13, t_eval=times
@@ -118,10 +118,10 @@ def test_time_outside_the_bounds_is_counted() -> None:
     model = find_takagi_sugeno_model("pendulum")
     narrow = replace(model, premises=(replace(model.premises[0], low=0.9, high=1.0),))
     observer = TakagiSugenoLuenberger(narrow)
-    p, u = observer.unpack_parameters(observer.start_parameters()), np.zeros(2)
+    p, u = observer.start_parameters(), np.zeros(2)
     for angle, outside in ((0.1, 0.0), (1.5, 1.0)):  # sin(1.5) / 1.5 = 0.66
         u[1] = angle
-        assert observer.flow(0.0, observer.start_state(), observer.unpack_inputs(u), p)[-1] == outside
+        assert observer.state_derivative(0.0, observer.start_state(), u, p)[-1] == outside
 
 
 def test_the_margin_by_hand() -> None:

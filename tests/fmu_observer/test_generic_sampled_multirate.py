@@ -29,17 +29,16 @@ def joint_errors(ends: tuple[float, ...], position_gap: float, angle_gap: float,
     observer = MultirateSylvester()
     P = solve_continuous_are(MODEL.A, MODEL.B, np.eye(5), np.eye(1))
     feedback = MODEL.B.T @ P if balanced else np.zeros((1, 5))
-    p = observer.unpack_parameters(observer.start_parameters())
-    u = np.zeros(4)
+    p = observer.start_parameters()
+    u, missed = np.zeros(4), np.zeros(1)
 
-    def known(x: np.ndarray) -> object:
+    def known(x: np.ndarray) -> None:
         u[0], u[1] = -(feedback @ x)[0], x[2]
-        return observer.unpack_inputs(u)
 
     def flow(_t: float, both: np.ndarray) -> np.ndarray:
-        x = both[:5]
-        named = known(x)
-        return np.r_[MODEL.A @ x + MODEL.B @ u[:1], observer.flow(0.0, both[5:], named, p)]
+        known(both[:5])
+        followed = observer.state_derivative(0.0, np.r_[both[5:], missed], u, p)
+        return np.r_[MODEL.A @ both[:5] + MODEL.B @ u[:1], followed]
 
     instants = sorted(
         {round(k * gap, 9) for gap in (position_gap, angle_gap) for k in range(1, int(ends[-1] / gap) + 1)} | set(ends)
@@ -49,11 +48,12 @@ def joint_errors(ends: tuple[float, ...], position_gap: float, angle_gap: float,
         both = solve_ivp(flow, (t, end), both, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
         t = end
         if end in ends:
-            found.append(float(np.abs(observer.estimate(both[5:], known(both[:5]), p) - both[:5]).max()))
+            known(both[:5])
+            found.append(float(np.abs(observer.output_vector(t, np.r_[both[5:], missed], u, p) - both[:5]).max()))
         for event, gap, state in (("position_sample", position_gap, 3), ("angle_sample", angle_gap, 4)):
             if abs(end / gap - round(end / gap)) < 1e-6:
                 u[INPUTS[f"{event}_value"]] = both[state]
-                both[5:] = observer.jump(event, t, both[5:], observer.unpack_inputs(u), p)
+                both[5:] = observer.jump_vector(event, t, np.r_[both[5:], missed], u, p)[:-1]
     return found
 
 

@@ -48,11 +48,11 @@ def test_weights_and_innovation_change_at_samples_only() -> None:
 
 def test_the_flow_uses_the_frozen_weights() -> None:
     observer = TakagiSugenoAperiodic()
-    p, u = observer.unpack_parameters(observer.start_parameters()), observer.unpack_inputs(np.array([TORQUE, 0.0]))
-    x = np.array([2.0, 0.3, 0.1, 0.25, 0.75])  # weights that are not those of the angle 2
-    (A1, A2), (L1, L2), B = observer.model.A, observer.gains(p), observer.model.B[0]
+    p, u = observer.start_parameters(), np.array([TORQUE, 0.0])
+    x = np.array([2.0, 0.3, 0.1, 0.25, 0.75, 0.0])  # weights that are not those of the angle 2, no sample missed
+    (A1, A2), (L1, L2), B = observer.model.A, observer.gains(observer.unpack_parameters(p)), observer.model.B[0]
     expected = (0.25 * A1 + 0.75 * A2) @ x[:2] + B[:, 0] * TORQUE - (0.25 * L1 + 0.75 * L2)[:, 0] * 0.1
-    np.testing.assert_allclose(observer.flow(0.0, x, u, p), expected, rtol=1e-14)
+    np.testing.assert_allclose(observer.state_derivative(0.0, x, u, p), expected, rtol=1e-14)
 
 
 def test_the_correction_pulls_towards_the_measurement() -> None:

@@ -25,6 +25,7 @@ from fmu_observer.design.residual_analysis import (
 from fmu_observer.design.residual_channel import ResidualChannel, decoupled_channel, residual_channel
 from fmu_observer.models import coupled_vehicles
 from fmu_observer.observers.continuous import DecouplingUio, ProportionalIntegralUio
+from plant_models.hybrid import scalar_names
 
 LAG = ResidualChannel(np.array([[-2.0]]), np.array([[3.0]]), np.array([[1.0]]), np.array([[0.0]]))
 HIGH_PASS = ResidualChannel(np.array([[-2.0]]), np.array([[-2.0]]), np.array([[1.0]]), np.array([[1.0]]))  # s / (s + 2)
@@ -129,22 +130,22 @@ def test_a_pulse_agrees_with_a_simulation(length: float, horizon: float) -> None
 def residuals(observer: Any, s: np.ndarray, t: np.ndarray, E: np.ndarray, F: np.ndarray) -> np.ndarray:
     """Residuals of an observer beside its plant, both from rest, under a signal that is linear between the times."""
     model, n = observer.model, observer.model.order
-    p = observer.unpack_parameters(observer.start_parameters())
+    p = observer.start_parameters()
     start = np.concatenate([np.zeros(n), np.zeros(observer.state_count)])
     at = lambda now: np.interp(now, t, s)  # noqa: E731
 
-    def inputs(now: float, x: np.ndarray) -> Any:
+    def inputs(now: float, x: np.ndarray) -> np.ndarray:
         y = model.measured(x[:n]) + F[:, 0] * at(now)
-        return observer.unpack_inputs(np.concatenate([np.zeros(len(model.inputs)), y]))
+        return np.concatenate([np.zeros(len(model.inputs)), y])
 
     def flow(now: float, x: np.ndarray) -> np.ndarray:
         moved = model.flow(x[:n], np.zeros(len(model.inputs))) + E[:, 0] * at(now)
-        return np.concatenate([moved, observer.flow(now, x[n:], inputs(now, x), p)])
+        return np.concatenate([moved, observer.state_derivative(now, x[n:], inputs(now, x), p)])
 
     x = solve_ivp(flow, (0.0, t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-12, max_step=t[1]).y.T
-    names = [f"residual_{m.name}" for m in model.measurements]
-    found = [observer.output(now, row[n:], inputs(now, row), p) for now, row in zip(t, x, strict=True)]
-    return np.array([[float(one[name]) for name in names] for one in found])
+    told = np.array([observer.output_vector(now, row[n:], inputs(now, row), p) for now, row in zip(t, x, strict=True)])
+    names = scalar_names(observer.outputs)
+    return told[:, [names.index(f"residual_{m.name}") for m in model.measurements]]
 
 
 def test_the_channel_of_the_proportional_integral_observer() -> None:

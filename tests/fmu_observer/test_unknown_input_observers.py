@@ -44,14 +44,14 @@ def plain(A: Any, H: Any, C: Any) -> ObserverModel:
 def together(observer: Any, times: list[float], disturbance: Any, preset: str | None = None) -> tuple[Any, Any, Any]:
     """Plant states, observer states and observer outputs at the times; the disturbance is a function of time."""
     model, n = observer.model, observer.model.order
-    p = observer.unpack_parameters(observer.start_parameters(preset))
+    p = observer.start_parameters(preset)
 
-    def inputs(t: float, x: np.ndarray) -> Any:
-        return observer.unpack_inputs(np.concatenate([known(model, t), model.measured(x[:n])]))
+    def inputs(t: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([known(model, t), model.measured(x[:n])])
 
     def flow(t: float, x: np.ndarray) -> np.ndarray:
         moved = model.flow(x[:n], known(model, t)) + model.H @ disturbance(t)
-        return np.concatenate([moved, observer.flow(t, x[n:], inputs(t, x), p)])
+        return np.concatenate([moved, observer.state_derivative(t, x[n:], inputs(t, x), p)])
 
     start = np.array([float(s.start_values[0]) for s in model.states]) + 0.3 * (1.0 + np.arange(n))
     rows, x, begin = [], np.concatenate([start, observer.start_state(preset)]), 0.0
@@ -60,7 +60,8 @@ def together(observer: Any, times: list[float], disturbance: Any, preset: str | 
             part = solve_ivp(flow, (left, min(left + PIECE, end)), x, method="DOP853", rtol=1e-12, atol=1e-13)
             x = part.y[:, -1]
         begin = end
-        rows.append((x[:n], x[n:], observer.output(end, x[n:], inputs(end - 1e-9, x), p)))
+        told = observer.output_vector(end, x[n:], inputs(end - 1e-9, x), p)
+        rows.append((x[:n], x[n:], dict(zip(scalar_names(observer.outputs), told, strict=True))))
     return tuple(zip(*rows, strict=True))  # type: ignore[return-value]
 
 
@@ -102,10 +103,10 @@ def test_the_printed_form_is_the_same_observer() -> None:
     """``dz = N z + G u + L y`` of (2.12), with random numbers."""
     observer, generator = DecouplingUio(), np.random.default_rng(3)
     x, u, y = generator.normal(size=3), generator.normal(size=1), generator.normal(size=2)
-    p = observer.unpack_parameters(observer.start_parameters())
-    matrices = observer.matrices(p)
+    p = observer.start_parameters()
+    matrices = observer.matrices(observer.unpack_parameters(p))
     printed = matrices["N"] @ x + matrices["G"] @ u + matrices["L"] @ y
-    found = observer.flow(0.0, x, observer.unpack_inputs(np.concatenate([u, y])), p)
+    found = observer.state_derivative(0.0, x, np.concatenate([u, y]), p)
     np.testing.assert_allclose(found, printed, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(matrices["G"] - (np.eye(3) + matrices["M"] @ observer.model.C) @ observer.model.B, 0.0)
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(matrices["N"]).real), [-3.0, -2.5, -2.0], rtol=1e-9)
@@ -360,7 +361,7 @@ def test_residuals_are_weighted() -> None:
     observer = ProportionalIntegralUio("coupled_vehicles", rho=1)
     p = observer.unpack_parameters(observer.start_parameters())
     u = observer.unpack_inputs(np.array([0.0, 10.5, 9.0]))
-    x = observer.start_state()
+    x = observer.unpack_states(observer.start_state())
     found = observer.output(0.0, x, u, p._replace(residual_gain=np.array([2.0, 1.0, 0.0, -1.0])))
     assert (found["residual_speed"], found["residual_wagon_speed"]) == (2.0 * 0.5 - 1.0, 1.0)
 

@@ -31,23 +31,23 @@ class Beside(HybridSystem):
         self.model, self.observer = observer.model, observer
         self.states = (*self.model.states, *observer.states)
         self.outputs = (output_signal("error", "m"), output_signal("residual", "m/s"))
-        self._p = observer.unpack_parameters(observer.start_parameters())
+        self._p = observer.start_parameters()
         super().__init__()
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         n = self.model.order
         moved = self.model.flow(x[:n], vector(0.0 * x[0])) + self.model.H @ vector(u.unknown)
-        followed = self.observer.flow(t, x[n:], self._seen(x), self._p)
-        return vector(*(moved[i] for i in range(n)), *(followed[i] for i in range(self.observer.state_count)))
+        return np.hstack([moved, self.observer.state_derivative(t, x[n:], self._seen(x), self._p)])
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        found = self.observer.output(t, x[self.model.order :], self._seen(x), self._p)
+        told = self.observer.output_vector(t, x[self.model.order :], self._seen(x), self._p)
+        found = {s.name: told[i] for i, s in enumerate(self.observer.outputs)}
         residual = found.get("residual_wagon_speed", 0.0)
         return {"error": found["elongation"] - x[0], "residual": residual}
 
     def _seen(self, x: Any) -> Any:
         y = self.model.C @ x[: self.model.order]
-        return self.observer.unpack_inputs(vector(0.0 * x[0], y[0], y[1]))
+        return vector(0.0 * x[0], y[0], y[1])
 
 
 def run(observer: Any) -> tuple[np.ndarray, np.ndarray]:

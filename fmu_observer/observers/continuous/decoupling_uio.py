@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.decoupling import SOURCE, decoupled_gain, decoupling, decoupling_condition, require_decoupling
 from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.models.linearisation import start_of
+from fmu_observer.models.model import named_as
 from fmu_observer.models.suitability import linear_part, with_unknown_inputs
 from fmu_observer.observers.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
@@ -52,6 +52,7 @@ class DecouplingUio(ModelObserver):
     description = "Unknown-input observer that decouples the unknown inputs, continuous measurements"
     source = "Aguiar Cota 2019, (2.12)"
     internal_step = 5e-3
+    estimate_prefix = "filter_"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MODELS), **NUMBERS}
 
     def __init__(self, model: str | ObserverModel = "coupled_vehicles", **numbers: float) -> None:
@@ -65,17 +66,18 @@ class DecouplingUio(ModelObserver):
         self.extra_outputs = residual_outputs(chosen)
         super().__init__(chosen, **numbers)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Filter state z, shape (n,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Filter state z."""
         K = as_matrix(p.gain, self.model.order, len(self.model.measurements))
-        error = self.measured(u) - self.model.measured(self._estimate(x, u))
-        return self._decoupling.P @ self.model.flow(self._estimate(x, u), self.known(u)) + K @ error
+        estimate = self._estimate(x, u)
+        error = self.measured(u) - self.model.measured(estimate)
+        return self.named_estimates(self._decoupling.P @ self.model.flow(estimate, self.known(u)) + K @ error)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates and the residuals."""
         estimate = self._estimate(x, u)
-        found = {s.name: estimate[i] for i, s in enumerate(self.model.states)}
-        return found | residuals(self.model, self.measured(u) - self.model.measured(estimate), p)
+        error = self.measured(u) - self.model.measured(estimate)
+        return named_as(self.model.states, estimate) | residuals(self.model, error, p)
 
     def condition_of(self, p: Any) -> Condition:
         """Existence by ranks and invariant zeros, and the abscissa of N for the gain in use."""
@@ -97,10 +99,12 @@ class DecouplingUio(ModelObserver):
         M = self._decoupling.M
         return {"N": N, "G": self._decoupling.P @ self.model.B, "L": K - N @ M, "M": M}
 
-    def _estimate(self, x: Array, u: Any) -> Array:
+    def _estimate(self, x: Any, u: Any) -> Array:
         return self.estimates(x) - self._decoupling.M @ self.measured(u)
 
     def _estimates(self) -> tuple[Signal, ...]:
         starts = self._decoupling.P @ start_of(self.model)
-        plain = (state(f"filter_{s.name}", s.unit, 0.0, f"Filter z of: {s.description}") for s in self.model.states)
-        return tuple(replace(s, start=float(value)) for s, value in zip(plain, starts, strict=True))
+        return tuple(
+            state(f"filter_{s.name}", s.unit, float(start), f"Filter z of: {s.description}")
+            for s, start in zip(self.model.states, starts, strict=True)
+        )

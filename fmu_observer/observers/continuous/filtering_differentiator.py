@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
 from fmu_observer.observers.signal_differentiator import LARGEST, SignalDifferentiator
-from plant_models.hybrid import vector
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 
@@ -43,12 +43,11 @@ class FilteringDifferentiator(SignalDifferentiator):
             )
         super().__init__(order, filtering_order, unit)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of filter states and estimates, shape (nf + n + 1,)."""
-        nf = self.filtering_order
-        w, z = [x[i] for i in range(nf)], [x[nf + i] for i in range(self.order + 1)]
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of filter states and estimates."""
+        w, z = stacked_of(x, self.filters), stacked_of(x, self.estimates)
         dw, dz = filtering_differentiator_flow(w, z, u.signal, p.bound)
-        return vector(*dw, *dz)
+        return named_as((*self.filters, *self.estimates), (*dw, *dz))
 
     def interval(self, p: Any) -> float:
         """The internal step [s]."""

@@ -18,7 +18,7 @@ from fmu_observer.design.high_gain_theta import (
 from fmu_observer.models import ObserverModel, find_model
 from fmu_observer.models.suitability import require_triangular_chain
 from fmu_observer.observers.model_observer import ModelObserver
-from plant_models.hybrid import parameter, vector
+from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 
 
@@ -46,10 +46,11 @@ class HighGain(ModelObserver):
         )
         super().__init__(chosen)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model and correction, shape (n,)."""
-        predicted, error = self.model.flow(x, self.known(u)), self.innovation(x, u)[0]
-        return vector(*(predicted[i] - p.theta ** (i + 1) * p.high_gain[i] * error for i in range(self.model.order)))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model and correction."""
+        predicted, error = self.model.flow(self.estimates(x), self.known(u)), self.innovation(x, u)[0]
+        corrections = (p.theta ** (i + 1) * p.high_gain[i] * error for i in range(self.model.order))
+        return self.named_estimates(rate - less for rate, less in zip(predicted, corrections, strict=True))
 
     def condition_of(self, p: Any) -> Condition:
         """K makes the chain Hurwitz, and theta lies above the smallest one proven."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.continuous.differentiator import differentiator_flow
 from fmu_observer.observers.signal_differentiator import LARGEST, SignalDifferentiator
-from plant_models.hybrid import vector
 from plant_models.hybrid.system import Array
 
 
@@ -35,9 +35,9 @@ class LevantDifferentiator(SignalDifferentiator):
     def __init__(self, order: int = 2, unit: str = "1") -> None:
         super().__init__(order, 0, unit)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the estimates, shape (n + 1,)."""
-        return vector(*differentiator_flow([x[i] for i in range(self.order + 1)], u.signal, p.bound))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the estimates."""
+        return named_as(self.estimates, differentiator_flow(stacked_of(x, self.estimates), u.signal, p.bound))
 
     def interval(self, p: Any) -> float:
         """The internal step [s]."""

@@ -44,9 +44,10 @@ class Luenberger(ModelObserver):
         poles = -SPEED * (1.0 + 0.25 * np.arange(model.order))
         return observer_gain(linear_part(model), model.C, poles, tuple(s.name for s in model.states), model.name)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model and correction, shape (n,)."""
-        return self.model.flow(x, self.known(u)) - self.gain_matrix(p) @ self.innovation(x, u)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model and correction."""
+        predicted = self.model.flow(self.estimates(x), self.known(u))
+        return self.named_estimates(predicted - self.gain_matrix(p) @ self.innovation(x, u))
 
     def gain_matrix(self, p: Any) -> Array:
         """Gain L in use, shape (n, q)."""

@@ -13,11 +13,12 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.extended_disturbance import check_rho, extended_gain, extended_matrices
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.models import MODELS, ObserverModel, find_model
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.models.suitability import linear_part, with_unknown_inputs
 from fmu_observer.observers.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
-from plant_models.hybrid import output_signal, state, vector
+from plant_models.hybrid import output_signal, state
 from plant_models.hybrid.system import Array
 
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, -1.5 SPEED, ... [ours]
@@ -108,21 +109,19 @@ class ProportionalIntegralUio(ModelObserver):
         poles = -SPEED * (1.0 + 0.25 * np.arange(len(states)))
         return extended_gain(linear_part(model).A, np.asarray(model.H), model.C, rho, poles, states, model.name)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Estimates and disturbances, shape (n + rho nd,)."""
-        moved = self.A_e @ x + self._gain(p) @ (self.measured(u) - self.C_e @ x)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates and disturbances."""
+        extended, n = stacked_of(x, self.states), self.model.order
+        moved = self.A_e @ extended + self._gain(p) @ (self.measured(u) - self.C_e @ extended)
         driven = self.model.B @ self.known(u) if self.model.inputs else np.zeros(self.model.order)
-        n = self.model.order
         if self.model.phi is not None:
             driven = driven + self.model.remainder(self.estimates(x), self.known(u))
-        return vector(*(moved[i] + driven[i] if i < n else moved[i] for i in range(len(self.A_e))))
+        return named_as(self.states, [*(a + b for a, b in zip(moved[:n], driven, strict=True)), *moved[n:]])
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, the disturbances and the residuals."""
-        n = self.model.order
-        found = {s.name: x[i] for i, s in enumerate(self.model.states)}
-        found |= {name: x[n + i] for i, name in enumerate(self._disturbances)}
-        return found | residuals(self.model, self.measured(u) - self.C_e @ x, p)
+        found = super().output(t, x, u, p) | {name: getattr(x, f"estimated_{name}") for name in self._disturbances}
+        return found | residuals(self.model, self.measured(u) - self.C_e @ stacked_of(x, self.states), p)
 
     def condition_of(self, p: Any) -> Condition:
         """Observability of the extended pair by rank and smallest singular value, and the abscissa of A_e - L C_e."""

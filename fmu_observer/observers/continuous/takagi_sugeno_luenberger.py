@@ -11,9 +11,9 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.takagi_sugeno_luenberger import placed_gains, vertex_decrease
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, TakagiSugenoModel, find_takagi_sugeno_model
 from fmu_observer.models.checks import checked_matrix
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 Premise = Literal["measured", "estimated"]
@@ -47,6 +47,7 @@ class TakagiSugenoLuenberger(HybridSystem):
     name = "takagi_sugeno_luenberger"
     description = "Takagi-Sugeno Luenberger observer, continuous measurements"
     source = "Bouchama 2024, (1.19)-(1.28), inequality (1.26) repaired"
+    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
@@ -77,11 +78,11 @@ class TakagiSugenoLuenberger(HybridSystem):
         self.parameters = (parameter("gain", "1", tuple(map(float, K.ravel())), text, size=K.size),)
         super().__init__(model=chosen.name, premise=premise)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Estimates and time outside the bounds, shape (n + 1,)."""
-        model, n = self.model, self.model.order
-        estimate, known = x[:n], stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
-        y = stacked(tuple(getattr(u, f"measured_{s.name}") for s in model.measurements))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates and time outside the bounds."""
+        model = self.model
+        estimate, known = stacked_of(x, model.states, "estimated_"), stacked_of(u, model.inputs)
+        y = stacked_of(u, model.measurements, "measured_")
         count = len(model.sampled)
         seen = model.informed(estimate, y[:count], y[count:]) if self.premise == "measured" else estimate
         values = model.premise_values(seen, known)
@@ -89,11 +90,12 @@ class TakagiSugenoLuenberger(HybridSystem):
         moved = model.blend(h, estimate, known)
         for i, weight in enumerate(h):
             moved = moved - weight * (self._gain_of(p, i) @ error)
-        return vector(*(moved[i] for i in range(n)), model.outside(values))
+        return named_as(model.states, moved, "estimated_") | {"time_outside": model.outside(values)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, and how long premises were outside their bounds."""
-        return {s.name: x[i] for i, s in enumerate(self.model.states)} | {"premise_outside_time": x[self.model.order]}
+        estimate = stacked_of(x, self.model.states, "estimated_")
+        return named_as(self.model.states, estimate) | {"premise_outside_time": x.time_outside}
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Whether one quadratic Lyapunov function covers all vertices for the gains in use.

@@ -13,10 +13,11 @@ from fmu_observer.design.discrete_bounds import centre_of, discrete_bound
 from fmu_observer.design.pole_placement import observability_matrix, observer_gain
 from fmu_observer.models import ObserverModel, find_model
 from fmu_observer.models.discretisation import transition
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observability import MeasuredSystem, UnobservableError, require_observable
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
-from plant_models.hybrid import Signal, memory, vector
+from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.system import Array
 
@@ -52,19 +53,18 @@ class ExtendedLuenberger(ModelObserver):
         self.extra_memory = primed_memory(*_innovations(chosen))
         super().__init__(chosen)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """One period with the last correction; then the innovation is read, shape (n + q + 1,)."""
-        n, q = self.model.order, len(self.model.measurements)
-        L = as_matrix(p.gain, n, q)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """One period with the last correction; then the innovation is read."""
+        outputs = self.model.measurements
+        L = as_matrix(p.gain, self.model.order, len(outputs))
 
-        def advance(values: Array) -> Array:
-            moved = transition(self.model, values[:n], self.known(u), p.sample_period) + L @ values[n:]
-            return vector(*(moved[i] for i in range(n)), *(values[n + i] for i in range(q)))
+        def advance(x: Any) -> dict[str, Array]:
+            moved = transition(self.model, self.estimates(x), self.known(u), p.sample_period)
+            return self.named_estimates(moved + L @ stacked_of(x, outputs, "innovation_"))
 
-        def correct(values: Array) -> Array:
-            expected = self.model.measured(values[:n])
-            error = or_else(self.measured(u), expected) - expected
-            return vector(*(values[i] for i in range(n)), *(error[i] for i in range(q)))
+        def correct(x: Any) -> dict[str, Array]:
+            expected = self.model.measured(self.estimates(x))
+            return named_as(outputs, or_else(self.measured(u), expected) - expected, "innovation_")
 
         return at_sample(x, advance, correct)
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.discrete.implicit_recursion import implicit_step
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.signal_differentiator import LARGEST, SignalDifferentiator
-from plant_models.hybrid import PeriodicEvent, memory, parameter, vector
+from plant_models.hybrid import PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
@@ -55,17 +56,16 @@ class ImplicitDifferentiator(SignalDifferentiator):
             extra_memory=primed_memory(memory("held_signal", unit, 0.0, "Signal at the last sample")),
         )
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The step from the last sample to this one; then the signal is read, shape (nf + n + 3,)."""
-        nf, count = self.filtering_order, self.filtering_order + self.order + 1
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The step from the last sample to this one; then the signal is read."""
 
-        def advance(values: Array) -> Array:
-            w, z = [values[i] for i in range(nf)], [values[i] for i in range(nf, count)]
-            w_next, z_next = implicit_step(w, z, values[count], p.bound, p.sample_period)
-            return vector(*w_next, *z_next, values[count])
+        def advance(x: Any) -> dict[str, Array]:
+            w, z = stacked_of(x, self.filters), stacked_of(x, self.estimates)
+            w_next, z_next = implicit_step(w, z, x.held_signal, p.bound, p.sample_period)
+            return named_as((*self.filters, *self.estimates), (*w_next, *z_next))
 
-        def read(values: Array) -> Array:  # where the signal is missing it is taken to be what is estimated
-            return vector(*(values[i] for i in range(count)), or_else(u.signal, values[nf]))
+        def read(x: Any) -> dict[str, Array]:  # where the signal is missing it is taken to be what is estimated
+            return {"held_signal": or_else(u.signal, x.estimated_value)}
 
         return at_sample(x, advance, read)
 

@@ -7,13 +7,14 @@ What such an observer publishes after a sample belongs to that sample, and not t
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Signal, memory, vector
+from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 
-Update = Callable[[Array], Array]  # (memory without the last, shape (k,)) -> the same, shape (k,)
+Update = Callable[[Any], dict[str, Array]]  # named tuple of the memory -> what of it changes, by name
 
 PRIMED = memory("primed", "1", 0.0, "1 after the first sample")
 
@@ -27,17 +28,13 @@ def primed_memory(*signals: Signal) -> tuple[Signal, ...]:
     return (*signals, PRIMED)
 
 
-def at_sample(x: Array, advance: Update, correct: Update) -> Array:
-    """State after a sample: advanced over the period since the last one (not at the first), then corrected.
+def at_sample(x: Any, advance: Update, correct: Update) -> dict[str, Array]:
+    """What a sample changes: the memory is advanced over the period since the last one (not at the first), then
+    corrected.
 
     Args:
-        x: whole state, shape (k + 1,), the last one `PRIMED`.
+        x: named tuple of the memory, `PRIMED` among it.
         advance: over one period. correct: by the measurement at hand.
-
-    Returns:
-        Shape (k + 1,).
     """
-    count = x.shape[0] - 1
-    before = x[:count]
-    corrected = correct(np.where(x[count] > 0.5, advance(before), before))
-    return vector(*(corrected[i] for i in range(count)), 1.0 + 0.0 * x[count])
+    moved = {name: np.where(x.primed > 0.5, value, getattr(x, name)) for name, value in advance(x).items()}
+    return moved | correct(x._replace(**moved)) | {PRIMED.name: 1.0}

@@ -59,22 +59,17 @@ class DecayingInnovation(HeldInnovation):
         super().declare_sampled_part(model)
         self.extra_states = (ELAPSED,)
 
-    def sampled_part(self, x: Array) -> Array:
-        """The innovation as it was at the sample, shape (q,)."""
-        n = self.model.order + 1
-        return x[n : n + self.outputs_count]
-
-    def acting(self, x: Array, p: Any) -> Array:
+    def acting(self, x: Any, p: Any) -> Array:
         """What is left of the innovation, shape (q,)."""
-        return innovation_left(x[self.model.order], p.decay_rate, p.decay_exponent) * self.sampled_part(x)
+        return innovation_left(x.elapsed, p.decay_rate, p.decay_exponent) * self.sampled_part(x)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model and correction, and time goes on, shape (n + 1,)."""
-        return np.hstack([super().flow(t, x, u, p), 1.0 + 0.0 * x[:1]])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model and correction, and time goes on."""
+        return super().flow(t, x, u, p) | {"elapsed": 1.0}
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The innovation is set anew; the estimates stay continuous, shape (n + 1 + q,)."""
-        return np.hstack([self.estimates(x), 0.0 * x[:1], self.innovation(x, u)])
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The innovation is set anew; the estimates stay continuous."""
+        return super().update(event, t, x, u, p) | {"elapsed": 0.0}
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> DecayingError | ImpulsiveError:
         """``de = drift e - theta inv(Delta) K phi C e(t_k)``."""

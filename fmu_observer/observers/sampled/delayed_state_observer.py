@@ -14,14 +14,10 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.network_bounds import NetworkBounds, network_bounds
 from fmu_observer.limits import Limit
 from fmu_observer.models import MODELS, ObserverModel, find_model
+from fmu_observer.models.model import named_as
 from fmu_observer.observers.delay_memory import at_age, integral_weights
 from fmu_observer.observers.delayed_limits import delay_limit, packet_limit
-from fmu_observer.observers.delayed_state_memory import (
-    DelayedStateMemory,
-    MemorySizes,
-    declared_memory,
-    prediction_starts,
-)
+from fmu_observer.observers.delayed_state_memory import declared_memory
 from fmu_observer.observers.finite_time_predictor import Prediction, moved_on
 from fmu_observer.observers.measurement_nodes import nodes_of_measurements, turns_of_nodes
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -32,6 +28,7 @@ from plant_models.hybrid import (
     Signal,
     TriggeredEvent,
     input_signal,
+    matrix,
     output_signal,
     parameter,
     state,
@@ -87,6 +84,7 @@ class DelayedStateObserver(HighGainSampled):
     name = "delayed_state_observer"
     description = "Observer of late measurements node by node, with finite-time predictors of the state now"
     source = "Hann 2014, (2.16), (2.57), Theorem 2.1"
+    sampled_state = "predicted_output"
     theta_start = THETA_REPAIRED
     internal_step = 2.5e-3  # four to a reading
     late_policy = "late"
@@ -115,10 +113,7 @@ class DelayedStateObserver(HighGainSampled):
         self.predictors, self.memory_places = predictors, memory_places
         self.predicts_output = between_samples == "predicted"
         self.node_of = nodes_of_measurements("delayed_state_observer", chosen, nodes)
-        self._sizes = MemorySizes(
-            chosen.order, len(chosen.inputs), predictors, memory_places, max(predictors, 1) * memory_places + 2
-        )
-        self.extra_memory = declared_memory(chosen, self._sizes)
+        self.extra_memory = declared_memory(chosen, predictors, memory_places, self.total_places + 2)
         self.extra_outputs = self._outputs(chosen)
         super().__init__(
             chosen,
@@ -147,11 +142,6 @@ class DelayedStateObserver(HighGainSampled):
     def total_places(self) -> int:
         """Longest delay in memory periods."""
         return max(self.predictors, 1) * self.memory_places
-
-    @property
-    def input_places(self) -> int:
-        """Mean inputs that are remembered."""
-        return self._sizes.input_places
 
     def theta_parameters(self) -> tuple[Signal, ...]:
         """Theta, the delay, and how the past is remembered."""
@@ -184,94 +174,81 @@ class DelayedStateObserver(HighGainSampled):
 
     # -- equations --------------------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Delayed state, its output, and the integral of the inputs."""
-        model, z = self.model, self.estimates(x)
-        now = self.known(u)
-        past = self._past(x)
-        acting = [np.where(p.delay < p.memory_period, now[i], past.acting[i]) for i in range(len(model.inputs))]
-        moved = model.flow(z, vector(*acting) if acting else now)
+        model, z, now = self.model, self.estimates(x), self.known(u)
+        acting = np.where(p.delay < p.memory_period, now, x.delayed_input) if model.inputs else now
+        moved = model.flow(z, acting)
         error = model.measured(z) - self.sampled_part(x)
         follows = model.measured(moved)
         if not self.predicts_output:
             follows = 0.0 * follows
-        return np.hstack([moved - self.correction(x, error, p), follows, *((now,) if acting else ())])
+        flows = self.named_estimates(moved - self.correction(x, error, p)) | self.named_part(follows)
+        return flows | ({"input_integral": now} if model.inputs else {})
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A packet sets the outputs of its node; a reading moves memory on."""
         if event == "reading":
             return self._read(t, x, u, p)
         told, outputs = self.measured(u), self.sampled_part(x)
         node = getattr(u, f"{event}_node")
-        after = [np.where(node * (node - float(of)) == 0.0, told[i], outputs[i]) for i, of in enumerate(self.node_of)]
-        return self.with_outputs(x, after)
+        after = (np.where(node * (node - float(of)) == 0.0, told[i], outputs[i]) for i, of in enumerate(self.node_of))
+        return self.named_part(vector(*after))
 
-    def with_outputs(self, x: Array, outputs: Sequence[Array]) -> Array:
-        """The own states with other outputs a delay ago.
-
-        Args:
-            outputs: one a measurement.
-        """
-        n, q = self.model.order, self.outputs_count
-        return vector(*(x[i] for i in range(n)), *outputs, *(x[i] for i in range(n + q, self.own_count)))
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The state now, the delayed one, and the time until the predictors are reached."""
-        names, z = [s.name for s in self.model.states], self.estimates(x)
-        delayed = {f"delayed_{name}": z[i] for i, name in enumerate(names)}
+        states, z = self.model.states, self.estimates(x)
+        delayed = named_as(states, z, "delayed_")
         if not self.predictors:
-            return {name: z[i] for i, name in enumerate(names)} | delayed
-        past = self._past(x)
-        since = t - past.read_at
+            return named_as(states, z) | delayed
         largest = 0.0
-        for root in (root for roots in past.roots for root in roots):
+        for root in (root for roots in x.distance_root for root in roots):
             largest = np.maximum(largest, np.abs(root))
-        now = {name: z[i] + past.offset[i] + since * past.drift[i] for i, name in enumerate(names)}
-        return now | delayed | {"reaching_time": 2.0 * largest}
+        now = z + x.prediction_offset + (t - x.reading_time) * x.prediction_offset_rate
+        return named_as(states, now) | delayed | {"reaching_time": 2.0 * largest}
 
-    def _read(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def _read(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A period of the memory ends: the inputs are read, and all predictors move on by it."""
-        model, h = self.model, p.memory_period
-        n, q, m = model.order, self.outputs_count, len(model.inputs)
-        past, now = self._past(x), self.known(u)
-        first = past.begun < 0.5
+        h, now, first = p.memory_period, self.known(u), x.reading_begun[0] < 0.5
         means = []
-        for i in range(m):
-            mean = np.where(first, now[i], x[n + q + i] / h)
-            means.append([mean, *(np.where(first, now[i], old) for old in past.means[i][:-1])])
-        acting = [at_age(np.maximum(p.delay / h - 1.0, 0.0), means[i]) for i in range(m)]
-        estimates = [x[i] for i in range(n)]
-        kept = [*estimates, *(x[i] for i in range(n, n + q)), *(0.0 * x[0] for _ in range(m))]
-        if not self.predictors:
-            return vector(*kept, *_flat(means), *acting, t, 1.0)
-        share = p.delay / (self.predictors * h)  # of the delay, in places
+        for i in range(len(self.model.inputs)):
+            mean = np.where(first, now[i], x.input_integral[i] / h)
+            means.append([mean, *(np.where(first, now[i], old) for old in x.past_input[i][:-1])])
+        read = {"reading_time": vector(t), "reading_begun": vector(1.0)}
+        if means:
+            acting = vector(*(at_age(np.maximum(p.delay / h - 1.0, 0.0), mean) for mean in means))
+            read |= {"input_integral": np.zeros(len(means)), "past_input": matrix(*means), "delayed_input": acting}
+        return read | (self._predicted(x, means, now, first, p) if self.predictors else {})
+
+    def _predicted(self, x: Any, means: list[list[Array]], now: Array, first: Array, p: Any) -> dict[str, Array]:
+        """The predictors after a reading of these inputs, each from the one before."""
+        h, n, count = p.memory_period, self.model.order, self.predictors
+        share = p.delay / (count * h)  # of the delay, in places
         weights = integral_weights(share, self.memory_places)
-        base, drift = estimates, [0.0 * value for value in estimates]
-        roots, predictions, rates = [], [], []
-        for j in range(self.predictors):
-            ahead = (self.predictors - 1 - j) * share - 0.5  # a mean stands for the middle of its period
-            known = vector(*(at_age(ahead, means[i]) for i in range(m))) if m else now
-            before = Prediction(past.predictions[j], past.rates[j], past.roots[j])
-            moved = moved_on(
-                before, base, partial(self._rate, known=known), first, weights, h, p.delay / self.predictors
-            )
-            roots.append(moved.roots)
-            predictions.append(moved.state)
-            rates.append([moved.rates[i][:-1] for i in range(n)])
+        estimates = [*self.estimates(x)]
+        base, drift = estimates, [0.0] * n
+        predictors, rates = [], []
+        for j in range(count):
+            ahead = (count - 1 - j) * share - 0.5  # a mean stands for the middle of its period
+            known = vector(*(at_age(ahead, mean) for mean in means)) if means else now
+            before = Prediction(x.prediction[j], x.past_rate[j * n : (j + 1) * n], x.distance_root[j])
+            rate_at = partial(self._rate, known=known)
+            moved = moved_on(before, base, rate_at, first, weights, h, p.delay / count)
+            predictors.append(moved)
+            rates += [rates[:-1] for rates in moved.rates]
             ago = [at_age(share, moved.rates[i]) for i in range(n)]
             drift = [drift[i] + moved.rates[i][0] - ago[i] - moved.roots[i] for i in range(n)]
             base = moved.state
-        offset = [base[i] - estimates[i] for i in range(n)]
-        memories = (*_flat(means), *acting, *_flat(roots), *_flat(predictions), *_flat(map(_flat, rates)))
-        return vector(*kept, *memories, *offset, *drift, t, 1.0)
+        return {
+            "distance_root": matrix(*(moved.roots for moved in predictors)),
+            "prediction": matrix(*(moved.state for moved in predictors)),
+            "past_rate": matrix(*rates),
+            "prediction_offset": vector(*(base[i] - estimates[i] for i in range(n))),
+            "prediction_offset_rate": vector(*drift),
+        }
 
     def _rate(self, x: list[Array], known: Array) -> Array:
         return self.model.flow(vector(*x), known)
-
-    def _past(self, x: Array) -> DelayedStateMemory:
-        first = self.model.order + self.outputs_count + len(self.model.inputs)
-        size = sum(entry.size or 1 for entry in self.extra_memory)
-        return self._sizes.unpack([x[i] for i in range(first, first + size)])
 
     # -- certificate ------------------------------------------------------------------------------------------------
 
@@ -377,7 +354,7 @@ class DelayedStateObserver(HighGainSampled):
     @property
     def prediction_starts(self) -> tuple[float, ...]:
         """Starts of the predictions, predictor by predictor."""
-        return prediction_starts(self.model, self.predictors)
+        return tuple(float(s.start_values[0]) for s in self.model.states) * self.predictors
 
     def linearised_drift(self) -> np.ndarray:
         """Jacobian of the model at its start, shape (n, n)."""
@@ -415,7 +392,3 @@ class DelayedStateObserver(HighGainSampled):
         node = input_signal(f"{event.name}_node", "1", 0.0, meaning, variability="discrete")
         text = "A packet arrives, a delay after its measurement"
         return replace(event, payload=(node, *event.payload), description=text)
-
-
-def _flat(rows: Any) -> list[Array]:
-    return [value for row in rows for value in row]

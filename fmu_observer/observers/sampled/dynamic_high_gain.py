@@ -64,26 +64,21 @@ class DynamicHighGain(OutputPredictor):
         super().declare_sampled_part(model)
         self.extra_states = (*self.extra_states, state("theta", "1/s", THETA_START, "High gain in force"))
 
-    def theta_in_force(self, x: Array, p: Any) -> Array:
+    def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain now [1/s]."""
-        return x[self.model.order + self.outputs_count]
+        return x.theta
 
     def settled_theta(self, p: Any) -> float:
         """The limit of theta [1/s]."""
         return float(p.theta_limit)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model with correction, its uncorrected output, and theta, shape (n + q + 1,)."""
-        theta = self.theta_in_force(x, p)
-        return np.hstack([super().flow(t, x, u, p), p.theta_rate * theta * (p.theta_limit - theta)])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model with correction, its uncorrected output, and theta."""
+        return super().flow(t, x, u, p) | {"theta": p.theta_rate * x.theta * (p.theta_limit - x.theta)}
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The predicted output is set to the measured one, shape (n + q + 1,)."""
-        return np.hstack([super().update(event, t, x, u, p), self.theta_in_force(x, p)])
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates and the gain in force."""
-        return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}
+        return super().output(t, x, u, p) | {"gain": x.theta}
 
     def remark(self) -> str:
         """What holds only after a while, besides what is left out."""

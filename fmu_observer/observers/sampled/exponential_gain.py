@@ -25,15 +25,15 @@ class ExponentialGain(HighGainSampled):
     description = "High-gain observer at aperiodic samples, gain decaying since the last"
     source = "Bouchama 2024, (1.47)-(1.52)"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model, correction and decay of the innovation, shape (n + q,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model, correction and decay of the innovation."""
         eta = self.sampled_part(x)
         predicted = self.model.flow(self.estimates(x), self.known(u))
-        return np.hstack([predicted - self.correction(x, eta, p), -self.decay(eta, p)])
+        return self.named_estimates(predicted - self.correction(x, eta, p)) | self.named_part(-self.decay(eta, p))
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""
-        return np.hstack([self.estimates(x), self.innovation(x, u)])
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The innovation is set anew; the estimates stay continuous."""
+        return self.named_part(self.innovation(x, u))
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
         """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample."""

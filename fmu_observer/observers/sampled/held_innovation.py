@@ -34,17 +34,18 @@ class HeldInnovation(HighGainSampled):
         """The innovation, in memory."""
         self.extra_memory = (per_measurement(model, "innovation", "Error at the last sample, held", memory),)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model and correction, shape (n,)."""
-        return self.model.flow(self.estimates(x), self.known(u)) - self.correction(x, self.acting(x, p), p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model and correction."""
+        predicted = self.model.flow(self.estimates(x), self.known(u))
+        return self.named_estimates(predicted - self.correction(x, self.acting(x, p), p))
 
-    def acting(self, x: Array, p: Any) -> Array:
+    def acting(self, x: Any, p: Any) -> Array:
         """The innovation as it acts now, shape (q,)."""
         return self.sampled_part(x)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""
-        return np.hstack([self.estimates(x), self.innovation(x, u)])
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The innovation is set anew; the estimates stay continuous."""
+        return self.named_part(self.innovation(x, u))
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> GapError:
         """``de = drift e - theta inv(Delta) K c``, ``dc = 0``, ``c = C e`` at a sample."""

@@ -48,7 +48,7 @@ class HighGainSampled(SampledObserver):
         """What theta is, or follows from."""
         return (parameter("theta", "1/s", self.theta_start, "High gain", min=0.0),)
 
-    def theta_in_force(self, x: Array, p: Any) -> Array:
+    def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain now [1/s]."""
         return p.theta
 
@@ -60,7 +60,7 @@ class HighGainSampled(SampledObserver):
         """Declare what stands behind the estimates, one value a measurement."""
         self.extra_states = (per_measurement(model, "innovation", "Error at the last sample, as it acts now"),)
 
-    def correction(self, x: Array, eta: Array, p: Any) -> Array:
+    def correction(self, x: Any, eta: Array, p: Any) -> Array:
         """``theta inv(Delta) K eta`` with theta in force, shape (n,)."""
         theta = self.theta_in_force(x, p)
         powers = vector(*(theta ** (level + 1) for level in self.levels()))

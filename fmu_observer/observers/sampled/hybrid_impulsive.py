@@ -37,6 +37,7 @@ class HybridImpulsive(SampledObserver):
     name = "hybrid_impulsive"
     description = "Hybrid observer at aperiodic samples: a jump, and a correction between"
     source = "Bouchama 2024, (1.53)-(1.54)"
+    sampled_state = "rest"
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
@@ -50,17 +51,19 @@ class HybridImpulsive(SampledObserver):
         self.extra_states = (per_measurement(chosen, "rest", "Rest of the innovation, z, as it acts now"),)
         super().__init__(chosen)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model, correction and decay of z, shape (n + q,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model, correction and decay of z."""
         L, H, _ = self._gains(p)
         z = self.sampled_part(x)
-        return np.hstack([self.model.flow(self.estimates(x), self.known(u)) + L @ z, H @ z])
+        moved = self.model.flow(self.estimates(x), self.known(u)) + L @ z
+        return self.named_estimates(moved) | self.named_part(H @ z)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The estimate jumps, and z is set to what the jump left over, shape (n + q,)."""
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The estimate jumps, and z is set to what the jump left over."""
         _, _, F = self._gains(p)
         missing = -self.innovation(x, u)
-        return np.hstack([self.estimates(x) + F @ missing, missing - self.model.C @ (F @ missing)])
+        step = F @ missing
+        return self.named_estimates(self.estimates(x) + step) | self.named_part(missing - self.model.C @ step)
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
         """``de = drift e + L z``, ``dz = H z``; ``e+ = (I - F C) e``, ``z+ = -(I - C F) C e`` at a sample."""

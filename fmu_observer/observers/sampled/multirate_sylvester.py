@@ -19,7 +19,7 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.sylvester import sylvester_design, sylvester_residual
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.inverted_pendulum_cart import inverted_pendulum_cart
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -56,6 +56,7 @@ class MultirateSylvester(GapCertified):
     name = "multirate_sylvester"
     description = "Multirate observer by a Sylvester equation, every sampled output at its own instants"
     source = "Bouchama 2024, (1.42)-(1.46)"
+    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MULTIRATE_MODELS), "continuous": (0, 1, 2)}
 
@@ -95,33 +96,31 @@ class MultirateSylvester(GapCertified):
         )
         super().__init__(model=self.model.name, continuous=continuous)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the filter and of the predicted samples, shape (r + n_d,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the filter and of the predicted samples."""
         r, A, B, T = self._matrices(p)
-        known, estimate = self._known(u), self.estimate(x, u, p)
+        known, estimate = stacked_of(u, self.model.inputs), self.estimate(x, u, p)
         driven = T @ (self.model.B @ known) if len(self.model.inputs) else 0.0
-        whole = self.model.flow(estimate, known)
-        return np.hstack([A @ x[:r] + B @ estimate[r:] + driven, whole[self.model.order - len(self.sampled) :]])
+        whole = self.model.flow(estimate, known)[self.model.order - len(self.sampled) :]
+        return {"filter": A @ x.filter + B @ estimate[r:] + driven} | named_as(self._slow_states(), whole, "predicted_")
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """One predicted sample is set to what was measured; filter and other samples stay, shape (r + n_d,)."""
-        names = [f"{s.name}_sample" for s in self.sampled]
-        chosen = np.eye(len(names))[names.index(event)]
-        predicted = x[self.hidden :]
-        return np.hstack([x[: self.hidden], predicted + chosen * (getattr(u, f"{event}_value") - predicted)])
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """One predicted sample is set to what was measured."""
+        pairs = zip(self.sampled, self._slow_states(), strict=True)
+        name = next(f"predicted_{slow.name}" for s, slow in pairs if event == f"{s.name}_sample")
+        predicted = getattr(x, name)
+        return {name: predicted + (getattr(u, f"{event}_value") - predicted)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates; what is measured always is passed on."""
-        estimate = self.estimate(x, u, p)
-        return {s.name: estimate[i] for i, s in enumerate(self.model.states)}
+        return named_as(self.model.states, self.estimate(x, u, p))
 
-    def estimate(self, x: Array, u: Any, p: Any) -> Array:
+    def estimate(self, x: Any, u: Any, p: Any) -> Array:
         """``[xh_R, y_c, w]``, shape (n,)."""
         r, _, _, T = self._matrices(p)
-        always = stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.always))
-        sampled = x[r : r + len(self.sampled)]
+        always, sampled = stacked_of(u, self.always, "measured_"), stacked_of(x, self._slow_states(), "predicted_")
         measured = np.hstack([always, sampled]) if self.always else sampled
-        return np.hstack([np.linalg.solve(T[:, :r], x[:r] - T[:, r:] @ measured), measured])
+        return np.hstack([np.linalg.solve(T[:, :r], x.filter - T[:, r:] @ measured), measured])
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """(1.46) by its residual, A Hurwitz by its abscissa, T_R invertible by its condition number.
@@ -184,9 +183,6 @@ class MultirateSylvester(GapCertified):
 
     def _slow_states(self) -> tuple[Signal, ...]:
         return self.model.states[self.model.order - len(self.sampled) :]
-
-    def _known(self, u: Any) -> Array:
-        return stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
 
     def _matrices(self, p: Any) -> tuple[int, Array, Array, Array]:
         r, n = self.hidden, self.model.order

@@ -25,20 +25,22 @@ class OutputPredictor(HighGainSampled):
     name = "output_predictor"
     description = "High-gain observer with the output predicted between samples"
     source = "Bouchama 2024, figure 1.2, equations of its references"
+    sampled_state = "predicted_output"
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
         """The predicted output."""
         self.extra_states = (per_measurement(model, "predicted_output", "Output predicted since the last sample"),)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Model with correction, and its uncorrected output, shape (n + q,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model with correction, and its uncorrected output."""
         predicted = self.model.flow(self.estimates(x), self.known(u))
         error = self.model.measured(self.estimates(x)) - self.sampled_part(x)
-        return np.hstack([predicted - self.correction(x, error, p), self.model.measured(predicted)])
+        follows = self.named_part(self.model.measured(predicted))
+        return self.named_estimates(predicted - self.correction(x, error, p)) | follows
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The predicted output is set to the measured one, shape (n + q,)."""
-        return np.hstack([self.estimates(x), self.measured(u)])
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The predicted output is set to the measured one."""
+        return self.named_part(self.measured(u))
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
         """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample, with

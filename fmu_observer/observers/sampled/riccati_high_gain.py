@@ -28,8 +28,8 @@ class RiccatiHighGain(ModelObserver, GapCertified):
     Between samples ``dxh = f(xh, u)`` and ``dS = -S Q_theta S - F' S - S F`` with F the exact Jacobian of f at xh, and
     ``Q_theta = theta^2 inv(Delta) Q inv(Delta)``, ``Delta = diag(1, 1/theta, ..., 1/theta^(n-1))``; at a sample
     ``S+ = S + T C' C / r``, ``xh+ = xh - T inv(S+) C' (C xh - y) / r`` with T the sampling period.
-    S is symmetric and positive definite from its start on; it is kept as its upper triangle, row by row. ``inv(S)``
-    obeys the equations of an extended Kalman filter with noise Q_theta.
+    S is symmetric and positive definite from its start on. ``inv(S)`` obeys the equations of an extended Kalman filter
+    with noise Q_theta.
 
     For a linear model the error dies at any period, since ``e' S e`` falls; the period must be short where the Jacobian
     at the estimate is not that between estimate and truth. Q is diagonal. Defaults: Q = I, r = 0.2, theta = 1.5 1/s, S
@@ -58,27 +58,25 @@ class RiccatiHighGain(ModelObserver, GapCertified):
             parameter("state_weight", "1", (1.0,) * n, "Diagonal of Q", min=1e-9, size=n),
             parameter("output_weight", "1", OUTPUT_WEIGHT, "r, the same for every measurement", min=1e-9),
         )
-        identity = tuple(float(i == j) for i, j in _upper(n))
-        self.extra_states = (
-            state("information", "1", identity, "Upper triangle of S, row by row", size=len(identity)),
-        )
+        text = "Upper triangle of S, row by row"
+        self.extra_states = (state("information", "1", np.eye(n), text, shape=(n, n), symmetric=True),)
         super().__init__(chosen)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The model, and the Riccati-like equation, shape (n + n (n + 1) / 2,)."""
-        estimate, known, S = self.estimates(x), self.known(u), self._information(x)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The model, and the Riccati-like equation."""
+        estimate, known, S = self.estimates(x), self.known(u), x.information
         F = self.model.jacobian(estimate, known)
         noise = self._noise(p)
         SF = S @ F
         change = -(S * noise) @ S - SF.T - SF
-        return np.hstack([self.model.flow(estimate, known), self._packed(change)])
+        return self.named_estimates(self.model.flow(estimate, known)) | {"information": change}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Correction by the sample, and its information, shape (n + n (n + 1) / 2,)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Correction by the sample, and its information."""
         C, weight = self.model.C, p.sample_period / p.output_weight
-        S = self._information(x) + weight * (C.T * is_there(self.measured(u)) @ C)
+        S = x.information + weight * (C.T * is_there(self.measured(u)) @ C)
         step = np.linalg.solve(S, C.T @ self.innovation(x, u))
-        return np.hstack([self.estimates(x) - weight * step, self._packed(S)])
+        return self.named_estimates(self.estimates(x) - weight * step) | {"information": S}
 
     def condition_of(self, p: Any) -> Condition:
         """Observability of the sampled linear part at the start, and its closed growth from sample to sample, S
@@ -123,16 +121,3 @@ class RiccatiHighGain(ModelObserver, GapCertified):
     def _noise(self, p: Any) -> Array:
         """Diagonal of Q_theta, shape (n,)."""
         return vector(*(p.theta ** (2 + 2 * i) for i in range(self.model.order))) * p.state_weight
-
-    def _information(self, x: Array) -> Array:
-        """S, shape (n, n)."""
-        n = self.model.order
-        places = {pair: n + k for k, pair in enumerate(_upper(n))}
-        return np.vstack([np.hstack([x[places[min(i, j), max(i, j)]] for j in range(n)]) for i in range(n)])
-
-    def _packed(self, S: Array) -> Array:
-        return vector(*(S[i, j] for i, j in _upper(self.model.order)))
-
-
-def _upper(n: int) -> list[tuple[int, int]]:
-    return [(i, j) for i in range(n) for j in range(i, n)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver
 from fmu_observer.observers.model_trial import model_trial
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, scalar_names, state
+from plant_models.hybrid import Signal, scalar_names, state, vector
 from plant_models.hybrid.system import Array
 
 
@@ -29,10 +29,12 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
     """Base of the observers corrected at the model's own `event`, its payload the measurements, periodic or not.
 
     A subclass writes `flow`, `update`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the
-    model.
+    model. What it keeps of the measurements is the state `sampled_state`, declared by `per_measurement`: a vector by
+    `sampled_part`, and back by `named_part`.
     """
 
     timing = "event"
+    sampled_state: ClassVar[str] = "innovation"
     internal_step = 5e-3
 
     @abstractmethod
@@ -107,10 +109,18 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
         """Place of every estimate in its chain of derivatives, for a model in chain form."""
         return tuple(i // self.outputs_count for i in range(self.model.order))
 
-    def sampled_part(self, x: Array) -> Array:
-        """What stands behind the estimates, shape (q,)."""
-        n = self.model.order
-        return x[n : n + self.outputs_count]
+    def sampled_part(self, x: Any) -> Array:
+        """What is kept of the measurements, shape (q,)."""
+        value = getattr(x, self.sampled_state)
+        return vector(value) if self.outputs_count == 1 else value
+
+    def named_part(self, values: Array) -> dict[str, Array]:
+        """The way back: what is kept of the measurements, or its derivative, by name of the state.
+
+        Args:
+            values: shape (q,).
+        """
+        return {self.sampled_state: values[0] if self.outputs_count == 1 else values}
 
 
 def per_measurement(model: ObserverModel, name: str, description: str, kind: Callable[..., Signal] = state) -> Signal:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.observers.sampled.takagi_sugeno_held import TakagiSugenoHeld
-from plant_models.hybrid import Event, Signal, TriggeredEvent, memory
+from plant_models.hybrid import Event, Signal, TriggeredEvent, memory, vector
 from plant_models.hybrid.system import Array
 
 
@@ -32,13 +32,11 @@ class TakagiSugenoAperiodic(TakagiSugenoHeld):
         weights = tuple(map(float, start))
         return (memory("weight", "1", weights, "Weights h_i of the vertices at the last sample", size=len(weights)),)
 
-    def held_weights(self, x: Array, u: Any) -> Array:
-        """Weights at the sample, shape (N,)."""
+    def held_weights(self, estimate: Array, u: Any) -> dict[str, Array]:
+        """Weights at the sample."""
         measured, count = self.measured(u), len(self.model.sampled)
-        best = self.model.informed(
-            x[: self.model.order], measured[:count], measured[count:] if self.model.continuous else None
-        )
-        return np.hstack(self.model.weights(self.model.premise_values(best, self.known(u))))
+        best = self.model.informed(estimate, measured[:count], measured[count:] if self.model.continuous else None)
+        return {"weight": vector(*self.model.weights(self.model.premise_values(best, self.known(u))))}
 
     def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
         """Triggered."""
@@ -49,10 +47,9 @@ class TakagiSugenoAperiodic(TakagiSugenoHeld):
         """A payload of the event."""
         return f"{self.model.event}_{name}"
 
-    def weights(self, x: Array, u: Any) -> tuple[Array, ...]:
+    def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
         """Weights of the last sample."""
-        first = self.model.order + len(self.model.measurements)
-        return tuple(x[first + i] for i in range(self.model.vertices))
+        return tuple(x.weight)
 
     def premise_remark(self) -> str:
         """The weights are those of the last sample."""

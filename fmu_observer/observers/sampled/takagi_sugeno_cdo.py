@@ -14,7 +14,7 @@ from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampl
 from fmu_observer.condition import Condition
 from fmu_observer.limits import Limit
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, TakagiSugenoModel, find_takagi_sugeno_model
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observability import require_detectable_vertices
 from fmu_observer.observers.gap_certified import ASKED_GAP, limits_of
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -71,6 +71,7 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         "Takagi-Sugeno continuous-discrete observer of any such model, continuous and aperiodic sampled outputs"
     )
     source = "Bouchama 2024, (2.6)"
+    by_name = True
     internal_step = 1e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
@@ -114,48 +115,39 @@ class GeneralTakagiSugenoCdo(GatedObserver):
 
     # -- equations ----------------------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Estimates, decaying innovation and time outside the bounds, shape (n + q1 + 1,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, decaying innovation and time outside the bounds."""
         model = self.model
-        n, sampled = model.order, len(model.sampled)
-        estimate, innovation = x[:n], x[n : n + sampled]
+        estimate, innovation = self._estimate(x), stacked_of(x, model.sampled, "innovation_")
         values = self._premises_in_use(x, u)
         h = model.weights(values)
-        predicted = model.blend(h, estimate, self._known(u))
+        predicted = model.blend(h, estimate, stacked_of(u, model.inputs))
         correction = self._corrected(h, p.sampled_gain, innovation)
         if model.continuous:
             continuous = model.C_continuous @ estimate - self._continuous(u)
             correction = correction + self._corrected(h, p.continuous_gain, continuous)
-        corrected = predicted - correction
-        decaying = (-p.innovation_decay * innovation[i] for i in range(sampled))
-        return vector(*(corrected[i] for i in range(n)), *decaying, model.outside(values))
+        return {
+            **named_as(model.states, predicted - correction, "estimated_"),
+            **named_as(model.sampled, -p.innovation_decay * innovation, "innovation_"),
+            "time_outside": model.outside(values),
+        }
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The innovation is set anew and the premises are looked at; the estimates stay, shape (n + q1 + 1 +
-        memory,).
-        """
-        model = self.model
-        n, sampled = model.order, len(model.sampled)
-        estimate = x[:n]
-        arrived = tuple(getattr(u, f"{model.event}_{s.name}") for s in model.sampled)
-        innovation = model.C_sampled @ estimate - stacked(arrived)
-        known = None if self.premise == "estimated" else stacked(arrived)
-        values = self._premises_at(estimate, known, u)
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The innovation is set anew and the premises are looked at; the estimates stay."""
+        model, estimate = self.model, self._estimate(x)
+        arrived = stacked_of(u, model.sampled, f"{model.event}_")
+        values = self._premises_at(estimate, None if self.premise == "estimated" else arrived, u)
         kept = {"frozen": values, "live": arrived, "estimated": ()}[self.premise]
-        violations = x[n + sampled + 1] + model.outside(values)
-        return vector(
-            *(estimate[i] for i in range(n)),
-            *(innovation[i] for i in range(sampled)),
-            x[n + sampled],
-            violations,
-            *kept,
-        )
+        return {
+            **named_as(model.sampled, model.C_sampled @ estimate - arrived, "innovation_"),
+            "violations_counted": x.violations_counted + model.outside(values),
+            **named_as(self._held, kept, "held_"),
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, and how often and how long premises were outside their bounds."""
-        behind = self.model.order + len(self.model.sampled)
-        estimates = {s.name: x[i] for i, s in enumerate(self.model.states)}
-        return estimates | {"premise_violations": x[behind + 1], "premise_outside_time": x[behind]}
+        counts = {"premise_violations": x.violations_counted, "premise_outside_time": x.time_outside}
+        return named_as(self.model.states, self._estimate(x)) | counts
 
     # -- stability ----------------------------------------------------------------------------------------------------
 
@@ -255,22 +247,27 @@ class GeneralTakagiSugenoCdo(GatedObserver):
             rows.append(sum(entries[1:], entries[0]))
         return vector(*rows)
 
-    def _premises_in_use(self, x: Array, u: Any) -> tuple[Array, ...]:
-        first = self.model.order + len(self.model.sampled) + 2
+    def _premises_in_use(self, x: Any, u: Any) -> tuple[Array, ...]:
+        held = stacked_of(x, self._held, "held_")
         if self.premise == "frozen":
-            return tuple(x[first + j] for j in range(len(self.model.premises)))
-        held = stacked(tuple(x[first + i] for i in range(len(self.model.sampled)))) if self.premise == "live" else None
-        return self._premises_at(x[: self.model.order], held, u)
+            return tuple(held)
+        return self._premises_at(self._estimate(x), held if self.premise == "live" else None, u)
 
     def _premises_at(self, estimate: Array, sampled: Array | None, u: Any) -> tuple[Array, ...]:
-        continuous = self._continuous(u) if self.model.continuous else None
-        return self.model.premise_values(self.model.informed(estimate, sampled, continuous), self._known(u))
-
-    def _known(self, u: Any) -> Array:
-        return stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        continuous, known = self._continuous(u) if self.model.continuous else None, stacked_of(u, self.model.inputs)
+        return self.model.premise_values(self.model.informed(estimate, sampled, continuous), known)
 
     def _continuous(self, u: Any) -> Array:
-        return stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.model.continuous))
+        return stacked_of(u, self.model.continuous, "measured_")
+
+    def _estimate(self, x: Any) -> Array:
+        return stacked_of(x, self.model.states, "estimated_")
+
+    @property
+    def _held(self) -> tuple[Any, ...]:
+        """What is held of the last sample: premises, or measurements."""
+        held: dict[str, tuple[Any, ...]] = {"frozen": self.model.premises, "live": self.model.sampled, "estimated": ()}
+        return held[self.premise]
 
     def _gain_parameters(self) -> tuple[Signal, ...]:
         model, starts = self.model, self.presets[self.default_preset or ""]
@@ -305,24 +302,13 @@ class GeneralTakagiSugenoCdo(GatedObserver):
     def _memory(self) -> tuple[Signal, ...]:
         model = self.model
         counted = memory("violations_counted", "1", 0.0, "Samples at which a premise was outside its bounds")
-        if self.premise == "frozen":
-            start = model.premise_values(model.start, np.zeros(len(model.inputs)))
-            held = zip(model.premises, start, strict=True)
-            return (
-                counted,
-                *(memory(f"held_{f.name}", f.unit, float(v), f"At the last sample: {f.description}") for f, v in held),
-            )
-        if self.premise == "live":
-            start = tuple(model.C_sampled @ model.start)
-            held_y = zip(model.sampled, start, strict=True)
-            return (
-                counted,
-                *(
-                    memory(f"held_{s.name}", s.unit, float(v), f"At the last sample: {s.description}")
-                    for s, v in held_y
-                ),
-            )
-        return (counted,)
+        premises = model.premise_values(model.start, np.zeros(len(model.inputs)))
+        starts = {"frozen": premises, "live": model.C_sampled @ model.start, "estimated": ()}[self.premise]
+        held = zip(self._held, starts, strict=True)
+        return (
+            counted,
+            *(memory(f"held_{s.name}", s.unit, float(v), f"At the last sample: {s.description}") for s, v in held),
+        )
 
     def _named(self, signal: Signal, p: Any) -> zip[tuple[str, Any]]:
         return zip(signal.scalar_names, np.atleast_1d(getattr(p, signal.name)), strict=True)

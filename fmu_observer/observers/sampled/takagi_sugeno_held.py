@@ -25,7 +25,7 @@ from fmu_observer.certificates.quadratic import Condition as Inequalities
 from fmu_observer.certificates.quadratic import flow_condition
 from fmu_observer.condition import Condition
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.models.takagi_sugeno_registry import find_takagi_sugeno_model
 from fmu_observer.observers.gap_certified import GapCertified
@@ -49,6 +49,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
     [ours].
     """
 
+    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": SUITED}
     payload_in_event: ClassVar[bool] = True
@@ -84,7 +85,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         """How the input of a measurement is called."""
 
     @abstractmethod
-    def weights(self, x: Array, u: Any) -> tuple[Array, ...]:
+    def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
         """Weights h_i in use now, N numbers."""
 
     @abstractmethod
@@ -99,38 +100,41 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         """Memory of the weights, if they are frozen."""
         return ()
 
-    def held_weights(self, x: Array, u: Any) -> Array:
-        """What goes into that memory at a sample, shape (N,) or (0,)."""
-        return np.zeros(0)
+    def held_weights(self, estimate: Array, u: Any) -> dict[str, Array]:
+        """What goes into that memory at a sample."""
+        return {}
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Blended model and held correction, shape (n,)."""
-        n, q = self.model.order, len(self.model.measurements)
-        weights, eta = self.weights(x, u), x[n : n + q]
-        total = self.model.blend(weights, x[:n], self.known(u))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Blended model and held correction."""
+        weights, eta = self.weights(x, u), stacked_of(x, self.model.measurements, "innovation_")
+        total = self.model.blend(weights, self.estimates(x), self.known(u))
         for weight, L in zip(weights, self.gains(p), strict=True):
             total = total - weight * (L @ eta)
-        return total
+        return named_as(self.model.states, total, "estimated_")
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The innovation is set anew, and the weights where they are frozen; the estimates stay continuous."""
-        estimate = x[: self.model.order]
-        parts = [estimate, self.model.C @ estimate - self.measured(u)]
-        return np.hstack([*parts, self.held_weights(x, u)] if self.weight_memory() else parts)
+        estimate = self.estimates(x)
+        innovation = self.model.C @ estimate - self.measured(u)
+        return named_as(self.model.measurements, innovation, "innovation_") | self.held_weights(estimate, u)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates."""
-        return {s.name: x[i] for i, s in enumerate(self.model.states)}
+        return named_as(self.model.states, self.estimates(x))
+
+    def estimates(self, x: Any) -> Array:
+        """The estimates within the state, shape (n,)."""
+        return stacked_of(x, self.model.states, "estimated_")
 
     def known(self, u: Any) -> Array:
         """The model's inputs, shape (m,)."""
-        return stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        return stacked_of(u, self.model.inputs)
 
     def measured(self, u: Any) -> Array:
         """The measurements at a sample, shape (q,)."""
-        return stacked(tuple(getattr(u, self.measurement_name(s.name)) for s in self.model.measurements))
+        return stacked_of(u, self.model.measurements, self.measurement_name(""))
 
     def gains(self, p: Any) -> tuple[Array, ...]:
         """L_i, N of them, each of shape (n, q)."""

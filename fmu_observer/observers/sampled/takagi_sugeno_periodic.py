@@ -35,10 +35,9 @@ class TakagiSugenoPeriodic(TakagiSugenoHeld):
         """An input that is there always."""
         return f"measured_{name}"
 
-    def weights(self, x: Array, u: Any) -> tuple[Array, ...]:
+    def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
         """Weights at the estimate."""
-        estimate = x[: self.model.order]
-        return self.model.weights(self.model.premise_values(estimate, self.known(u)))
+        return self.model.weights(self.model.premise_values(self.estimates(x), self.known(u)))
 
     def premise_remark(self) -> str:
         """The weights are those of the estimate."""

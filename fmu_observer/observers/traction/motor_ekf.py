@@ -9,8 +9,8 @@ import numpy as np
 
 from fmu_observer.observers.traction.motor_filter import MotorFilter, traction_preset
 from fmu_observer.observers.traction.motor_filter_presets import ROWS, preset_of
-from fmu_observer.observers.traction.motor_jacobians import as_array, printed_jacobian, rotor_jacobian
-from plant_models.hybrid import vector
+from fmu_observer.observers.traction.motor_jacobians import printed_jacobian, rotor_jacobian
+from plant_models.hybrid import matrix, vector
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, Frame, euler_step, rotor_voltages
 from plant_models.railway.traction.transforms import to_rotor
@@ -64,12 +64,14 @@ class MotorEkf(MotorFilter):
 
     def predict(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
         """Euler step of the motor, and its Jacobian in the rotor frame."""
-        values = (estimate[0], estimate[1], estimate[2], estimate[3])
-        moved = euler_step(values, *rotor_voltages(self.frame, u, values[3]), u.load_torque, p.sample_period, p)
-        return vector(*moved), as_array(self.jacobian(*values[:3], p.sample_period, p))
+        current_d, current_q, speed, angle = estimate
+        voltages = rotor_voltages(self.frame, u, angle)
+        moved = euler_step((current_d, current_q, speed, angle), *voltages, u.load_torque, p.sample_period, p)
+        return vector(*moved), matrix(*self.jacobian(current_d, current_q, speed, p.sample_period, p))
 
     def measure(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
         """Measured less predicted currents in the rotor frame [A]."""
         first, second = (getattr(u, f"measured_current_{axis}") for axis in AXES[self.frame])
-        seen = (first, second) if self.frame == "rotor" else to_rotor(first, second, estimate[3])
-        return vector(seen[0] - estimate[0], seen[1] - estimate[1]), MEASURED
+        current_d, current_q, _, angle = estimate
+        seen_d, seen_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, angle)
+        return vector(seen_d - current_d, seen_q - current_q), MEASURED

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 from fmu_observer.observers.traction.motor_filter import MotorFilter, traction_preset
-from fmu_observer.observers.traction.motor_jacobians import as_array, rotor_jacobian
-from plant_models.hybrid import vector
+from fmu_observer.observers.traction.motor_jacobians import rotor_jacobian
+from plant_models.hybrid import matrix, vector
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import euler_step
 from plant_models.railway.traction.transforms import to_rotor, to_stator
@@ -59,23 +59,24 @@ class MotorEkfStator(MotorFilter):
 
     def predict(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
         """Euler step of the motor with its voltages turned by the estimated angle, and its Jacobian."""
-        values = (estimate[0], estimate[1], estimate[2], estimate[3])
-        voltage_d, voltage_q = to_rotor(u.voltage_alpha, u.voltage_beta, values[3])
-        load = u.load_torque if self.known_load else estimate[4]
-        moved = euler_step(values, voltage_d, voltage_q, load, p.sample_period, p)
-        rows = rotor_jacobian(*values[:3], p.sample_period, p)
+        current_d, current_q, speed, angle, *estimated_load = estimate
+        voltage_d, voltage_q = to_rotor(u.voltage_alpha, u.voltage_beta, angle)
+        (load,) = estimated_load or (u.load_torque,)
+        moved = euler_step((current_d, current_q, speed, angle), voltage_d, voltage_q, load, p.sample_period, p)
+        rows = rotor_jacobian(current_d, current_q, speed, p.sample_period, p)
         rows[0][3] = p.sample_period * voltage_q / p.inductance_d
         rows[1][3] = -p.sample_period * voltage_d / p.inductance_q
         if self.known_load:
-            return vector(*moved), as_array(rows)
+            return vector(*moved), matrix(*rows)
         wide = [[*row, 0.0] for row in rows]
         wide[2][4] = -p.sample_period / p.inertia
-        return vector(*moved, load), as_array([*wide, [0.0, 0.0, 0.0, 0.0, 1.0]])
+        return vector(*moved, load), matrix(*wide, [0.0, 0.0, 0.0, 0.0, 1.0])
 
     def measure(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
         """Measured less predicted currents in the stator frame [A]."""
-        alpha, beta = to_stator(estimate[0], estimate[1], estimate[3])
-        along_d, along_q = to_stator(1.0, 0.0, estimate[3]), to_stator(0.0, 1.0, estimate[3])
+        current_d, current_q, _, angle, *_ = estimate
+        alpha, beta = to_stator(current_d, current_q, angle)
+        along_d, along_q = to_stator(1.0, 0.0, angle), to_stator(0.0, 1.0, angle)
         rest = () if self.known_load else (0.0,)
-        H = as_array([[along_d[0], along_q[0], 0.0, -beta, *rest], [along_d[1], along_q[1], 0.0, alpha, *rest]])
+        H = matrix([along_d[0], along_q[0], 0.0, -beta, *rest], [along_d[1], along_q[1], 0.0, alpha, *rest])
         return vector(u.measured_current_alpha - alpha, u.measured_current_beta - beta), H

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.condition import Condition
-from fmu_observer.filtering.kalman import correct, flattened, log_likelihood, normalised_square, predicted_covariance
+from fmu_observer.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.discrete.covariance_requirements import positive
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -26,7 +27,6 @@ from plant_models.hybrid import (
     memory,
     output_signal,
     parameter,
-    vector,
 )
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.requirements import within_bounds
@@ -60,6 +60,7 @@ class MotorFilter(HybridSystem):
         options: of the subclass.
     """
 
+    by_name = True
     internal_step = 1e-2  # nothing flows between samples
 
     def __init__(self, frame: str, known_load: bool, start_variance: Sequence[float], **options: Any) -> None:
@@ -71,9 +72,9 @@ class MotorFilter(HybridSystem):
             memory(
                 "estimate_covariance",
                 "1",
-                tuple(map(float, np.diag(start_variance).ravel())),
+                np.diag(start_variance),
                 "Covariance P, row by row, SI units",
-                size=n * n,
+                shape=(n, n),
             ),
             *(memory(f"held_innovation_{a}", "A", 0.0, f"Innovation of the current along {a}") for a in axes),
             memory("held_nis", "1", 0.0, "Normalised square of the innovation"),
@@ -132,51 +133,51 @@ class MotorFilter(HybridSystem):
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Prediction over the period since the last sample, then correction by what is not missing, shape
-        (n + n^2 + 5,).
-        """
-        n, RN = self.order, np.diag(p.measurement_variance)
-        last = n + n * n
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Prediction over the period since the last sample, then correction by what is not missing."""
+        estimated, RN = self.outputs[: self.order], np.diag(p.measurement_variance)
 
-        def advance(values: Array) -> Array:
-            moved, F = self.predict(values[:n], u, p)
-            P = predicted_covariance(np.reshape(values[n:last], (n, n)), F, np.diag(p.process_variance))
-            return vector(*(moved[i] for i in range(n)), *flattened(P), *(values[last + i] for i in range(4)))
+        def advance(x: Any) -> dict[str, Array]:
+            moved, F = self.predict(stacked_of(x, estimated, "estimated_"), u, p)
+            P = predicted_covariance(x.estimate_covariance, F, np.diag(p.process_variance))
+            return named_as(estimated, moved, "estimated_") | {"estimate_covariance": P}
 
-        def by_measurement(values: Array) -> Array:
-            innovation, H = self.measure(values[:n], u, p)
+        def by_measurement(x: Any) -> dict[str, Array]:
+            estimate = stacked_of(x, estimated, "estimated_")
+            innovation, H = self.measure(estimate, u, p)
             there = is_there(innovation[0]) * is_there(innovation[1])  # one current alone is as good as none
             innovation = or_else(innovation, 0.0)
-            after = correct(values[:n], np.reshape(values[n:last], (n, n)), innovation, H, RN)
-            nis = normalised_square(innovation, after.innovation_covariance)
-            told = values[last + 3] + log_likelihood(innovation, after.innovation_covariance)
-            estimate = (after.estimate[i] for i in range(n))
-            corrected = vector(*estimate, *flattened(after.covariance), innovation[0], innovation[1], nis, told)
-            return np.where(there > 0.5, corrected, values)
+            after = correct(estimate, x.estimate_covariance, innovation, H, RN)
+            told = x.log_likelihood + log_likelihood(innovation, after.innovation_covariance)
+            corrected = {
+                **named_as(estimated, after.estimate, "estimated_"),
+                "estimate_covariance": after.covariance,
+                **{f"held_innovation_{a}": value for a, value in zip(AXES[self.frame], innovation, strict=True)},
+                "held_nis": normalised_square(innovation, after.innovation_covariance),
+                "log_likelihood": told,
+            }
+            return {name: np.where(there > 0.5, value, getattr(x, name)) for name, value in corrected.items()}
 
         return at_sample(x, advance, by_measurement)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, their standard deviations, innovations and NIS."""
-        n, last = self.order, self.order * (self.order + 1)
-        names = [s.name for s in self.outputs[:n]]
+        names, P = [s.name for s in self.outputs[: self.order]], x.estimate_covariance
         return {
-            **{name: x[i] for i, name in enumerate(names)},
-            **{f"{name}_std": np.sqrt(np.maximum(x[n + i * (n + 1)], 0.0)) for i, name in enumerate(names)},
-            **{f"innovation_{axis}": x[last + i] for i, axis in enumerate(AXES[self.frame])},
-            "nis": x[last + 2],
-            "innovation_likelihood": x[last + 3],
+            **{name: getattr(x, f"estimated_{name}") for name in names},
+            **{f"{name}_std": np.sqrt(np.maximum(P[i, i], 0.0)) for i, name in enumerate(names)},
+            **{f"innovation_{axis}": getattr(x, f"held_innovation_{axis}") for axis in AXES[self.frame]},
+            "nis": x.held_nis,
+            "innovation_likelihood": x.log_likelihood,
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
-    def start_requirements(self, x: Array, p: Any) -> dict[str, Array]:
+    def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """The covariance of the first estimate is one."""
-        n = self.order
-        return positive("estimate_covariance", x[n : n + n * n], n, definite=False)
+        return positive("estimate_covariance", x.estimate_covariance, self.order, definite=False)
 
     def condition(
         self,

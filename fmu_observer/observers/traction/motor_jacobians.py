@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from plant_models.hybrid import vector
 from plant_models.hybrid.system import Array
 
 
@@ -67,12 +64,3 @@ def printed_jacobian(current_d: Array, current_q: Array, speed: Array, period: A
     rows[1][1] = 1.0 - share_d * p.stator_resistance
     rows[1][2] = share_q * p.pole_pairs * (p.inductance_d * current_d - p.rotor_flux)
     return rows
-
-
-def as_array(rows: list[list[Array]]) -> Array:
-    """Rows of numbers and symbols as a matrix, shape (rows, columns).
-
-    Args:
-        rows: of equal length.
-    """
-    return np.stack([vector(*row) for row in rows])

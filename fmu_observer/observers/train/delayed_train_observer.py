@@ -13,7 +13,7 @@ from fmu_observer.observers.sampled.delayed_state_observer import (
     Between,
     DelayedStateObserver,
 )
-from plant_models.hybrid import TriggeredEvent, input_signal
+from plant_models.hybrid import TriggeredEvent, input_signal, vector
 from plant_models.hybrid.system import Array
 
 
@@ -47,13 +47,13 @@ class DelayedTrainObserver(DelayedStateObserver):
         )
         del self.options["model"], self.options["nodes"]
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A balise sets the position a delay ago, a packet the speed; a reading moves memory on."""
         if event == "reading":
             return super().update(event, t, x, u, p)
-        outputs = self.sampled_part(x)
-        after = [u.balise_position, outputs[1]] if event == "balise" else [outputs[0], u.packet_speed]
-        return self.with_outputs(x, after)
+        position, speed = self.sampled_part(x)
+        after = (u.balise_position, speed) if event == "balise" else (position, u.packet_speed)
+        return self.named_part(vector(*after))
 
     @property
     def certified_turns(self) -> tuple[tuple[int, ...], ...]:
