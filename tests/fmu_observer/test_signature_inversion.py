@@ -154,7 +154,7 @@ def test_the_first_property_of_the_reaction_and_the_search_for_its_rate(reaction
 
 def test_a_rate_beyond_the_candidates_is_told(reaction: ReactionSignature) -> None:
     p = parameters(reaction)
-    x = reaction.start_state()
+    x = reaction.unpack_states(reaction.start_state())
     for rate, outside in ((0.2, False), (0.5, True)):
         window = reaction.properties(np.array([1.5, 1.0]), rate, 0.01, 1e-2)[1]
         assert (reaction.inverted([window], x, p).outside >= 1.0) == outside
@@ -253,12 +253,13 @@ def test_a_third_state_beyond_the_tables_of_the_cascade_is_told() -> None:
 def test_a_rate_that_goes_astray_after_long_is_told(preset: str, period: float, told: float) -> None:
     """By the exact solution, without noise; at 8 s less than a third of the windows lay beyond the table."""
     observer = ReactionSignature()
-    p, x = observer.unpack_parameters(observer.start_parameters(preset)), observer.start_state()
-    x[:2] = 2.5, 0.5
+    p = observer.unpack_parameters(observer.start_parameters(preset))
+    x = observer.unpack_states(observer.start_state())
+    x = x._replace(**dict(zip(x._fields[:2], (2.5, 0.5), strict=True)))
     for k in range(round(6.5 / period)):
         a = 2.5 / (1.0 + 0.3 * 2.5 * k * period)
         u = observer.unpack_inputs(np.array([0.5 * (a + 3.5)]))
-        x = observer.jump("sampling", k * period, x, u, p)
+        x = x._replace(**observer.jump("sampling", k * period, x, u, p))
     values = observer.output(6.5, x, u, p)
     assert values["outside_count"] < 0.35 * values["window_count"]
     assert values["mostly_outside"] == told
@@ -268,11 +269,11 @@ def test_a_rate_that_goes_astray_after_long_is_told(preset: str, period: float, 
 def test_the_noise_of_a_signal_is_told(deviation: float) -> None:
     """Of a sine of 0.5 Hz at 100 Hz; 97 differences tell the deviation to 30 %."""
     system = OBSERVERS["signature_track"]()
-    p, x = system.unpack_parameters(system.start_parameters()), system.start_state()
+    p, x = system.unpack_parameters(system.start_parameters()), system.unpack_states(system.start_state())
     rng = np.random.default_rng(2)
     for k in range(900):
         u = system.unpack_inputs(np.array([np.sin(0.01 * np.pi * k) + deviation * rng.standard_normal()]))
-        x = system.jump("sampling", 0.01 * k, x, u, p)
+        x = x._replace(**system.jump("sampling", 0.01 * k, x, u, p))
     told = system.output(9.0, x, u, p)
     assert abs(told["noise"] - deviation) < 0.3 * deviation + 1e-5
     assert told["noisy"] == (told["ready"] if deviation > 0.003 else 0.0)
@@ -313,13 +314,13 @@ def _effect(system: HybridSystem, start: object, changed: object) -> bool:
     """Whether outputs after some samples of a moving signal differ."""
     told = []
     for p in (start, changed):
-        x = system.start_state()
+        x = system.unpack_states(system.start_state())
         for k in range(12):
             u = system.unpack_inputs(np.full(len(system.inputs), 0.6 + 0.3 * np.sin(0.03 * k)))
             with np.errstate(
                 invalid="ignore", divide="ignore"
             ):  # until the window is full it holds no biomass, and is not looked up
-                x = system.jump(system.events[0].name, 0.0, x, u, p)
+                x = x._replace(**system.jump(system.events[0].name, 0.0, x, u, p))
         told.append(np.hstack(list(system.output(0.0, x, u, p).values())))
     return bool((told[0] != told[1]).any())
 
@@ -358,11 +359,11 @@ def test_until_the_window_is_full_the_model_runs_alone() -> None:
     states = {}
     for gain in (0.0, 5.0):
         p = parameters(observer, gain=gain)
-        x, states[gain] = observer.start_state(), []
+        x, states[gain] = observer.unpack_states(observer.start_state()), []
         for sample in (1.0, 1.01, 1.02, 1.03):
             u = observer.unpack_inputs(np.array([sample]))
-            x = observer.jump("sampling", 0.0, x, u, p)
-            states[gain].append(x[:2].copy())
+            x = x._replace(**observer.jump("sampling", 0.0, x, u, p))
+            states[gain].append(np.array(x[:2]))
             full = observer.output(0.0, x, u, p)["window_full"]
         assert full == 1.0
     same = [bool((a == b).all()) for a, b in zip(*states.values(), strict=True)]
@@ -374,10 +375,10 @@ def test_most_windows_beyond_the_table_are_warned_of() -> None:
     warning = next(s for s in observer.outputs if s.name == "mostly_outside").warning
     assert warning is not None
     assert "tabulated" in warning.text
-    x, p = observer.start_state(), parameters(observer)
+    x, p = observer.unpack_states(observer.start_state()), parameters(observer)
     for k in range(6):
         u = observer.unpack_inputs(np.array([100.0 * (-1.0) ** k]))
-        x = observer.jump("sampling", 0.0, x, u, p)
+        x = x._replace(**observer.jump("sampling", 0.0, x, u, p))
     told = observer.output(0.0, x, observer.unpack_inputs(np.zeros(1)), p)
     assert (told["window_count"], told["mostly_outside"]) == (4.0, 1.0)
 

@@ -106,7 +106,7 @@ class CascadeSignature(SignatureObserver):
         """The printed constants."""
         return self._model(*self._constants, p.sample_period)
 
-    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
         """x2 by envelopes, then x1 by median lines, then x3 by chords."""
         first, *middle, last, distances = self._read(past[0])
         point, chord, nodes = 0.5 * (middle[0] + middle[1]), last - first, self.nodes

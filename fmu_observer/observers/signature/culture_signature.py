@@ -131,7 +131,7 @@ class CultureSignature(SignatureObserver):
             offs.append(np.abs(np.sum(lacks)) / (RUN_ERROR * np.maximum(size, 1e-300)))
         return {"nominal run": np.max(np.stack(offs))}
 
-    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
         """Glycerol and enzyme at the oldest sample, of its biomass and the light of the window."""
         X = past[0][0]
         target = self.properties(past[1], p.regularisation)

@@ -115,7 +115,7 @@ class OscillatorSignature(SignatureObserver):
         points = self.points(window, ORDER, p.regularisation)
         return points[0][0], points[1][0]
 
-    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
         """Both states by (4.6.5)."""
         count = len(self.nodes[0])
         xi, eta = (np.reshape(p.table[i * count**2 : (i + 1) * count**2], (count, count)) for i in range(2))

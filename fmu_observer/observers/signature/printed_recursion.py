@@ -4,11 +4,11 @@ recursion of the tips, which says where a curve has gone round.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from fmu_observer.observers.signature.tip_recursion import Tips, next_tips
+from fmu_observer.observers.signature.tip_recursion import next_tips
 from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 
@@ -31,58 +31,40 @@ PRINTED_MEMORY: tuple[Signal, ...] = (
 )
 
 
-class Printed(NamedTuple):
-    """Values of `PRINTED_MEMORY`, in their order."""
-
-    ordinate: Array
-    tip_ordinate: Array
-    near: Array
-    near_before: Array
-    short_abscissa: Array
-    short_ordinate: Array
-    short_earlier: Array
-    bend: Array
-    bend_at: Array
-    bend_before: Array
-    bend_at_before: Array
-
-
 def next_printed(
-    m: Tips, q: Printed, long_point: tuple[Array, Array], short_point: tuple[Array, Array], patience: Array
-) -> tuple[Tips, Printed]:
+    x: Any, long_point: tuple[Array, Array], short_point: tuple[Array, Array], patience: Array
+) -> dict[str, Array]:
     """Memory after a sample, with the properties by the printed formulas.
 
     ``|S_y - y*| < 0.01`` asks for the ordinate of a tip that is still to come; here it is that of the last one.
 
     Args:
-        m: tips before. q: the rest before. long_point: abscissa and ordinate of the new point of S1. short_point: of
+        x: before, by name. long_point: abscissa and ordinate of the new point of S1. short_point: of
             S2. patience: samples without a tip after which the count begins anew.
     """
-    tips = next_tips(m, long_point[0], short_point[0], patience)
-    tip = tips.since_tip < 0.5
-    near = np.where(np.abs(long_point[1] - q.tip_ordinate) < TOLERANCE, np.minimum(q.near, long_point[0]), q.near)
-    bend = short_point[1] - 2.0 * q.short_ordinate + q.short_earlier
-    sharper = bend > q.bend
-    best, best_at = np.where(sharper, bend, q.bend), np.where(sharper, q.short_abscissa, q.bend_at)
-    rest = Printed(
-        long_point[1],
-        np.where(tip, q.ordinate, q.tip_ordinate),
-        np.where(tip, m.before, near),
-        np.where(tip, near, q.near_before),
-        short_point[0],
-        short_point[1],
-        q.short_ordinate,
-        np.where(tip, FLAT, best),
-        np.where(tip, q.short_abscissa, best_at),
-        np.where(tip, best, q.bend_before),
-        np.where(tip, best_at, q.bend_at_before),
-    )
-    top = np.maximum(m.before, m.last_tip)
-    nearest = np.minimum(near, q.near_before)
-    low = np.minimum(m.lowest, m.lowest_before)
-    at_bend = np.where(best > q.bend_before, best_at, q.bend_at_before)
-    return tips._replace(
-        length=np.where(tip, 0.5 * (top + nearest) - low, m.length),
-        short_tip=np.where(tip, at_bend, m.short_tip),
-        gap=np.where(tip, top - nearest, m.gap),
-    ), rest
+    tips = next_tips(x, long_point[0], short_point[0], patience)
+    tip = tips["since_tip"] < 0.5
+    near = np.where(np.abs(long_point[1] - x.tip_ordinate) < TOLERANCE, np.minimum(x.near, long_point[0]), x.near)
+    bend = short_point[1] - 2.0 * x.short_ordinate + x.short_earlier
+    sharper = bend > x.bend
+    best, best_at = np.where(sharper, bend, x.bend), np.where(sharper, x.short_abscissa, x.bend_at)
+    top = np.maximum(x.abscissa_before, x.last_tip)
+    nearest = np.minimum(near, x.near_before)
+    low = np.minimum(x.lowest, x.lowest_before)
+    at_bend = np.where(best > x.bend_before, best_at, x.bend_at_before)
+    return tips | {
+        "ordinate_before": long_point[1],
+        "tip_ordinate": np.where(tip, x.ordinate_before, x.tip_ordinate),
+        "near": np.where(tip, x.abscissa_before, near),
+        "near_before": np.where(tip, near, x.near_before),
+        "short_abscissa": short_point[0],
+        "short_ordinate": short_point[1],
+        "short_earlier": x.short_ordinate,
+        "bend": np.where(tip, FLAT, best),
+        "bend_at": np.where(tip, x.short_abscissa, best_at),
+        "bend_before": np.where(tip, best, x.bend_before),
+        "bend_at_before": np.where(tip, best_at, x.bend_at_before),
+        "held_length": np.where(tip, 0.5 * (top + nearest) - low, x.held_length),
+        "held_short_tip": np.where(tip, at_bend, x.held_short_tip),
+        "held_gap": np.where(tip, top - nearest, x.held_gap),
+    }

@@ -139,7 +139,7 @@ class ReactionSignature(SignatureObserver):
         offs.append(np.abs(first[count - 1] - np.sum(made[0]) / count) / sizes[0])
         return {"table": np.max(np.stack(offs))}
 
-    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
         """The state for each candidate of the rate, and the candidate that fits the window best."""
         states, residuals = self.search(past[0], p)
         best = best_candidate(self.rates, residuals)
@@ -147,8 +147,7 @@ class ReactionSignature(SignatureObserver):
             interpolated(self.rates, values, best.values)
             for values in (states.values[0], states.values[1], np.minimum(states.outside, 1e3))
         ]
-        before = x[self._places["estimated_rate"]]
-        smoothed = (before + p.gain * best.values) / (1.0 + p.gain)
+        smoothed = (x.estimated_rate + p.gain * best.values) / (1.0 + p.gain)
         return Inverted(np.stack(chosen[:2]), np.maximum(chosen[2], best.outside), (smoothed, best.values))
 
     def search(self, window: Array, p: Any) -> tuple[Found, Array]:

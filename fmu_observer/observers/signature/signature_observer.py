@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.signatures.blending import blended
 from fmu_observer.signatures.pencil import NextScaling, pencil_point
@@ -24,7 +25,6 @@ from plant_models.hybrid import (
     memory,
     output_signal,
     parameter,
-    scalar_names,
     vector,
 )
 from plant_models.hybrid.integration import rk4_step
@@ -80,6 +80,7 @@ class SignatureObserver(HybridSystem):
     are estimated it overrides `model_parameters`.
     """
 
+    by_name = True
     internal_step = 0.1  # nothing flows between samples
     plant: NoisyPlant
     window: int
@@ -106,29 +107,26 @@ class SignatureObserver(HybridSystem):
             known: names of parameters of the plant that are not parameters of the observer.
         """
         self.plant, self.window, self.scaling = plant, window, scaling
-        named = plant.plain_outputs[: len(plant.moving)]
+        self._named = named = plant.plain_outputs[: len(plant.moving)]
         measured = plant.outputs[len(plant.plain_outputs) :]
-        self.state_names = tuple(s.name for s in named)
-        self.measured_names = tuple(s.name for s in measured)
+        self._measured = tuple(s.name for s in measured)
         pairs = list(zip(plant.moving, named, strict=True))
         self.states = (*_remembered(pairs, measured, window), *own_memory)
         self.inputs = tuple(input_signal(s.name, s.unit, 0.0, s.description) for s in measured)
         self.outputs = (*_told(named), *own_outputs)
-        self._own_outputs = tuple(s.name for s in own_outputs)
+        self._own_memory, self._own_outputs = tuple(own_memory), tuple(own_outputs)
         self.parameters = (*_settings(plant, known, gain, eps), *own_parameters)
         self.events = (PeriodicEvent("sampling", "sample_period", description="A sample is read"),)
-        self._places = {
-            s.name: i for s, i in zip(self.states, np.cumsum([0, *(s.width for s in self.states)]), strict=False)
-        }
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
         """State at the oldest sample of the window.
 
         Args:
-            past: samples of each measurement, the oldest first, shape (N_O,) each. x: memory before. p: parameters.
+            past: samples of each measurement, the oldest first, shape (N_O,) each. x: memory before, by name. p:
+                parameters.
         """
 
     def table_errors(self, p: Any) -> dict[str, Array]:
@@ -213,46 +211,44 @@ class SignatureObserver(HybridSystem):
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Move the window on, invert its signature, blend; shape of the state."""
-        n, width = len(self.state_names), self.window
-        held, windows, outsides, share, long, own = self._counts(x)
-        past = []
-        for i, name in enumerate(self.measured_names):
-            first = 2 * n + i * width
-            past.append(np.hstack([x[first + 1 : first + width], np.stack([getattr(u, name) + 0.0 * held])]))
-        count = np.minimum(held + 1.0, float(width))
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Move the window on, invert its signature, blend."""
+        width, own = self.window, self._own(x)
+        past = {name: np.hstack([getattr(x, f"past_{name}")[1:], vector(getattr(u, name))]) for name in self._measured}
+        count = np.minimum(x.samples_held + 1.0, float(width))
         full = np.where(count > width - 0.5, 1.0, 0.0)
-        ahead = np.where(held > 0.5, self.moved(x[:n], 1, self.model_parameters(own, p))[-1], x[:n])
-        told = self.inverted(past, x, p)
+        before = stacked_of(x, self._named, "estimated_")
+        ahead = np.where(x.samples_held > 0.5, self.moved(before, 1, self.model_parameters(own, p))[-1], before)
+        told = self.inverted([*past.values()], x, p)
         now = self.adopted(self.brought(told.state, width - 1, self.model_parameters(told.own, p)), u)
-        estimate = blended(ahead, now, p.gain, full)
-        shown = np.where(full > 0.5, now, ahead)
-        beyond = full * np.where(told.outside > OUTSIDE_CELLS, 1.0, 0.0)
-        share = share + full * (beyond - share) / np.minimum(windows + 1.0, RECENT)  # of all, then of the last
-        long = np.where(windows > RECENT, np.where(share > 0.5, 1.0, long), long)
-        kept = [np.where(full > 0.5, new, old) for new, old in zip(told.own, own, strict=True)]
-        return vector(
-            *(estimate[i] for i in range(n)),
-            *(shown[i] for i in range(n)),
-            *(samples[i] for samples in past for i in range(width)),
-            count,
-            windows + full,
-            outsides + beyond,
-            share,
-            long,
-            *kept,
-        )
+        windows, beyond = x.windows_inverted, full * np.where(told.outside > OUTSIDE_CELLS, 1.0, 0.0)
+        share = x.share_outside + full * (beyond - x.share_outside) / np.minimum(windows + 1.0, RECENT)  # all, or last
+        long = np.where(windows > RECENT, np.where(share > 0.5, 1.0, x.long_outside), x.long_outside)
+        kept = (np.where(full > 0.5, new, old) for new, old in zip(told.own, own, strict=True))
+        return {
+            **named_as(self._named, blended(ahead, now, p.gain, full), "estimated_"),
+            **named_as(self._named, np.where(full > 0.5, now, ahead), "looked_up_"),
+            **{f"past_{name}": samples for name, samples in past.items()},
+            "samples_held": count,
+            "windows_inverted": windows + full,
+            "windows_outside": x.windows_outside + beyond,
+            "share_outside": share,
+            "long_outside": long,
+            **named_as(self._own_memory, kept),
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, what the signature alone gives, and how often it lay beyond the table."""
-        n = len(self.state_names)
-        held, windows, outsides, _, long, own = self._counts(x)
-        values = {name: x[i] for i, name in enumerate(self.state_names)}
-        values |= {f"{name}_look_up": x[n + i] for i, name in enumerate(self.state_names)}
-        values |= {"window_full": np.where(held > self.window - 0.5, 1.0, 0.0), "window_count": windows}
-        values |= {"outside_count": outsides, "mostly_outside": np.where(outsides > 0.5 * windows, 1.0, long)}
-        return values | dict(zip(self._own_outputs, own, strict=True))
+        windows, outsides = x.windows_inverted, x.windows_outside
+        return {
+            **{s.name: getattr(x, f"estimated_{s.name}") for s in self._named},
+            **{f"{s.name}_look_up": getattr(x, f"looked_up_{s.name}") for s in self._named},
+            "window_full": np.where(x.samples_held > self.window - 0.5, 1.0, 0.0),
+            "window_count": windows,
+            "outside_count": outsides,
+            "mostly_outside": np.where(outsides > 0.5 * windows, 1.0, x.long_outside),
+            **named_as(self._own_outputs, self._own(x)),
+        }
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters are finite and within their bounds, and tables are those of the other parameters."""
@@ -277,11 +273,9 @@ class SignatureObserver(HybridSystem):
         self.parameters = tuple(replace(s, start=start) if s.name == "table" else s for s in self.parameters)
         self.__dict__.pop("parameter_signals", None)
 
-    def _counts(self, x: Array) -> tuple[Array, Array, Array, Array, Array, list[Array]]:
-        """Samples held, windows, those outside, the recent share of these, whether it was large, and the own memory."""
-        first = self._places["samples_held"]
-        held, windows, outsides, share, long = (x[first + i] for i in range(5))
-        return held, windows, outsides, share, long, [x[i] for i in range(first + 5, len(scalar_names(self.states)))]
+    def _own(self, x: Any) -> list[Array]:
+        """Values of the subclass' own memory."""
+        return [getattr(x, s.name) for s in self._own_memory]
 
 
 def _settings(plant: NoisyPlant, known: Sequence[str], gain: float, eps: float) -> tuple[Signal, ...]:

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.observers.signature.printed_recursion import PRINTED_MEMORY, Printed, next_printed
-from fmu_observer.observers.signature.tip_recursion import CYCLES, TIP_MEMORY, Tips, next_tips
+from fmu_observer.observers.signature.printed_recursion import PRINTED_MEMORY, next_printed
+from fmu_observer.observers.signature.tip_recursion import CYCLES, TIP_MEMORY, next_tips
 from fmu_observer.signatures.pencil import NextScaling, pencil_point
 from plant_models.hybrid import (
     HybridSystem,
@@ -59,6 +59,7 @@ class SignatureTrack(HybridSystem):
     name = "signature_track"
     description = "Signature properties of an oscillating signal, and which parameter has changed"
     source = "Omar 2012, (2.3.1)-(2.3.6), section 2.5; detection of the tips ours"
+    by_name = True
     internal_step = 1e-2
     inputs = (input_signal("signal", "1", 0.0, "The signal"),)
     outputs = (
@@ -145,54 +146,49 @@ class SignatureTrack(HybridSystem):
         )
         return super().requirements(p) | {text: 1.0 - shipped * other}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A sample gives one point to each signature."""
         count, short = self.orders
-        past, taken = x[:count], x[count]
+        past = x.samples
         long_point = pencil_point(past, u.signal, p.eps, self.next_scaling)
         short_point = pencil_point(past[count - short :], u.signal, p.eps, self.next_scaling)
-        full = taken > count - 0.5
-        tips, patience = self._tips(x), p.patience / p.sample_period
+        patience = p.patience / p.sample_period
         if self.reading == "repaired":
-            rest = [*next_tips(tips, long_point[0], short_point[0], patience)]
+            found = next_tips(x, long_point[0], short_point[0], patience)
         else:
-            begin = count + 1 + len(TIP_MEMORY)
-            printed = Printed(*(x[begin + i] for i in range(len(PRINTED_MEMORY))))
             points = ((long_point[0], long_point[1]), (short_point[0], short_point[1]))
-            found = next_printed(tips, printed, *points, patience)
-            rest = [*found[0], *found[1]]
-        kept = (np.where(full, new, x[count + 1 + i]) for i, new in enumerate(rest))
-        return vector(*(past[i] for i in range(1, count)), u.signal, np.minimum(taken + 1.0, 1.0 * count), *kept)
+            found = next_printed(x, *points, patience)
+        full = x.taken > count - 0.5
+        return {
+            "samples": np.hstack([past[1:], vector(u.signal)]),
+            "taken": np.minimum(x.taken + 1.0, 1.0 * count),
+            **{name: np.where(full, new, getattr(x, name)) for name, new in found.items()},
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Properties and verdict."""
-        m = self._tips(x)
-        ready = np.where(m.tips > CYCLES - 0.5, 1.0, 0.0)
-        past = x[: self.orders[0]]
+        ready = np.where(x.tips > CYCLES - 0.5, 1.0, 0.0)
+        past = x.samples
         third = past[3:] - 3.0 * past[2:-1] + 3.0 * past[1:-2] - past[:-3]  # white noise: 20 times its variance
         noise = np.sqrt(np.sum(third * third) / (20.0 * max(self.orders[0] - 3, 1)))
         return {
-            "length": m.length,
-            "short_tip": m.short_tip,
-            "gap": m.gap,
-            "abscissa": m.before,
+            "length": x.held_length,
+            "short_tip": x.held_short_tip,
+            "gap": x.held_gap,
+            "abscissa": x.abscissa_before,
             "ready": ready,
             "noise": noise,
             "noisy": np.where(noise > p.noise_limit, ready, 0.0),
-            **self._verdict(m, ready, p),
+            **self._verdict(x, ready, p),
         }
 
-    def _verdict(self, m: Tips, ready: Array, p: Any) -> dict[str, Array]:
-        change = np.abs(m.length - p.nominal_length)
-        second = np.abs(m.short_tip - p.nominal_short_tip) > p.short_tip_change
+    def _verdict(self, x: Any, ready: Array, p: Any) -> dict[str, Array]:
+        change = np.abs(x.held_length - p.nominal_length)
+        second = np.abs(x.held_short_tip - p.nominal_short_tip) > p.short_tip_change
         first = np.where(second, change - p.strong_change, change - p.length_change) > 0.0
-        third = np.abs(m.gap - p.nominal_gap) > p.gap_change
+        third = np.abs(x.held_gap - p.nominal_gap) > p.gap_change
         return {
             "p1_changed": ready * np.where(first, 1.0, 0.0),
             "p2_changed": ready * np.where(second, 1.0, 0.0),
             "p3_changed": ready * np.where(third, 1.0, 0.0),
         }
-
-    def _tips(self, x: Array) -> Tips:
-        begin = self.orders[0] + 1
-        return Tips(*(x[begin + i] for i in range(len(TIP_MEMORY))))

@@ -4,7 +4,7 @@ numbers of memory. Pure functions that trace.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,54 +32,36 @@ TIP_MEMORY: tuple[Signal, ...] = (
 )
 
 
-class Tips(NamedTuple):
-    """Values of `TIP_MEMORY`, in their order."""
-
-    before: Array
-    earlier: Array
-    last_tip: Array
-    lowest: Array
-    lowest_before: Array
-    highest: Array
-    highest_before: Array
-    short_highest: Array
-    short_before: Array
-    tips: Array
-    since_tip: Array
-    length: Array
-    short_tip: Array
-    gap: Array
-
-
-def next_tips(m: Tips, long_abscissa: Array, short_abscissa: Array, patience: Array) -> Tips:
+def next_tips(x: Any, long_abscissa: Array, short_abscissa: Array, patience: Array) -> dict[str, Array]:
     """Memory after a sample.
 
     A tip is a local maximum of the long signature's abscissa in the upper half of its extent. Extremes are those of
     the last two ways between tips, so that both branches count.
 
     Args:
-        m: before. long_abscissa: of the new point of S1. short_abscissa: of that of S2. patience: samples without a tip
-            after which the count begins anew.
+        x: before, by name. long_abscissa: of the new point of S1. short_abscissa: of that of S2. patience: samples
+            without a tip after which the count begins anew.
     """
-    middle = 0.5 * (np.minimum(m.lowest, m.lowest_before) + np.maximum(m.highest, m.highest_before))
-    tip = (m.before > m.earlier) * (m.before >= long_abscissa) * (m.before > middle)
-    lowest = np.minimum(m.lowest, m.lowest_before)
-    length = 0.5 * (m.before + m.last_tip) - lowest
-    lost = m.since_tip >= patience
-    kept = np.where(lost, 0.0, m.tips)
-    return Tips(
-        long_abscissa,
-        m.before,
-        np.where(tip, m.before, m.last_tip),
-        np.where(tip, long_abscissa, np.minimum(m.lowest, long_abscissa)),
-        np.where(tip, m.lowest, m.lowest_before),
-        np.where(tip, long_abscissa, np.maximum(m.highest, long_abscissa)),
-        np.where(tip, m.highest, m.highest_before),
-        np.where(tip, short_abscissa, np.maximum(m.short_highest, short_abscissa)),
-        np.where(tip, m.short_highest, m.short_before),
-        np.where(tip, kept + 1.0, kept),
-        np.where(tip, 0.0, np.where(lost, 0.0, m.since_tip + 1.0)),
-        np.where(tip, length, m.length),
-        np.where(tip, np.maximum(m.short_highest, m.short_before), m.short_tip),
-        np.where(tip, np.abs(m.before - m.last_tip), m.gap),
-    )
+    before = x.abscissa_before
+    lowest = np.minimum(x.lowest, x.lowest_before)
+    middle = 0.5 * (lowest + np.maximum(x.highest, x.highest_before))
+    tip = (before > x.abscissa_earlier) * (before >= long_abscissa) * (before > middle)
+    length = 0.5 * (before + x.last_tip) - lowest
+    lost = x.since_tip >= patience
+    kept = np.where(lost, 0.0, x.tips)
+    return {
+        "abscissa_before": long_abscissa,
+        "abscissa_earlier": before,
+        "last_tip": np.where(tip, before, x.last_tip),
+        "lowest": np.where(tip, long_abscissa, np.minimum(x.lowest, long_abscissa)),
+        "lowest_before": np.where(tip, x.lowest, x.lowest_before),
+        "highest": np.where(tip, long_abscissa, np.maximum(x.highest, long_abscissa)),
+        "highest_before": np.where(tip, x.highest, x.highest_before),
+        "short_highest": np.where(tip, short_abscissa, np.maximum(x.short_highest, short_abscissa)),
+        "short_before": np.where(tip, x.short_highest, x.short_before),
+        "tips": np.where(tip, kept + 1.0, kept),
+        "since_tip": np.where(tip, 0.0, np.where(lost, 0.0, x.since_tip + 1.0)),
+        "held_length": np.where(tip, length, x.held_length),
+        "held_short_tip": np.where(tip, np.maximum(x.short_highest, x.short_before), x.held_short_tip),
+        "held_gap": np.where(tip, np.abs(before - x.last_tip), x.held_gap),
+    }

@@ -40,6 +40,7 @@ class WheelSignature(HybridSystem):
     name = "wheel_signature"
     description = "Jams and skids of the odometer's wheel from the signature of its record"
     source = "Omar 2012, sections 2.3 and 3.4, for the record of an odometer; classes trained on synthetic trains"
+    by_name = True
     internal_step = 1e-2
     inputs = (input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),)
     outputs = (
@@ -75,30 +76,30 @@ class WheelSignature(HybridSystem):
         kept = np.where(np.abs(p.odometer_period - TRAINED_PERIOD) < 1e-6, 1.0, 0.0)
         return super().requirements(p) | within_bounds(self.parameters, p) | {trained: kept}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A reading is judged."""
-        last, taken, kind, before, held = (x[CHANGES + i] for i in range(5))
-        change = np.where(taken > 0.5, u.odometer - last, 0.0)
-        record = [*(x[i] for i in range(1, CHANGES)), change]
+        taken, kind = x.readings, x.told_kind
+        change = np.where(taken > 0.5, u.odometer - x.last_reading, 0.0)
+        record = [*x.changes[1:], change]
         told = np.where(taken > CHANGES - 0.5, record_class(WHEEL_CLASSES, record), 0.0)
-        acts = np.where(told == before, 0.0, told)
+        acts = np.where(told == x.told_change, 0.0, told)
         kept = np.where(acts * kind == 0.0, np.where(kind == 0.0, acts, kind), np.where(acts == kind, kind, 0.0))
-        time = np.where(kept == 0.0, 0.0, np.where(kept == kind, held + p.odometer_period, 0.0))
+        time = np.where(kept == 0.0, 0.0, np.where(kept == kind, x.held_time + p.odometer_period, 0.0))
         over = time > p.hold_limit
         record[-1] = np.where(told == 0.0, change, record[-2])
-        return vector(
-            *record,
-            u.odometer,
-            np.minimum(taken + 1.0, 1.0 * CHANGES),
-            np.where(over, 0.0, kept),
-            told,
-            np.where(over, 0.0, time),
-        )
+        return {
+            "changes": vector(*record),
+            "last_reading": u.odometer,
+            "readings": np.minimum(taken + 1.0, 1.0 * CHANGES),
+            "told_kind": np.where(over, 0.0, kept),
+            "told_change": told,
+            "held_time": np.where(over, 0.0, time),
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Verdict, kind, class of the newest record, and how long the fault has been told."""
-        kind = x[CHANGES + 2]
-        return {"odometer_fault": np.abs(kind), "kind": kind, "change": x[CHANGES + 3], "fault_time": x[CHANGES + 4]}
+        told = {"kind": x.told_kind, "change": x.told_change, "fault_time": x.held_time}
+        return {"odometer_fault": np.abs(x.told_kind)} | told
 
 
 def record_class(classes: SignatureClassifier, record: Sequence[Array]) -> Array:
