@@ -20,7 +20,6 @@ floor it never exceeds ``1 / floor``. H has a 1 for each constant that is learnt
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -149,13 +148,13 @@ def adaptation_states(
     n, m, q = sizes[:3]
 
     def triangle(name: str, first: np.ndarray, description: str) -> Signal:
-        start = tuple(float(first[i, j]) for i, j in upper(len(first)))
-        return state(name, "1", start, f"{description}, upper triangle row by row", size=len(start))
+        text = f"{description}, upper triangle row by row"
+        return state(name, "1", first, text, shape=first.shape, symmetric=True)
 
-    sampled = state("seen_sensitivity", "1", (0.0,) * (q * m), "Sensitivity chi of the innovation", size=q * m)
+    sampled = state("seen_sensitivity", "1", 0.0, "Sensitivity chi of the innovation", shape=(q, m))
     return (
         triangle("adaptation_gain", gain * np.eye(m), "Adaptation gain R"),
-        state("sensitivity", "1", (0.0,) * (n * m), "Sensitivity lambda of the state, row by row", size=n * m),
+        state("sensitivity", "1", 0.0, "Sensitivity lambda of the state, row by row", shape=(n, m)),
         *((sampled,) if sizes.sampled else ()),
         triangle("inverse_s", inverse_s * np.eye(n), "Inverse of S, of which the state's gain is made"),
         triangle("mean_excitation", np.zeros((m, m)), "Mean Gramian of the excitation over its window"),
@@ -163,22 +162,14 @@ def adaptation_states(
     )
 
 
-def adaptation_of(x: Array, C: Array, sizes: Sizes) -> tuple[Adaptation, int]:
-    """An adaptation from its states, and how many they are.
+def adaptation_of(x: Any, C: Array, sizes: Sizes) -> Adaptation:
+    """An adaptation from its states.
 
     Args:
-        x: state of the observer from the first of these on. C: shape (q, n). sizes: see there.
+        x: states of the observer, by name. C: shape (q, n). sizes: see there.
     """
-    n, m, q = sizes[:3]
-    widths = [_triangle(m), n * m, q * m if sizes.sampled else 0, _triangle(n), _triangle(m), _triangle(sizes.error)]
-    ends = [0, *(int(end) for end in np.cumsum(widths))]
-    gain, sensitivity, seen, inverse, excitation, covariance = (x[a:b] for a, b in pairwise(ends))
-    L = _matrix([[sensitivity[i * m + j] for j in range(m)] for i in range(n)])
-    chi = _matrix([[seen[i * m + j] for j in range(m)] for i in range(q)]) if sizes.sampled else C @ L
-    adaptation = Adaptation(
-        unpacked(gain, m), L, chi, unpacked(inverse, n), unpacked(excitation, m), unpacked(covariance, sizes.error)
-    )
-    return adaptation, ends[-1]
+    seen = x.seen_sensitivity if sizes.sampled else C @ x.sensitivity
+    return Adaptation(x.adaptation_gain, x.sensitivity, seen, x.inverse_s, x.mean_excitation, x.error_covariance)
 
 
 def gains_of(adaptation: Adaptation, C: Array, learnt: Array) -> Gains:
@@ -196,29 +187,26 @@ def gains_of(adaptation: Adaptation, C: Array, learnt: Array) -> Gains:
 
 def adaptation_flow(
     adaptation: Adaptation, plant: Plant, gains: Gains, error_drift: Array, mu: Array, p: Any, sizes: Sizes
-) -> list[Array]:
-    """Derivatives of the states of an adaptation, in their order.
+) -> dict[str, Array]:
+    """Derivatives of the states of an adaptation.
 
     Args:
         adaptation: see there. plant: matrices now. gains: in force. error_drift: see `error_drift`. mu: decay of S
             [1/s]. p: named tuple with `forgetting` [1/s], `gain_floor` and `excitation_time` [s]. sizes: see there.
     """
-    n, m, q = sizes[:3]
     R, L, seen, Z, E, V = adaptation
     A, C = plant.A, plant.C
     gramian = seen.T @ seen
-    floor = p.forgetting * p.gain_floor * np.eye(m)
-    dL = A @ L - gains.state @ seen + plant.Phi
-    dseen = -(C @ gains.state) @ seen
+    floor = p.forgetting * p.gain_floor * np.eye(sizes.m)
     FV = error_drift @ V
-    return [
-        packed(p.forgetting * R - R @ (gramian + floor) @ R, m),
-        vector(*(dL[i, j] for i in range(n) for j in range(m))),
-        *([vector(*(dseen[i, j] for i in range(q) for j in range(m)))] if sizes.sampled else []),
-        packed(mu * Z + A @ Z + Z @ A.T - gains.state @ gains.state.T, n),
-        packed((gramian - E) / p.excitation_time, m),
-        packed(FV + FV.T + plant.noise, sizes.error),
-    ]
+    return {
+        "adaptation_gain": p.forgetting * R - R @ (gramian + floor) @ R,
+        "sensitivity": A @ L - gains.state @ seen + plant.Phi,
+        **({"seen_sensitivity": -(C @ gains.state) @ seen} if sizes.sampled else {}),
+        "inverse_s": mu * Z + A @ Z + Z @ A.T - gains.state @ gains.state.T,
+        "mean_excitation": (gramian - E) / p.excitation_time,
+        "error_covariance": FV + FV.T + plant.noise,
+    }
 
 
 def error_drift(plant: Plant, gains: Gains, sizes: Sizes, predicts: bool) -> Array:
@@ -240,22 +228,6 @@ def error_drift(plant: Plant, gains: Gains, sizes: Sizes, predicts: bool) -> Arr
     top = np.hstack([model, -gains.total])
     middle = np.hstack([none, -gains.constants])
     return np.vstack([top, middle, np.zeros((q, n + m + q))])
-
-
-def seen_after(before: Array, first: int, C: Array, sizes: Sizes) -> Array:
-    """States of an adaptation with chi at ``C lambda``, as at a sample.
-
-    Args:
-        before: states of the observer. first: place of the first of the adaptation. C: shape (q, n). sizes: see there.
-    """
-    if not sizes.sampled:
-        return before
-    n, m, q = sizes[:3]
-    at = first + _triangle(m)
-    L = _matrix([[before[at + i * m + j] for j in range(m)] for i in range(n)])
-    chi = C @ L
-    at += n * m
-    return np.hstack([before[:at], *(chi[i, j] for i in range(q) for j in range(m)), before[at + q * m :]])
 
 
 def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes, predicts: bool) -> Array:
@@ -346,10 +318,6 @@ def smallest_eigenvalue(E: Array, size: int) -> Array:
     )
     angle = np.arccos(np.clip(half, -NEARLY_ONE, NEARLY_ONE)) / 3.0
     return mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)
-
-
-def _triangle(size: int) -> int:
-    return size * (size + 1) // 2
 
 
 def _matrix(rows: list[list[Array]]) -> Array:

@@ -43,10 +43,10 @@ class AdaptiveHold(AdaptiveObserver):
         q = self.sizes.q
         return memory("held_innovation", "1", (0.0,) * q, "Innovation at the last sample", size=q)
 
-    def acting(self, x: Array) -> Array:
+    def acting(self, x: Any) -> Array:
         """The held innovation, shape (q,)."""
-        return self.kept(x)
+        return x.held_innovation
 
-    def kept_after(self, x: Array, y: Array) -> Array:
-        """``C xh - y``, shape (q,)."""
-        return self.model.C @ self.estimates(x) - y
+    def kept_after(self, x: Any, y: Array) -> dict[str, Array]:
+        """``C xh - y``."""
+        return {"held_innovation": self.model.C @ self.estimates(x) - y}

@@ -16,7 +16,7 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.adaptive_certificate import (
     HORIZON,
     LEFT,
@@ -36,8 +36,6 @@ from fmu_observer.observers.adaptive_law import (
     error_drift,
     gains_of,
     learnt_constants,
-    packed,
-    seen_after,
     smallest_eigenvalue,
     start_covariance,
 )
@@ -65,7 +63,7 @@ ADAPTIVE_PARAMETERS = (
 class AdaptiveObserver(GatedObserver, GapCertified):
     """Base of the observers of state and unknown constants at once: Hann 2014, chapter 4.
 
-    The state is laid out as estimates, constants, adaptation (`adaptive_law.adaptation_states`), then what a subclass
+    States are the estimates, the constants, the adaptation (`adaptive_law.adaptation_states`), and what a subclass
     keeps of the measurements, q numbers. Outputs are the estimates and the constants under their names, for each
     constant `<name>_deviation`, the standard deviation of its error, and `<name>_learnt`, 1 where it is learnt and 0
     where it is held for want of excitation; `smallest_excitation`, the smallest eigenvalue of the mean of
@@ -82,6 +80,7 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         ValueError: the model is unknown, or has more than three unknown constants.
     """
 
+    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
     predicts: ClassVar[bool]
@@ -121,12 +120,12 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         """What is kept of the measurements: q predicted outputs (a state), or q held innovations (memory)."""
 
     @abstractmethod
-    def acting(self, x: Array) -> Array:
+    def acting(self, x: Any) -> Array:
         """The innovation that acts, shape (q,)."""
 
     @abstractmethod
-    def kept_after(self, x: Array, y: Array) -> Array:
-        """What is kept once the measurements y are known, shape (q,)."""
+    def kept_after(self, x: Any, y: Array) -> dict[str, Array]:
+        """What is kept once the measurements y are known, by name."""
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
@@ -134,10 +133,10 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(self.parameters[: len(ADAPTIVE_PARAMETERS) + 1], p)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, constants, adaptation, and predicted outputs where they are predicted."""
         estimate, rho, adaptation = self._parts(x)
-        known = stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        known = stacked_of(u, self.model.inputs)
         plant = Plant(
             self.model.drift(t, known), self.model.drive(t, known), self.model.regressor(t, known), self.model.C
         )
@@ -145,30 +144,28 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         c = self.acting(x)
         predicted = plant.A @ estimate + plant.B + plant.Phi @ rho
         drift = error_drift(plant, gains, self.sizes, self.predicts)
-        flows = [
-            predicted - gains.total @ c,
-            -(gains.constants @ c),
-            *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, self.sizes),
-        ]
-        return np.hstack([*flows, self.model.C @ predicted - gains.output @ c] if self.predicts else flows)
+        return {
+            **named_as(self.model.states, predicted - gains.total @ c, "estimated_"),
+            **named_as(self.model.unknowns, -(gains.constants @ c), "estimated_"),
+            **adaptation_flow(adaptation, plant, gains, drift, p.mu, p, self.sizes),
+            **({"predicted_output": self.model.C @ predicted - gains.output @ c} if self.predicts else {}),
+        }
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What is kept is set by the measurements, and the covariance with it; all else stays continuous."""
-        y = stacked(tuple(getattr(u, f"{self.model.event}_{s.name}") for s in self.model.measurements))
-        V, variance = self._parts(x)[2].covariance, p.noise_deviation**2
+        V, variance = x.error_covariance, p.noise_deviation**2
         for row in range(self.sizes.q):
             V = covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
-        count = self.sizes.error * (self.sizes.error + 1) // 2
-        before = self.own_count - self.sizes.q - count
-        own = seen_after(x[:before], self.sizes.n + self.sizes.m, self.model.C, self.sizes)
-        return np.hstack([own, packed(V, self.sizes.error), self.kept_after(x, y)])
+        seen = {"seen_sensitivity": self.model.C @ x.sensitivity} if self.sizes.sampled else {}
+        y = stacked_of(u, self.model.measurements, f"{self.model.event}_")
+        return seen | {"error_covariance": V} | self.kept_after(x, y)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, constants with their uncertainty, excitation and innovation."""
         n, m = self.sizes[:2]
         estimate, rho, adaptation = self._parts(x)
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, m)
-        found = {s.name: estimate[i] for i, s in enumerate(self.model.states)}
+        found = named_as(self.model.states, estimate)
         for j, s in enumerate(self.model.unknowns):
             variance = adaptation.covariance[n + j, n + j]
             found |= {
@@ -297,17 +294,13 @@ class AdaptiveObserver(GatedObserver, GapCertified):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def kept(self, x: Array) -> Array:
-        """The q numbers that are kept of the measurements, shape (q,)."""
-        return x[self.own_count - self.sizes.q : self.own_count]
-
-    def estimates(self, x: Array) -> Array:
+    def estimates(self, x: Any) -> Array:
         """The estimated state, shape (n,)."""
-        return x[: self.sizes.n]
+        return stacked_of(x, self.model.states, "estimated_")
 
-    def _parts(self, x: Array) -> tuple[Array, Array, Adaptation]:
-        n, m = self.sizes[:2]
-        return x[:n], x[n : n + m], adaptation_of(x[n + m :], self.model.C, self.sizes)[0]
+    def _parts(self, x: Any) -> tuple[Array, Array, Adaptation]:
+        rho = stacked_of(x, self.model.unknowns, "estimated_")
+        return self.estimates(x), rho, adaptation_of(x, self.model.C, self.sizes)
 
     def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, self.sizes.m)

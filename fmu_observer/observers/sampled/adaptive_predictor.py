@@ -60,10 +60,10 @@ class AdaptivePredictor(AdaptiveObserver):
             "predicted_output", "1", (0.0,) * self.sizes.q, "Output predicted since the last sample", size=self.sizes.q
         )
 
-    def acting(self, x: Array) -> Array:
+    def acting(self, x: Any) -> Array:
         """``C xh - w``, shape (q,)."""
-        return self.model.C @ self.estimates(x) - self.kept(x)
+        return self.model.C @ self.estimates(x) - x.predicted_output
 
-    def kept_after(self, x: Array, y: Array) -> Array:
-        """The measurements, shape (q,)."""
-        return y
+    def kept_after(self, x: Any, y: Array) -> dict[str, Array]:
+        """The measurements."""
+        return {"predicted_output": y}

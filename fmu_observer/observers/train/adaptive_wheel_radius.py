@@ -8,8 +8,6 @@ import numpy as np
 
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
 from fmu_observer.observers.adaptive_law import (
-    Adaptation,
-    Gains,
     Plant,
     Sizes,
     adaptation_flow,
@@ -18,7 +16,6 @@ from fmu_observer.observers.adaptive_law import (
     error_drift,
     gains_of,
     learnt_constants,
-    packed,
     start_covariance,
 )
 from fmu_observer.observers.gap_certified import GapCertified
@@ -26,7 +23,7 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import Signal, input_signal, matrix, memory, output_signal, parameter, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -36,8 +33,6 @@ MU, FORGETTING = 0.03, 0.003  # [1/s] [ours]
 FIRST_GAIN = 1e-4  # [1/(m2 s)] [ours], of R
 PRIOR = 0.02  # standard deviation of the wheel radius' error before any balise [ours]
 QUICKEST = 50.0  # [1/s]: no balise moves the constant faster, which keeps explicit integration stable
-P, PREDICTED, SCALE, R, L, CHI, INVERSE_S, EXCITATION = range(8)  # places of the adaptation
-ADAPTATION = R
 ADAPTIVE = (
     parameter("mu", "1/s", MU, "Rate at which the position forgets balises", min=1e-9),
     parameter("forgetting", "1/s", FORGETTING, "Rate at which the wheel radius forgets balises", min=0.0),
@@ -84,6 +79,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     name = "adaptive_wheel_radius"
     description = "Train observer that learns the error of the wheel radius from balises"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
+    by_name = True
     internal_step = 1e-2
     weighing = "itself"
     inputs: tuple[Signal, ...] = (
@@ -128,75 +124,72 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(ADAPTIVE, p)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, scale, adaptation and predicted position."""
-        adaptation = self._adaptation(x)
-        reading = _without_creep(u, p)
-        speed = reading * (1.0 + x[SCALE])
-        noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[SCALE]) ** 2
+        adaptation = adaptation_of(x, C, SIZES)
+        reading, scale = _without_creep(u, p), 1.0 + x.estimated_scale
+        speed = reading * scale
+        noise = p.odometer_deviation**2 * p.odometer_period * scale**2
         plant = Plant(np.zeros((1, 1)), reading, np.reshape(reading, (1, 1)), C, noise * DISTURBED)
-        gains = self._gains(adaptation, p)
+        gains = gains_of(adaptation, C, learnt_constants(adaptation.excitation, p.least_excitation, 1))
         moves = 1.0 - stands(0.0 * reading, reading, 3.0 * p.odometer_deviation)
         # Time at standstill makes nothing older.
         p = p._replace(forgetting=moves * p.forgetting, excitation_time=p.excitation_time / np.maximum(moves, 1e-9))
-        c = x[P] - x[PREDICTED]
+        c = x.estimated_position - x.predicted_position
         drift = error_drift(plant, gains, SIZES, True)
-        return np.hstack(
-            [
-                speed - gains.total[0, 0] * c,
-                speed - gains.output[0, 0] * c,
-                -gains.constants[0, 0] * c,
-                *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, SIZES),
-            ]
-        )
+        return {
+            "estimated_position": speed - gains.total[0, 0] * c,
+            "predicted_position": speed - gains.output[0, 0] * c,
+            "estimated_scale": -gains.constants[0, 0] * c,
+            **adaptation_flow(adaptation, plant, gains, drift, p.mu, p, SIZES),
+        }
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The predicted position is that of the balise; the first one sets the position too."""
-        used = x[self.own_count - 2]
-        first = np.where(used > 0.0, 0.0, 1.0)
-        covariance = self._adaptation(x).covariance
+        begins = x.balises_used <= 0.0
         deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
         gain, variance = gain_ratio(self.own_bound(x, p), deviation, p.balise_deviation), deviation**2
-        told = u.balise_position - p.reading_age * _without_creep(u, p) * (1.0 + x[SCALE])
-        seen = gain * x[L]
-        quickest = x[R] / (1.0 + x[R] * seen**2 / QUICKEST)
-        predicted = np.where(gain < 1.0, x[P] + gain * (told - x[P]), told)
-        later = (x[P], predicted, x[SCALE], quickest, x[L], seen, x[INVERSE_S], x[EXCITATION])
-        begun = (told, told, x[SCALE], p.first_gain, 0.0, 0.0, x[INVERSE_S], 0.0)
+        told = u.balise_position - p.reading_age * _without_creep(u, p) * (1.0 + x.estimated_scale)
+        position, R, seen = x.estimated_position, x.adaptation_gain[0, 0], gain * x.sensitivity[0, 0]
+        quickest = R / (1.0 + R * seen**2 / QUICKEST)
+        predicted = np.where(gain < 1.0, position + gain * (told - position), told)
+        covariance = x.error_covariance
         jump = np.vstack([UNMOVED, np.hstack([1.0 - gain, 0.0, 0.0])])
-        moved = packed(jump @ covariance @ jump.T + gain**2 * variance * OF_PREDICTED, SIZES.error)
-        known = packed(variance * SAME_PLACE + covariance[1, 1] * OF_SCALE, SIZES.error)
-        return vector(
-            *(np.where(first > 0.0, new, old) for new, old in zip(begun, later, strict=True)),
-            *(np.where(first > 0.0, known[i], moved[i]) for i in range(6)),
-            used + 1.0,
-            x[P] - told,
-        )
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """Position, speed and wheel radius with their uncertainty."""
-        adaptation = self._adaptation(x)
-        V = adaptation.covariance
-        scale = 1.0 + x[SCALE]
-        reading = _without_creep(u, p)
+        moved = jump @ covariance @ jump.T + gain**2 * variance * OF_PREDICTED
+        known = variance * SAME_PLACE + covariance[1, 1] * OF_SCALE
         return {
-            "position": x[P] + p.reading_age * reading * scale,
+            "estimated_position": np.where(begins, told, position),
+            "predicted_position": np.where(begins, told, predicted),
+            "adaptation_gain": matrix([np.where(begins, p.first_gain, quickest)]),
+            "sensitivity": np.where(begins, 0.0, x.sensitivity),
+            "seen_sensitivity": matrix([np.where(begins, 0.0, seen)]),
+            "mean_excitation": np.where(begins, 0.0, x.mean_excitation),
+            "error_covariance": np.where(begins, known, moved),
+            "balises_used": x.balises_used + 1.0,
+            "last_innovation": position - told,
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Position, speed and wheel radius with their uncertainty."""
+        V, scale, reading = x.error_covariance, 1.0 + x.estimated_scale, _without_creep(u, p)
+        return {
+            "position": x.estimated_position + p.reading_age * reading * scale,
             "speed": reading * scale,
-            "innovation": x[self.own_count - 1],
+            "innovation": x.last_innovation,
             "position_deviation": _root(V[0, 0]),
             "wheel_radius_error": 1.0 / scale - 1.0,
             "wheel_radius_error_deviation": _root(V[1, 1]) / scale**2,
-            "wheel_radius_learnt": learnt_constants(adaptation.excitation, p.least_excitation, 1)[0],
-            "excitation": adaptation.excitation[0, 0],
+            "wheel_radius_learnt": learnt_constants(x.mean_excitation, p.least_excitation, 1)[0],
+            "excitation": x.mean_excitation[0, 0],
         }
 
     def odometer_of(self, u: Any) -> Array:
         """The odometer [m/s]."""
         return u.odometer
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""
-        return _root(self._adaptation(x).covariance[0, 0])
+        return _root(x.error_covariance[0, 0])
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the observer that knows the wheel radius, ``d e = -mu c``, ``d c = -mu c``, ``c = e`` at a
@@ -209,14 +202,6 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
             "gaps, in cascade; noise, standstill and wheels that lock or spin are left out"
         )
         return certify_sampled_error((error,), max_gap, model)
-
-    # -- internals --------------------------------------------------------------------------------------------------
-
-    def _adaptation(self, x: Array) -> Adaptation:
-        return adaptation_of(x[ADAPTATION:], C, SIZES)[0]
-
-    def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
-        return gains_of(adaptation, C, learnt_constants(adaptation.excitation, p.least_excitation, 1))
 
 
 DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position
