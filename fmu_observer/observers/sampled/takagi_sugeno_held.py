@@ -101,7 +101,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         return ()
 
     def held_weights(self, estimate: Array, u: Any) -> dict[str, Array]:
-        """What goes into that memory at a sample."""
+        """What goes into that memory at a sample, by name, of the estimate there."""
         return {}
 
     # -- what follows -----------------------------------------------------------------------------------------------
