@@ -1,8 +1,8 @@
 """Registries: the members of one kind by name, found without importing them and loaded when they are asked for.
 
-A member is a class that states its own name, ``name = "locomotive"`` or ``check: Literal["signal"]``, in a file of one
-of the registry's rooms: a new file is a new member. Installed packages bring members by entry points, and a program
-adds its own by assignment.
+A member is a subclass of the registry's base that states its own name, ``name = "locomotive"`` or
+``check: Literal["signal"]``, in a file of one of the registry's rooms: a new file is a new member. Installed packages
+bring members by entry points, and a program adds its own by assignment.
 Standard library only.
 """
 
@@ -23,10 +23,13 @@ from typing import Any, Generic, TypeVar, cast
 T = TypeVar("T")
 LOG = logging.getLogger("plant_models")
 
-NAMED_CLASS = re.compile(
-    r'^(?:class (\w+)|    (?:name(?:: [^=\n]+)? = |check: Literal\[)((?:"[^"\n]+"(?:, )?)+))', re.M
+CLASS = re.compile(
+    r"^class (\w+)(?:\(([^)]*)\))?:|^    (?:name(?:: [^=\n]+)? = |check: Literal\[)((?:\"[^\"\n]+\"(?:, )?)+)", re.M
 )
-"""A class at the top of a file, and the name that it states; a table states it, or several, in ``check``."""
+"""A class at the top of a file with its bases, and the name that it states; a table states it, or several, in
+``check``."""
+IMPORT = re.compile(r"^(?: {4})?from ([\w.]+) import (?:\(([^)]*)\)|(.*))", re.M)
+"""Names that a file takes from another one."""
 
 
 class RegistryError(ValueError):
@@ -141,6 +144,7 @@ class Registry(MutableMapping[str, T], Generic[T]):
     def __setitem__(self, name: str, member: T) -> None:
         if not _is_member(member, self.base):
             raise RegistryError(f"the {self.kind} {name!r} is no subclass of {self.base.replace(':', '.')}.")
+        _require_whole(member, f"the {self.kind} {name!r}")
         self._own[name] = member
 
     def __delitem__(self, name: str) -> None:
@@ -159,16 +163,64 @@ class Registry(MutableMapping[str, T], Generic[T]):
     def _shipped(self) -> Iterator[Member]:
         for room in self.rooms:
             for path in files_of(room):
-                cls = ""
-                for found, names in NAMED_CLASS.findall(path.read_text(encoding="utf-8")):
-                    cls = found or cls
-                    target = f"{room}.{path.stem}:{cls}"
-                    for name in re.findall('"(.+?)"', names) if cls else ():
+                module = f"{room}.{path.stem}"
+                for cls, names in _source(module).names.items():
+                    target = f"{module}:{cls}"
+                    for name in names if _descends(module, cls, self.base) else ():
                         yield Member(name, target, f"this package ({target})", room)
 
     def _announced(self) -> Iterator[Member]:
         for entry in announced(self.group):
             yield Member(entry.name, entry.value, f"{_package(entry)} ({entry.value})")
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What the text of a file says of its classes.
+
+    Args:
+        bases: of each class at the top of the file, as they are written. names: that a class states.
+        imports: module and name by which it is known there, by the name that it has here.
+    """
+
+    bases: dict[str, tuple[str, ...]]
+    names: dict[str, tuple[str, ...]]
+    imports: dict[str, tuple[str, str]]
+
+
+@cache
+def _source(module: str) -> _Source:
+    """The classes of a module, read and not imported; a module without a file has none."""
+    top, *parts = module.split(".")
+    spec = find_spec(top)
+    place = Path(next(iter((spec.submodule_search_locations if spec is not None else None) or [""])), *parts)
+    path = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    bases: dict[str, tuple[str, ...]] = {}
+    names: dict[str, tuple[str, ...]] = {}
+    cls = ""
+    for found, listed, stated in CLASS.findall(text):
+        if found:
+            cls, bases[found] = found, tuple(re.findall(r"(?:^|, *|\n *)([\w.]+)", re.sub(r"\[[^\]]*\]", "", listed)))
+        elif cls:
+            names.setdefault(cls, tuple(re.findall('"(.+?)"', stated)))
+    imports = {}
+    for source, many, one in IMPORT.findall(text):
+        for words in (many or one).split("#")[0].split(","):
+            own, _, alias = words.strip().partition(" as ")
+            imports[alias or own] = (source, own)
+    return _Source(bases, names, imports)
+
+
+@cache
+def _descends(module: str, cls: str, base: str) -> bool:
+    """Whether a class has a base of this name, by the text of the files on the way."""
+    if f"{module}:{cls}" == base:
+        return True
+    source = _source(module)
+    if cls in source.bases:
+        return any(_descends(module, one.rpartition(".")[2], base) for one in source.bases[cls])
+    return cls in source.imports and _descends(*source.imports[cls], base)
 
 
 def announced(group: str) -> EntryPoints:
@@ -245,19 +297,33 @@ def descends_from(found: Any, base: str) -> bool:
     return any(f"{parent.__module__}:{parent.__qualname__}" == base for parent in cls.__mro__)
 
 
+def unwritten(found: Any) -> str:
+    """What an abstract class leaves to be written, in words; empty for any other one.
+
+    Args:
+        found: a class.
+    """
+    return ", ".join(f"{name}()" for name in sorted(getattr(found, "__abstractmethods__", ())))
+
+
+def _require_whole(found: Any, what: str) -> None:
+    if unwritten(found):
+        raise RegistryError(f"{what} is not complete: {found.__qualname__} has no {unwritten(found)}; write it.")
+
+
 def _load(member: Member, kind: str, base: str) -> Any:
+    what = f"the {kind} {member.name!r} of {member.origin}"
     if member.room:
-        return load(member.target)
+        found = load(member.target)
+        _require_whole(found, what)
+        return found
     try:
         found = load(member.target)
     except (Exception, SystemExit) as error:  # whatever the code of others raises while it is imported
-        raise RegistryError(
-            f"the {kind} {member.name!r} of {member.origin} cannot be loaded: {type(error).__name__}: {error}"
-        ) from error
+        raise RegistryError(f"{what} cannot be loaded: {type(error).__name__}: {error}") from error
     if not _is_member(found, base):
-        raise RegistryError(
-            f"the {kind} {member.name!r} of {member.origin} is no subclass of {base.replace(':', '.')}."
-        )
+        raise RegistryError(f"{what} is no subclass of {base.replace(':', '.')}.")
+    _require_whole(found, what)
     return found
 
 

@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any
 
 from plant_models.local_files import files_digest, local_files
-from plant_models.registry import load
+from plant_models.registry import load, unwritten
 
 _neighbours: dict[str, tuple[ModuleType, str]] = {}
 """Modules that were imported from beside a user's file as it was run, and the digest of what they rest on."""
@@ -81,7 +81,7 @@ def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
         found = _imported(name)
         if not expected.accepts(found):
             raise UserFileError(f"{name} is {_kind(found)}, no {expected.noun}.")
-        return found
+        return _whole(found, name)
     text, wanted = split_name(name)
     path = Path(folder, text)
     if not path.is_file():
@@ -90,15 +90,21 @@ def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
     own = {k: v for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__}
     fitting = [key for key, value in own.items() if expected.accepts(value)]
     if not wanted and len(fitting) == 1:
-        return own[fitting[0]]
+        return _whole(own[fitting[0]], name)
     found = getattr(module, wanted or "-", None)
     if expected.accepts(found):
-        return found
+        return _whole(found, name)
     what = f" ({wanted} is {_kind(found)})" if found is not None else ""
     raise UserFileError(
         f"{path} has no {expected.noun} named {wanted!r}{what}; it has: {', '.join(fitting) or 'none'}."
         + (f" Write {path}:Class." if fitting else "")
     )
+
+
+def _whole(found: Any, name: str) -> Any:
+    if unwritten(found):
+        raise UserFileError(f"{name} is not complete: it has no {unwritten(found)}; write it.")
+    return found
 
 
 def make(cls: type, options: Mapping[str, Any]) -> Any:

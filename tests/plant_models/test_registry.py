@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from abc import abstractmethod
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +23,7 @@ from cosim.scenario.model_name import EXPECTED
 from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from fmus.check.catalogue import CHECKS
+from fmus.check.catalogue import EXPECTED as CHECK
 from plant_models import registry
 from plant_models.registry import Registry, RegistryError
 from plant_models.user_file import UserFileError, load_class
@@ -215,3 +217,74 @@ def test_a_member_that_is_left_out_is_told_once(plugins: Registry[Any], caplog: 
     assert [text.split()[0] for text in said] == ["'thau'", "'gone'", "'wrong'"]
     with pytest.raises(RegistryError, match="the observer 'number' is no subclass of"):
         plugins["number"] = 3
+
+
+ROOM = '''
+from abc import ABC, abstractmethod
+from {package}.base import Base as Root
+
+
+class Middle(
+    Root,
+):
+    """It has no name of its own."""
+
+
+class Bare(Middle):
+    name = "bare"
+
+
+class Helper:
+    name = "helper"
+
+
+class Unfinished(Root):
+    name = "unfinished"
+
+    @abstractmethod
+    def run(self):
+        """Left out."""
+
+
+class Root2(ABC):
+    name = "no member"
+'''
+
+
+@pytest.fixture
+def own_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry[Any]:
+    """A package with a base, and a room whose file has members and classes that are none."""
+    package = f"package_of_{tmp_path.name}".replace("-", "_")
+    room = tmp_path / package / "room"
+    room.mkdir(parents=True)
+    (room / "__init__.py").write_text("", encoding="utf-8")
+    (room.parent / "__init__.py").write_text("", encoding="utf-8")
+    (room.parent / "base.py").write_text("from abc import ABC\n\n\nclass Base(ABC):\n    pass\n", encoding="utf-8")
+    (room / "things.py").write_text(ROOM.format(package=package), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return Registry("thing", [f"{package}.room"], "none", f"{package}.base:Base")
+
+
+def test_a_member_is_a_subclass_of_the_base_whatever_else_has_a_name(own_room: Registry[Any]) -> None:
+    assert list(own_room) == ["bare", "unfinished"]
+    assert own_room["bare"].__name__ == "Bare"
+
+
+def test_a_member_that_is_not_complete_is_told_with_what_it_lacks(own_room: Registry[Any]) -> None:
+    words = r"the thing 'unfinished' of this package .* is not complete: Unfinished has no run\(\); write it"
+    with pytest.raises(RegistryError, match=words):
+        own_room["unfinished"]
+    with pytest.raises(RegistryError, match="is not complete"):
+        own_room["added"] = type(own_room["bare"])(
+            "Added", (own_room["bare"],), {"run": abstractmethod(lambda _self: None)}
+        )
+    left_out: dict[str, str] = {}
+    assert list(own_room.usable(left_out.__setitem__)) == ["bare"]
+    assert "is not complete" in left_out["unfinished"]
+
+
+def test_a_check_of_a_user_without_run_is_not_blamed_on_the_fmu(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text("from fmus.check.check import Check\nclass Mine(Check):\n    name = 'mine'\n", encoding="utf-8")
+    with pytest.raises(UserFileError, match=r"mine.py:Mine is not complete: it has no run\(\); write it"):
+        load_class(f"{path}:Mine", CHECK)
