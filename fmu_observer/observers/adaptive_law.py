@@ -93,34 +93,6 @@ class Gains(NamedTuple):
     output: Array
 
 
-def upper(size: int) -> list[tuple[int, int]]:
-    """Places of an upper triangle, row by row.
-
-    Args:
-        size: of the matrix.
-    """
-    return [(i, j) for i in range(size) for j in range(i, size)]
-
-
-def packed(matrix: Array, size: int) -> Array:
-    """Upper triangle of a symmetric matrix, row by row.
-
-    Args:
-        matrix: shape (size, size). size: of the matrix.
-    """
-    return vector(*(matrix[i, j] for i, j in upper(size)))
-
-
-def unpacked(values: Array, size: int) -> Array:
-    """Symmetric matrix of its upper triangle, shape (size, size).
-
-    Args:
-        values: row by row. size: of the matrix.
-    """
-    places = {pair: k for k, pair in enumerate(upper(size))}
-    return _matrix([[values[places[min(i, j), max(i, j)]] for j in range(size)] for i in range(size)])
-
-
 def start_covariance(C: np.ndarray, deviations: Sequence[float], sizes: Sizes, predicts: bool) -> np.ndarray:
     """Covariance of the error at the start, where ``w = C xh`` and ``c = 0``, shape (n + m + q, n + m + q).
 
@@ -318,7 +290,3 @@ def smallest_eigenvalue(E: Array, size: int) -> Array:
     )
     angle = np.arccos(np.clip(half, -NEARLY_ONE, NEARLY_ONE)) / 3.0
     return mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)
-
-
-def _matrix(rows: list[list[Array]]) -> Array:
-    return np.vstack([np.hstack(row) for row in rows])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.models.model import named_as
 from fmu_observer.observers.adaptation_at_samples import (
     AtSample,
     Constants,
@@ -23,9 +24,7 @@ from fmu_observer.observers.adaptation_at_samples import (
 from fmu_observer.observers.adaptive_law import (
     gentle_gain,
     learnt_constants,
-    packed,
     smallest_eigenvalue,
-    unpacked,
 )
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -35,16 +34,13 @@ from fmu_observer.observers.train.adaptive_davis_states import (
     SCALE,
     SIZES,
     STATES,
-    entries,
     just_sampled,
     moving_values,
-    of_state,
     parts_of,
-    sensitivity_of,
 )
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
-from fmu_observer.observers.train.train_observer import BALISE
-from plant_models.hybrid import PeriodicEvent, Signal, input_signal, output_signal, parameter, vector
+from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
+from plant_models.hybrid import PeriodicEvent, Signal, input_signal, matrix, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -53,7 +49,6 @@ C = np.array([[BALISE_WEIGHT, 0.0], [0.0, 1.0]])
 A = np.array([[0.0, 1.0], [0.0, 0.0]])
 MU, FORGETTING = 0.2, 0.0  # [1/s] [ours]
 QUICKEST = 50.0  # [1/s]: no sample moves constants faster [ours]
-P, V = 0, 1
 NAMES = ("davis_a_per_mass", "davis_b_per_mass", "davis_c_per_mass")
 UNITS = ("m/s2", "1/s", "1/m")
 POWERS = np.array([1.0, SCALE, SCALE**2])
@@ -95,6 +90,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     name = "adaptive_davis"
     description = "Train observer that learns the Davis coefficients per unit mass"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
+    by_name = True
     internal_step = 1e-2
     weighing = "itself"
     frictions = ("estimated_speed",)
@@ -139,34 +135,34 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(ADAPTIVE, p)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed, their sensitivities and gain, and what happens since the last sample."""
         known, since = parts_of(x)
         now = constants_now(known, since)
-        sensitivity, inverse_s = sensitivity_of(x), unpacked(of_state(x, "inverse_s"), 2)
-        slope = (p.davis_b + 2.0 * p.davis_c * x[V]) / p.mass
+        sensitivity, inverse_s, speed = x.sensitivity, x.inverse_s, x.estimated_speed
+        slope = (p.davis_b + 2.0 * p.davis_c * speed) / p.mass
         drift = A - np.vstack([np.zeros((1, 2)), np.hstack([0.0, slope])])
         gain = inverse_s @ C.T
-        predicted = vector(x[V], self._free_acceleration(x, now, u, p))
+        predicted = vector(speed, self._free_acceleration(x, now, u, p))
         moving = since_flow(since, gain, drift, C, p.unknown_acceleration * DISTURBED)
         d_sensitivity = drift @ sensitivity - gain @ (since.decay @ known.seen)
-        moves = 1.0 - stands(x[V])  # the speed of a train that its friction holds follows no coefficient
-        d_speed = [moves * (d_sensitivity[1, j] - r) for j, r in enumerate(_regressor(x[V]))]
+        moves = 1.0 - stands(speed)  # the speed of a train that its friction holds follows no coefficient
+        d_speed = [moves * (d_sensitivity[1, j] - r) for j, r in enumerate(_regressor(speed))]
+        rates = predicted - gain @ now.innovation + sensitivity @ now.rates
         d_inverse = p.mu * inverse_s + drift @ inverse_s + inverse_s @ drift.T - gain @ gain.T
-        return vector(
-            *entries(predicted - gain @ now.innovation + sensitivity @ now.rates),
-            *(d_sensitivity[0, j] for j in range(3)),
-            *d_speed,
-            *entries(packed(d_inverse, 2)),
-            *moving_values(moving),
-        )
+        return {
+            **named_as((POSITION, SPEED), rates),
+            "sensitivity": matrix(d_sensitivity[0], d_speed),
+            "inverse_s": d_inverse,
+            **moving_values(moving),
+        }
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
         now = constants_now(*parts_of(x))
         return vector(np.maximum(self._coefficients(now, p)[0], 0.0) + np.maximum(-u.effort, 0.0) / p.mass)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """One component of the innovation is set to what is measured; the first measurement sets the estimate too."""
         row = 0 if event == BALISE.name else 1
         known, since = parts_of(x)
@@ -178,19 +174,15 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         else:
             measured = u.odometer + p.reading_age * self._acceleration(x, now, u, p)
             deviation, gain = p.odometer_deviation, 1.0
-        used = list(entries(of_state(x, "samples_used")))
+        used, estimate = [*x.samples_used], [x.estimated_position, x.estimated_speed]
         first = np.where(used[row] > 0.0, 0.0, 1.0)
         weight = float(C[row, row]) * gain
-        used[row] = used[row] + 1.0
-        estimate, sensitivity = [x[P], x[V]], list(entries(of_state(x, "sensitivity")))
+        sensitivity, seen, c = [*x.sensitivity], [*(since.decay @ known.seen)], [*now.innovation]
         # what has just been measured for the first time does not depend on the coefficients
-        L = [np.where(first > 0.0, 0.0, sensitivity[3 * row + j]) for j in range(3)]
-        sensitivity[3 * row : 3 * row + 3] = L
-        reads = weight * vector(*L)
-        seen, c = [r for line in (since.decay @ known.seen) for r in entries(line)], list(entries(now.innovation))
-        seen[3 * row : 3 * row + 3] = entries(reads)
-        c[row] = np.where(first > 0.0, 0.0, weight * (x[row] - measured))
-        estimate[row] = np.where(first > 0.0, measured, x[row])
+        sensitivity[row] = np.where(first > 0.0, 0.0, sensitivity[row])
+        seen[row] = reads = weight * sensitivity[row]
+        c[row] = np.where(first > 0.0, 0.0, weight * (estimate[row] - measured))
+        used[row], estimate[row] = used[row] + 1.0, np.where(first > 0.0, measured, estimate[row])
         R = gain_now(known, since, p.forgetting, p.gain_floor)
         if row == 1:
             R = np.where(first > 0.0, p.first_gain * np.eye(3), R)
@@ -198,46 +190,43 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         moved = covariance_at_sample(before, gain * C, row, reads, (weight * deviation) ** 2, SIZES)
         begun = covariance_at_first(before, row, row, deviation**2, SIZES)
         excitation = excitation_now(known, since, p.excitation_time)
-        innovation = x[P] - measured if row == 0 else of_state(x, "last_innovation")[0]
-        reading = u.odometer if row == 1 else of_state(x, "last_reading")[0]
-        return vector(
-            *estimate,
-            *sensitivity,
-            *entries(of_state(x, "inverse_s")),
-            *just_sampled(),
-            *entries(now.values),
-            *c,
-            *entries(packed(gentle_gain(R, reads, QUICKEST), 3)),
-            *seen,
-            *entries(packed(excitation, 3)),
-            *entries(packed(np.where(first > 0.0, begun, moved), SIZES.error)),
-            *self._learnt(excitation, estimate[V], p),
-            *used,
-            innovation,
-            reading,
-        )
+        told = {"last_innovation": x.estimated_position - measured} if row == 0 else {"last_reading": u.odometer}
+        return {
+            **named_as((POSITION, SPEED), estimate),
+            **just_sampled(),
+            "sensitivity": matrix(*sensitivity),
+            "corrections": now.values,
+            "sampled_innovation": vector(*c),
+            "adaptation_gain": gentle_gain(R, reads, QUICKEST),
+            "seen_sensitivity": matrix(*seen),
+            "mean_excitation": excitation,
+            "error_covariance": np.where(first > 0.0, begun, moved),
+            "learnt": self._learnt(excitation, estimate[1], p),
+            "samples_used": vector(*used),
+            **told,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and coefficients with their uncertainty."""
         known, since = parts_of(x)
         now = constants_now(known, since)
         covariance = self._covariance(x, known, since, now)
-        regressor = _regressor(x[V])
+        regressor = _regressor(x.estimated_speed)
         of_resistance = sum(
             (regressor[i] * regressor[j] * covariance[2 + i, 2 + j] for i in range(3) for j in range(3)), 0.0
         )
         believed = self._coefficients(now, p)
         return {
-            "position": x[P],
-            "speed": x[V],
-            "innovation": of_state(x, "last_innovation")[0],
+            "position": x.estimated_position,
+            "speed": x.estimated_speed,
+            "innovation": x.last_innovation,
             "position_deviation": _root(covariance[0, 0]),
             **{n: believed[i] for i, n in enumerate(NAMES)},
             **{f"{n}_deviation": _root(covariance[2 + i, 2 + i]) / POWERS[i] for i, n in enumerate(NAMES)},
             **{f"{n}_learnt": known.learnt[i] for i, n in enumerate(NAMES)},
             "resistance_per_mass": self._resistance(x, now, p),
             "resistance_per_mass_deviation": _root(of_resistance),
-            "rolls_back": rolls_back(of_state(x, "last_reading")[0]),
+            "rolls_back": rolls_back(x.last_reading),
             "smallest_excitation": smallest_eigenvalue(excitation_now(known, since, p.excitation_time), 3),
         }
 
@@ -245,7 +234,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         """The odometer [m/s]."""
         return u.odometer
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""
         known, since = parts_of(x)
         return _root(self._covariance(x, known, since, constants_now(known, since))[0, 0])
@@ -264,31 +253,30 @@ class AdaptiveDavis(GatedObserver, GapCertified):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _covariance(self, x: Array, known: AtSample, since: Since, now: Constants) -> Array:
+    def _covariance(self, x: Any, known: AtSample, since: Since, now: Constants) -> Array:
         """Of position, speed and corrections, shape (5, 5)."""
         V_now = covariance_now(known, since, now.by_innovation, SIZES)
-        return state_covariance(V_now, sensitivity_of(x), SIZES)
+        return state_covariance(V_now, x.sensitivity, SIZES)
 
-    def _learnt(self, excitation: Array, speed: Array, p: Any) -> list[Array]:
-        moves = np.where(speed > p.minimum_speed, 1.0, 0.0)
-        return [moves * one for one in entries(learnt_constants(excitation, p.least_excitation, 3))]
+    def _learnt(self, excitation: Array, speed: Array, p: Any) -> Array:
+        return np.where(speed > p.minimum_speed, 1.0, 0.0) * learnt_constants(excitation, p.least_excitation, 3)
 
     def _coefficients(self, now: Constants, p: Any) -> tuple[Array, ...]:
         first = (p.davis_a, p.davis_b, p.davis_c)
         return tuple(first[i] / p.mass + now.values[i] / POWERS[i] for i in range(3))
 
-    def _resistance(self, x: Array, now: Constants, p: Any) -> Array:
+    def _resistance(self, x: Any, now: Constants, p: Any) -> Array:
         a, b, c = self._coefficients(now, p)
-        return a + b * x[V] + c * x[V] ** 2
+        return a + b * x.estimated_speed + c * x.estimated_speed**2
 
-    def _free_acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
+    def _free_acceleration(self, x: Any, now: Constants, u: Any, p: Any) -> Array:
         """Acceleration without dry friction [m/s2]."""
-        a, b, c = self._coefficients(now, p)
-        return np.maximum(u.effort, 0.0) / p.mass - np.minimum(a, 0.0) - (b + c * np.abs(x[V])) * x[V]
+        (a, b, c), speed = self._coefficients(now, p), x.estimated_speed
+        return np.maximum(u.effort, 0.0) / p.mass - np.minimum(a, 0.0) - (b + c * np.abs(speed)) * speed
 
-    def _acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
+    def _acceleration(self, x: Any, now: Constants, u: Any, p: Any) -> Array:
         """Acceleration of a train that moves, else 0 [m/s2]."""
-        return np.where(x[V] > 0.0, u.effort / p.mass - self._resistance(x, now, p), 0.0)
+        return np.where(x.estimated_speed > 0.0, u.effort / p.mass - self._resistance(x, now, p), 0.0)
 
 
 DISTURBED = np.array([[0.0, 0.0], [0.0, 1.0]])
