@@ -112,7 +112,7 @@ class Added(Locomotive):
     outputs: Any = (*Locomotive.outputs, output_signal("wheel_rotation", "rad/s", "Angular speed of the wheel"))
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {**super().output(t, x, u, p), "wheel_rotation": x[2]}
+        return {**super().output(t, x, u, p), "wheel_rotation": x.wheel_rate}
 
 
 class OtherDefault(Locomotive):

@@ -108,7 +108,7 @@ def jacobians(
     state, inputs, p = part.whole(x, u, part.parameters)
     signs = np.sign(state[system.friction_indices()])
     if system.switchings:
-        sides = system.switches(t, state, system.unpack_inputs(inputs), system.unpack_parameters(p))
+        sides = system.switch_vector(t, state, inputs, p)
         signs = np.concatenate([signs, np.ravel(sides)])
     tangent, q = part.traced.tangent, len(part.outputs)
     still = [np.zeros(1), np.zeros(len(state)), np.zeros(len(inputs)), np.zeros(len(p))]

@@ -112,7 +112,7 @@ def test_the_acceleration_output_is_the_derivative_the_integrator_uses(
     p = parameters(train, **{"gradient[1]": gradient})
     state, u = np.array(x), np.array([effort])
     derivative = effective_flow(train, 1.0, state, u, p, np.sign(state[[1, 2]]))
-    values = train.output(1.0, state, train.unpack_inputs(u), train.unpack_parameters(p))
+    values = train.output(1.0, train.unpack_states(state), train.unpack_inputs(u), train.unpack_parameters(p))
     assert values["acceleration"] == pytest.approx(derivative[1], rel=1e-9, abs=1e-12)
     force = values["adhesion_force"] - values["resistance_force"] - values["gradient_force"]
     assert force == pytest.approx(MASS * values["acceleration"], rel=1e-9, abs=1e-6)

@@ -16,8 +16,8 @@ def read(sensor: Any, value: float, noise: np.ndarray, **settings: float) -> np.
     p = sensor.unpack_parameters(sensor.start_parameters())._replace(**settings)
     names = [s.name for s in sensor.inputs]
     u = sensor.unpack_inputs(np.zeros(len(sensor.input_signals)))._replace(**{names[0]: value, "reading_noise": noise})
-    x = np.stack([np.full(noise.shape, value), np.zeros(noise.shape)])
-    return np.asarray(sensor.output(0.0, sensor.jump("sampling", 0.0, x, u, p), u, p)["reading"])
+    x = sensor.unpack_states(np.stack([np.full(noise.shape, value), np.zeros(noise.shape)]))
+    return np.asarray(sensor.output(0.0, x._replace(**sensor.jump("sampling", 0.0, x, u, p)), u, p)["reading"])
 
 
 def test_the_radar_has_a_scale_and_noise_that_grows_with_the_speed() -> None:

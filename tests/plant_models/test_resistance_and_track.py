@@ -81,10 +81,8 @@ def test_a_track_lies_along_time_or_position() -> None:
         names = [n for s in train.parameter_signals for n in s.scalar_names]
         p[names.index("zone_from[1]")], p[names.index("zone_to[1]")] = 10.0, 20.0
         x = np.array([[5.0, 15.0], [3.0, 3.0], [5.0, 5.0]])
-        degraded = train.output(12.0, x, train.unpack_inputs(np.zeros((1, 2))), train.unpack_parameters(p))[
-            "adhesion_degraded"
-        ]
-        assert list(degraded) == expected
+        told = train.unpack_inputs(np.zeros((1, 2))), train.unpack_parameters(p)
+        assert list(train.output(12.0, train.unpack_states(x), *told)["adhesion_degraded"]) == expected
 
 
 @pytest.mark.parametrize(("shape", "middle"), [("constant", 0.002), ("linear", 0.005)])
@@ -106,9 +104,8 @@ def test_setting_the_first_gradient_alone_tilts_the_whole_track() -> None:
         p = train.start_parameters()
         p[[n for s in train.parameter_signals for n in s.scalar_names].index("gradient[1]")] = 0.008
         for position in (-100.0, 0.0, 5e4):
-            output = train.output(
-                0.0, np.array([position, 0.0, 0.0]), train.unpack_inputs(np.zeros(1)), train.unpack_parameters(p)
-            )
+            x = train.unpack_states(np.array([position, 0.0, 0.0]))
+            output = train.output(0.0, x, train.unpack_inputs(np.zeros(1)), train.unpack_parameters(p))
             # The linear shape runs out towards the unused point a million kilometres away.
             assert output["gradient_force"] == pytest.approx(90e3 * 9.81 * 0.008, rel=1e-4)
 

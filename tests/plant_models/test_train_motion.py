@@ -113,7 +113,7 @@ def test_the_outputs_are_the_forces_the_integrator_uses(
     x = np.array([7.0, *elongations, *speeds, *rates, *pressures, *[0.0] * 21])
     u, p = np.array([effort, 0.3]), parameters(TRAIN, **{"gradient[1]": gradient})
     derivative = effective_flow(TRAIN, 1.0, x, u, p, np.sign(x[TRAIN.friction_indices()]))
-    now: dict[str, Any] = TRAIN.output(1.0, x, TRAIN.unpack_inputs(u), TRAIN.unpack_parameters(p))
+    now: dict[str, Any] = TRAIN.output(1.0, TRAIN.unpack_states(x), TRAIN.unpack_inputs(u), TRAIN.unpack_parameters(p))
     assert now["acceleration"] == pytest.approx(derivative[5], rel=1e-9, abs=1e-9)
     force = now["adhesion_force"] - now["resistance_force"] - now["gradient_force"] - now["wagon_brake_force"]
     assert force == pytest.approx(float(MASSES @ derivative[5:10]), rel=1e-9, abs=1e-5)

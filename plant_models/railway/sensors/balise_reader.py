@@ -83,6 +83,7 @@ class BaliseReader(HybridSystem):
     name = "balise_reader"
     description = "Balise reader: position and speed of a train in, balise events with their own time stamps out"
     source = "Bouchama 2024, section 3.4 (balises as aperiodic samples); the localisation is ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     inputs = (
         input_signal("position", "m", 0.0, "Position of the train, at the instant that input_instant names"),
@@ -128,26 +129,27 @@ class BaliseReader(HybridSystem):
             pending_capacity=pending_capacity,
         )
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Take a sample, find what was passed since the last one, announce the oldest; shape (n,) or (n, members)."""
-        last_communication, t0, p0, v0, primed = (x[i] for i in range(len(_SAMPLE)))
-        known = primed > 0.0
-        instant = np.where(known, np.where(p.input_instant > 0.5, t, last_communication), t)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Take a sample, find what was passed since the last one, announce the oldest."""
+        known, t0 = x.primed > 0.0, x.sample_time
+        instant = np.where(known, np.where(p.input_instant > 0.5, t, x.last_communication), t)
         h = np.where(known, np.maximum(instant - t0, 0.0), 0.0)
         # A second sample at one instant replaces the first: the train did not move in no time.
-        cubic = HermiteCubic.of(h, np.where(h > 0.0, p0, u.position), v0, u.position, u.speed)
+        before = np.where(h > 0.0, x.sample_position, u.position)
+        cubic = HermiteCubic.of(h, before, x.sample_speed, u.position, u.speed)
         segments = self._segments(cubic, u.position, p)
         places, fractions = self._crossings(cubic, segments, p)
         found = segments[0].count + segments[1].count
         stamps = [np.where(found > j, np.minimum(t0 + s * h, instant), 0.0) for j, s in enumerate(fractions)]
         places = [np.where(found > j, place, 0.0) for j, place in enumerate(places)]
-        sample = (t, instant, u.position, u.speed, 1.0)
-        return vector(*sample, *self._announce(x, found, stamps, places))
+        sample = {"sample_time": instant, "sample_position": u.position, "sample_speed": u.speed}
+        announced = self._announce(x, found, stamps, places)
+        return {"last_communication": t, **sample, "primed": 1.0, **announced}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The last announcement and the number of all, and of the lost."""
-        count, time, position, lost = (x[len(_SAMPLE) + i] for i in range(4))
-        return {"balise_count": count, "balise_time": time, "balise_position": position, "lost_count": lost}
+        passed = {"balise_time": x.announced_time, "balise_position": x.announced_position}
+        return {"balise_count": x.announced, **passed, "lost_count": x.lost}
 
     def _segments(self, cubic: HermiteCubic, after: Array, p: Any) -> tuple[_Segment, _Segment]:
         """The step, divided where the train turns; the second segment is empty where it does not."""
@@ -176,28 +178,22 @@ class BaliseReader(HybridSystem):
             fractions.append(cubic.crossing(place, direction, *bracket))
         return places, fractions
 
-    def _announce(self, x: Array, found: Array, stamps: list[Array], places: list[Array]) -> list[Array]:
+    def _announce(self, x: Any, found: Array, stamps: list[Array], places: list[Array]) -> dict[str, Array]:
         """Memory of the announcements after the crossings found have joined the queue and its head has left it."""
-        first, n = len(_SAMPLE), self.pending_capacity
-        count, time, position, lost, waiting = (x[first + i] for i in range(5))
-        times = _joined([x[first + 5 + i] for i in range(n)], waiting, stamps)
-        positions = _joined([x[first + 5 + n + i] for i in range(n)], waiting, places)
-        room = n - waiting
-        waiting = waiting + np.minimum(found, room)
+        times = _joined(x.waiting_time, x.waiting, stamps)
+        positions = _joined(x.waiting_position, x.waiting, places)
+        room = self.pending_capacity - x.waiting
+        waiting = x.waiting + np.minimum(found, room)
         some = waiting > 0.0
-        head = (
-            count + np.where(some, 1.0, 0.0),
-            np.where(some, times[0], time),
-            np.where(some, positions[0], position),
-            lost + np.maximum(found - room, 0.0),
-            waiting - np.where(some, 1.0, 0.0),
-        )
-        queues = [
-            np.where(some, queue[i + 1] if i + 1 < n else 0.0, queue[i])
-            for queue in (times, positions)
-            for i in range(n)
-        ]
-        return [*head, *queues]
+        return {
+            "announced": x.announced + np.where(some, 1.0, 0.0),
+            "announced_time": np.where(some, times[0], x.announced_time),
+            "announced_position": np.where(some, positions[0], x.announced_position),
+            "lost": x.lost + np.maximum(found - room, 0.0),
+            "waiting": waiting - np.where(some, 1.0, 0.0),
+            "waiting_time": _without_head(times, some),
+            "waiting_position": _without_head(positions, some),
+        }
 
 
 def _announcements(capacity: int) -> tuple[Any, ...]:
@@ -234,7 +230,7 @@ def _direction(before: Array, after: Array) -> Array:
     return np.where(after >= before, 1.0, -1.0)
 
 
-def _joined(queue: list[Array], waiting: Array, new: list[Array]) -> list[Array]:
+def _joined(queue: Array, waiting: Array, new: list[Array]) -> list[Array]:
     """The queue with the new ones behind those that wait, as far as there is room."""
     joined = []
     for i, old in enumerate(queue):
@@ -243,3 +239,8 @@ def _joined(queue: list[Array], waiting: Array, new: list[Array]) -> list[Array]
             value = np.where(waiting == i - j, new[j], value)
         joined.append(value)
     return joined
+
+
+def _without_head(queue: list[Array], some: Array) -> Array:
+    """The queue, moved up where something waits."""
+    return vector(*(np.where(some, behind, value) for value, behind in zip(queue, [*queue[1:], 0.0], strict=True)))

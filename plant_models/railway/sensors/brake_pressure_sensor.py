@@ -17,7 +17,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.sampling import sampling_event
@@ -40,6 +39,7 @@ class BrakePressureSensor(HybridSystem):
     name = "brake_pressure_sensor"
     description = "Pressure sensor of a brake cylinder: lag, offset, scale error, noise and resolution"
     source = "Ours: an industrial transmitter of class 0.5 with 12 bits over 10 bar"
+    by_name = True
     internal_step = 1e-2
     states = (
         state("lagged_pressure", "Pa", 0.0, "Pressure behind the lag of the sensor"),
@@ -67,16 +67,17 @@ class BrakePressureSensor(HybridSystem):
     }
     default_preset = "class_0_5"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the lagged pressure, shape (1,) or (1, members)."""
-        return vector((u.pressure - x[0]) / p.response_time)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the lagged pressure."""
+        return {"lagged_pressure": (u.pressure - x.lagged_pressure) / p.response_time}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Take a reading: lagged pressure and new held reading, shape (2,) or (2, members)."""
-        seen = np.clip((1.0 + p.scale_error) * x[0] + p.offset + p.noise_std * u.reading_noise, 0.0, p.span)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Take a reading."""
+        pressure = (1.0 + p.scale_error) * x.lagged_pressure + p.offset + p.noise_std * u.reading_noise
+        seen = np.clip(pressure, 0.0, p.span)
         step = np.where(p.resolution > 0.0, p.resolution, 1.0)
-        return vector(x[0], np.where(p.resolution > 0.0, np.floor(seen / step + 0.5) * step, seen))
+        return {"held_reading": np.where(p.resolution > 0.0, np.floor(seen / step + 0.5) * step, seen)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The held reading."""
-        return {"reading": x[1]}
+        return {"reading": x.held_reading}

@@ -17,7 +17,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.sampling import sampling_event
@@ -42,6 +41,7 @@ class DopplerRadar(HybridSystem):
     name = "doppler_radar"
     description = "Doppler radar: speed over ground with scale error, noise of the ground and a lowest speed"
     source = "Schubert, Heide, Magori 1995 (1 % of speed, 2 m in 1000 m); dwell time and floor are ours"
+    by_name = True
     internal_step = 1e-2  # the lag is resolved
     states = (
         state("averaged_speed", "m/s", 0.0, "Speed over ground, averaged over the dwell time"),
@@ -70,16 +70,16 @@ class DopplerRadar(HybridSystem):
     }
     default_preset = "measured"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the averaged speed, shape (1,) or (1, members)."""
-        return vector((u.speed - x[0]) / p.averaging_time)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the averaged speed."""
+        return {"averaged_speed": (u.speed - x.averaged_speed) / p.averaging_time}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Take a reading: averaged speed and new held reading, shape (2,) or (2, members)."""
-        noise = (p.noise_share * np.abs(x[0]) + p.noise_std) * u.reading_noise
-        seen = np.where(np.abs(x[0]) < p.lowest_speed, 0.0, x[0] * (1.0 + p.scale_error) + noise)
-        return vector(x[0], seen)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Take a reading."""
+        speed = x.averaged_speed
+        noise = (p.noise_share * np.abs(speed) + p.noise_std) * u.reading_noise
+        return {"held_reading": np.where(np.abs(speed) < p.lowest_speed, 0.0, speed * (1.0 + p.scale_error) + noise)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The held reading."""
-        return {"reading": x[1]}
+        return {"reading": x.held_reading}

@@ -17,7 +17,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
@@ -44,6 +43,7 @@ class Odometer(HybridSystem):
     name = "odometer"
     description = "Wheel odometer: sampled wheel speed with noise and tooth quantisation"
     source = "Bouchama 2024, (3.16), (3.50)"
+    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     states = (
         state("wheel_distance", "m", 0.0, "Distance run by the wheel's rim"),
@@ -73,18 +73,19 @@ class Odometer(HybridSystem):
     }
     default_preset = "ideal"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the wheel's distance, shape (1,) or (1, members)."""
-        return vector(u.wheel_speed + 0.0 * x[0])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the wheel's distance."""
+        return {"wheel_distance": u.wheel_speed}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Take a reading: new held reading and pulse count, shape (4,) or (4, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Take a reading: new held reading and pulse count."""
         pulse = pulse_length(p.teeth, p.wheel_radius)
-        count = counted_pulses(x[0], pulse)
+        count = counted_pulses(x.wheel_distance, pulse)
         # The first window is the one that a wheel of the present speed would have left behind.
-        window = pulses_in_window(count, x[2], x[3], u.wheel_speed, p.sample_period, pulse)
+        window = pulses_in_window(count, x.counted_pulses, x.primed, u.wheel_speed, p.sample_period, pulse)
         speed = np.where(p.teeth > 0.0, window * pulse / p.sample_period, u.wheel_speed)
-        return vector(x[0], speed + p.noise_std * u.reading_noise, count, 1.0)
+        reading = speed + p.noise_std * u.reading_noise
+        return {"held_reading": reading, "counted_pulses": count, "primed": 1.0}
 
     def reading_bound(self, output: str, p: Any) -> Array:
         """How far a reading is from the wheel's speed at most, see `pulses.reading_bound` [m/s].
@@ -95,10 +96,8 @@ class Odometer(HybridSystem):
         bound = reading_bound(p.noise_std, p.teeth, p.wheel_radius, p.sample_period)
         return np.where(output == "reading", bound, 0.0)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The held reading and the counted distance."""
-        pulse = pulse_length(p.teeth, p.wheel_radius)
-        return {
-            "reading": x[1],
-            "distance": np.where(p.teeth > 0.0, counted_pulses(x[0], pulse) * pulse, x[0]),
-        }
+        pulse, distance = pulse_length(p.teeth, p.wheel_radius), x.wheel_distance
+        counted = np.where(p.teeth > 0.0, counted_pulses(distance, pulse) * pulse, distance)
+        return {"reading": x.held_reading, "distance": counted}

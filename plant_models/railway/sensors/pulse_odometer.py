@@ -19,7 +19,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -56,6 +55,7 @@ class PulseOdometer(HybridSystem):
     name = "pulse_odometer"
     description = "Toothed wheel odometer: counted pulses, sampled at 50 ms and aggregated at 200 ms"
     source = "Aguiar Cota 2019, section 2.1.2; teeth and radius are ours"
+    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     outputs = (
         output_signal(
@@ -102,24 +102,22 @@ class PulseOdometer(HybridSystem):
         self.states = (*((_INTEGRAL,) if count_from == "wheel_speed" else ()), *_MEMORY)
         super().__init__(count_from=count_from)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the rim's distance, shape (1,) or (1, members); nothing flows where it is an input."""
-        return vector(u.wheel_speed + 0.0 * x[0]) if self.count_from == "wheel_speed" else super().flow(t, x, u, p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the rim's distance; nothing flows where it is an input."""
+        return {"rim_distance": u.wheel_speed} if self.count_from == "wheel_speed" else {}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Count the pulses, or hand on what was counted since the last aggregate."""
-        first = self.continuous_count
-        flowing = [x[i] for i in range(first)]
-        held, sampled, count, last, primed_sample, primed = (x[first + i] for i in range(len(_MEMORY)))
-        pulse = pulse_length(p.teeth, p.wheel_radius)
+        pulse, count, last = pulse_length(p.teeth, p.wheel_radius), x.counted_pulses, x.aggregated_pulses
         if event == "sampling":
-            now = counted_pulses(flowing[0] if first else u.wheel_distance, pulse)
-            window = pulses_in_window(now, count, primed_sample, u.wheel_speed, p.sample_period, pulse)
+            now = counted_pulses(x.rim_distance if self.count_from == "wheel_speed" else u.wheel_distance, pulse)
+            window = pulses_in_window(now, count, x.sampled_once, u.wheel_speed, p.sample_period, pulse)
             speed = window * pulse / p.sample_period + p.noise_std * u.sample_noise
-            return vector(*flowing, held, speed, now, np.where(primed == 0.0, now, last), 1.0, primed)
-        window = pulses_in_window(count, last, primed, u.wheel_speed, p.aggregation_period, pulse)
+            begin = np.where(x.aggregated_once == 0.0, now, last)
+            return {"held_sample": speed, "counted_pulses": now, "aggregated_pulses": begin, "sampled_once": 1.0}
+        window = pulses_in_window(count, last, x.aggregated_once, u.wheel_speed, p.aggregation_period, pulse)
         speed = window * pulse / p.aggregation_period + p.noise_std * u.reading_noise
-        return vector(*flowing, speed, sampled, count, count, primed_sample, 1.0)
+        return {"held_reading": speed, "aggregated_pulses": count, "aggregated_once": 1.0}
 
     def reading_bound(self, output: str, p: Any) -> Array:
         """How far a reading is from the mean speed of the wheel at most, see `pulses.reading_bound` [m/s].
@@ -130,14 +128,10 @@ class PulseOdometer(HybridSystem):
         period = {"reading": p.aggregation_period, "sampled_reading": p.sample_period}.get(output, np.inf)
         return np.where(output == "distance", 0.0, reading_bound(p.noise_std, p.teeth, p.wheel_radius, period))
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The held readings and the counted distance."""
-        first = self.continuous_count
-        return {
-            "reading": x[first],
-            "sampled_reading": x[first + 1],
-            "distance": x[first + 2] * pulse_length(p.teeth, p.wheel_radius),
-        }
+        distance = x.counted_pulses * pulse_length(p.teeth, p.wheel_radius)
+        return {"reading": x.held_reading, "sampled_reading": x.held_sample, "distance": distance}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds; an aggregate is made of whole samples."""

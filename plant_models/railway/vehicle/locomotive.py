@@ -60,6 +60,7 @@ class Locomotive(HybridSystem):
     name = "locomotive"
     description = "Single-mass train with wheel slip: effort in, position, speed and wheel speed out"
     source = "Bouchama 2024, (3.1)-(3.15) and Table 4.1"
+    by_name = True
     method = "rosenbrock"  # the wheel's time constant is 4.6e-5 s per m/s of speed: far below the step near standstill
     internal_step = 5e-4  # at 1 ms the linearly implicit step overshoots the creep curve below the slip floor by mm/s
     states = (
@@ -120,19 +121,18 @@ class Locomotive(HybridSystem):
             gradient_count=gradient_count,
         )
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of position, speed and wheel rate without dry friction, shape (3,) or (3, members)."""
-        position, speed, wheel_rate = x[0], x[1], x[2]
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of position, speed and wheel rate without dry friction."""
         creep = self._creep_force(t, x, u, p)
-        resistance = moving_resistance(speed, p.davis_b, p.davis_c) + self._gradient_force(position, p)
+        resistance = moving_resistance(x.train_speed, p.davis_b, p.davis_c) + self._gradient_force(x.train_position, p)
         traction = np.maximum(u.effort, 0.0)
-        return vector(
-            speed,
-            (creep - resistance) / p.mass,
-            p.wheel_radius * (traction - creep) / (p.n_axles * p.wheel_inertia) + 0.0 * wheel_rate,
-        )
+        return {
+            "train_position": x.train_speed,
+            "train_speed": (creep - resistance) / p.mass,
+            "wheel_rate": p.wheel_radius * (traction - creep) / (p.n_axles * p.wheel_inertia),
+        }
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Dry friction on the speed [m/s2] and on the wheel rate [rad/s2], shape (2,) or (2, members)."""
         brake = np.maximum(-u.effort, 0.0)
         return vector(
@@ -140,11 +140,10 @@ class Locomotive(HybridSystem):
             p.wheel_radius * brake / (p.n_axles * p.wheel_inertia),
         )
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs; at rest the forces are those that hold the train."""
-        position, speed, wheel_rate = x[0], x[1], x[2]
-        creep = self._creep_force(t, x, u, p)
-        gradient = self._gradient_force(position, p)
+        speed, creep = x.train_speed, self._creep_force(t, x, u, p)
+        gradient = self._gradient_force(x.train_position, p)
         moving = moving_resistance(speed, p.davis_b, p.davis_c)
         direction = np.sign(speed)
         push = creep - moving - gradient
@@ -152,10 +151,10 @@ class Locomotive(HybridSystem):
         hold = self._standing_hold(t, x, u, p)
         held = np.where(speed == 0.0, np.clip(push - dry, -hold, hold), direction * hold)
         return {
-            "position": position,
+            "position": x.train_position,
             "speed": speed,
             "acceleration": (push - dry - held) / p.mass,
-            "wheel_speed": p.wheel_radius * wheel_rate,
+            "wheel_speed": p.wheel_radius * x.wheel_rate,
             "slip": self._slip(x, p),
             "adhesion_force": creep - held,
             "resistance_force": moving + dry,
@@ -163,9 +162,9 @@ class Locomotive(HybridSystem):
             "adhesion_degraded": self._degraded(t, x, u, p),
         }
 
-    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """How far beyond the edges of the zones."""
-        return vector(*self._track.beyond_edges(t, x[0], p))
+        return vector(*self._track.beyond_edges(t, x.train_position, p))
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Zones have a length and do not overlap."""
@@ -173,26 +172,26 @@ class Locomotive(HybridSystem):
 
     # -- forces -----------------------------------------------------------------------------------------------------
 
-    def _slip(self, x: Array, p: Any) -> Array:
-        return (p.wheel_radius * x[2] - x[1]) / np.maximum(np.abs(x[1]), p.slip_floor)
+    def _slip(self, x: Any, p: Any) -> Array:
+        return (p.wheel_radius * x.wheel_rate - x.train_speed) / np.maximum(np.abs(x.train_speed), p.slip_floor)
 
-    def _degraded(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def _degraded(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         return self._track.degraded(self.switches(t, x, u, p))
 
-    def _creep_force(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        reference = np.maximum(np.abs(x[1]), p.slip_floor)
+    def _creep_force(self, t: Array, x: Any, u: Any, p: Any) -> Array:
+        reference = np.maximum(np.abs(x.train_speed), p.slip_floor)
         return self._law.coefficient(self._slip(x, p), reference, self._degraded(t, x, u, p), p) * _adhesive_weight(p)
 
     def _gradient_force(self, position: Array, p: Any) -> Array:
         return gradient_resistance(p.mass, p.gravity, self._track.gradient(position, p))
 
-    def _standing_hold(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def _standing_hold(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Force [N] by which a standing braked wheel holds the train beyond what the creep curve does already."""
         brake = np.maximum(-u.effort, 0.0)
         limit = self._law.limit(self._degraded(t, x, u, p), p) * _adhesive_weight(p)
         missing = np.maximum(np.minimum(brake, limit) - np.abs(self._creep_force(t, x, u, p)), 0.0)
         fading = np.clip(2.0 - 2.0 * np.abs(self._slip(x, p)), 0.0, 1.0)
-        return np.where(x[2] == 0.0, missing * fading, 0.0)
+        return np.where(x.wheel_rate == 0.0, missing * fading, 0.0)
 
 
 def _adhesive_weight(p: Any) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import PeriodicEvent, memory, parameter, vector
+from plant_models.hybrid import PeriodicEvent, memory, parameter
 from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.longitudinal_forces import TRAIN_PRESETS, LongitudinalForces
 
@@ -42,6 +42,7 @@ class LongitudinalTrainEuler(LongitudinalForces):
     name = "longitudinal_train_euler"
     description = "Train as one point in discrete time: the Euler form of longitudinal_train"
     source = "Aguiar Cota 2019, (2.9)-(2.10)"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("train_position", "m", 0.0, "Position of the train at start"),
@@ -52,16 +53,21 @@ class LongitudinalTrainEuler(LongitudinalForces):
     events = (PeriodicEvent("update", "update_period", description="The state is updated"),)
     presets: Mapping[str, Mapping[str, Any]] = TRAIN_PRESETS
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Position and speed one period later, shape (3,) or (3, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Position and speed one period later."""
         before = t - p.update_period
-        forces = self._forces(before, x[0], x[1], u, p)
-        h = p.update_period * x[2]
-        pushed = x[1] + h * forces.push / p.mass
+        forces = self._forces(before, x.train_position, x.train_speed, u, p)
+        h = p.update_period * x.updating
+        pushed = x.train_speed + h * forces.push / p.mass
         dry = h * (p.davis_a + forces.brake) / p.mass
-        return vector(x[0] + h * x[1], np.sign(pushed) * np.maximum(np.abs(pushed) - dry, 0.0), 1.0)
+        return {
+            "train_position": x.train_position + h * x.train_speed,
+            "train_speed": np.sign(pushed) * np.maximum(np.abs(pushed) - dry, 0.0),
+            "updating": 1.0,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs."""
-        passed = [np.where(beyond >= 0.0, 1.0, 0.0) for beyond in self._track.beyond_edges(t, x[0], p)]
-        return self._outputs(x[0], x[1], self._forces(t, x[0], x[1], u, p), self._track.degraded(passed), p)
+        position, speed = x.train_position, x.train_speed
+        passed = [np.where(beyond >= 0.0, 1.0, 0.0) for beyond in self._track.beyond_edges(t, position, p)]
+        return self._outputs(position, speed, self._forces(t, position, speed, u, p), self._track.degraded(passed), p)

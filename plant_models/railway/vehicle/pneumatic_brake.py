@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from plant_models.hybrid.arrays import Array, vector
 from plant_models.hybrid.event import PeriodicEvent
 from plant_models.hybrid.signal import Signal, memory, parameter, state
-from plant_models.hybrid.system import Array
 
 BAR = 1e5  # [Pa]
 
@@ -96,15 +96,15 @@ class BrakePipe:
         period = "brake_sample_period"
         self.event = PeriodicEvent("brake_reading", period, period, description="The brake demand is read")
 
-    def shifted(self, readings: list[Array], integral: Array, p: Any) -> list[Array]:
+    def shifted(self, readings: Array, integral: Array, p: Any) -> Array:
         """The register after a new reading: of a demand with this integral [s] over the last period.
 
         Args:
             p: parameters of the train.
         """
-        return [integral / p.brake_sample_period, *readings[:-1]]
+        return vector(integral / p.brake_sample_period, *readings[:-1])
 
-    def pressure(self, demand: Array, readings: list[Array], vehicle: int, p: Any) -> Array:
+    def pressure(self, demand: Array, readings: Array, vehicle: int, p: Any) -> Array:
         """Pressure in the pipe [Pa] at a vehicle, 0 is the first one, for the demand [1] at the first one now.
 
         Args:

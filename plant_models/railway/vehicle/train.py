@@ -7,6 +7,7 @@ own files.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -82,6 +83,7 @@ class Train(HybridSystem):
     name = "train"
     description = "Multi-vehicle train: effort and brake demand in, motion, slip of each axle and coupler forces out"
     source = "Bouchama 2024, (4.1)-(4.6), Table 4.2 and section 4.1"
+    by_name = True
     method = "rosenbrock"  # the wheels' time constants are far below the step near standstill
     stiff = ("train_speed", "wagon_velocity", "axle_rate")  # with all momenta among them; the couplers are slow: 3.4 Hz
     # to 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
@@ -156,141 +158,142 @@ class Train(HybridSystem):
         starts = {"train_speed": speed, **{f"wagon_velocity[{i + 1}]": speed for i in range(self.wagons)}}
         return starts | {f"axle_rate[{k + 1}]": speed / wheel_radius for k in range(self.axles)}
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the continuous states without dry friction, shape (nc,) or (nc, members)."""
-        now = _Now(self, x)
-        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
-        pushes = self._pushes(now, wheelsets, p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the continuous states without dry friction."""
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), x, u, p)
+        pushes = self._pushes(x, wheelsets, p)
         accelerations = [push / mass for push, mass in zip(pushes, self._masses(p), strict=True)]
-        elongating = [now.speeds[i] - now.speeds[i + 1] for i in range(self.wagons)]
-        fillings = [filling(c, pipe, p) for c, pipe in zip(now.cylinders, self._pipe_pressures(now, u, p), strict=True)]
-        spinning = [w.acceleration(p) for w in wheelsets]
-        return vector(now.speeds[0], *elongating, *accelerations, *spinning, *fillings, limited(u.brake_demand))
+        fillings = [filling(c, pipe, p) for c, pipe in zip(x.cylinder, self._pipe_pressures(x, u, p), strict=True)]
+        return {
+            "train_position": x.train_speed,
+            "elongation": vector(*_elongating(x)),
+            "train_speed": accelerations[0],
+            "wagon_velocity": vector(*accelerations[1:]),
+            "axle_rate": vector(*(w.acceleration(p) for w in wheelsets)),
+            "cylinder": vector(*fillings),
+            "demand_integral": limited(u.brake_demand),
+        }
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Dry friction on the speeds [m/s2] and on the wheel rates [rad/s2], shape (1 + wagons + axles,)."""
-        now = _Now(self, x)
-        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
-        limits = [davis + other for davis, other in self._dry_limits(now, wheelsets, p)]
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), x, u, p)
+        limits = [davis + other for davis, other in self._dry_limits(x, wheelsets, p)]
         decelerations = [limit / mass for limit, mass in zip(limits, self._masses(p), strict=True)]
         return vector(*decelerations, *(w.friction(p) for w in wheelsets))
 
-    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """How far beyond the edges of the zones: each axle along the track, all at once by time."""
-        places = [x[0] - p.axle_position[k] for k in range(self.axles)] if self._track.zones == "position" else [x[0]]
+        front, along_track = x.train_position, self._track.zones == "position"
+        places = [front - p.axle_position[k] for k in range(self.axles)] if along_track else [front]
         return vector(*(distance for place in places for distance in self._track.beyond_edges(t, place, p)))
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Zones have a length and do not overlap."""
         return self._track.requirements(p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The brake demand is read, and all earlier readings move down the pipe; shape (n,) or (n, members)."""
-        now, kept = _Now(self, x), self.continuous_count - 1
-        return vector(*(x[i] for i in range(kept)), 0.0, *self._pipe.shifted(now.readings, now.demand_integral, p))
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The brake demand is read, and all earlier readings move down the pipe."""
+        return {"demand_integral": 0.0, "pipe_demand": self._pipe.shifted(x.pipe_demand, x.demand_integral, p)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs; at rest the forces are those that hold the vehicles."""
-        now = _Now(self, x)
-        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
-        pushes = self._pushes(now, wheelsets, p)
-        limits = self._dry_limits(now, wheelsets, p)
-        dry = [_resolved(push, limit[0], v) for push, limit, v in zip(pushes, limits, now.speeds, strict=True)]
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), x, u, p)
+        pushes = self._pushes(x, wheelsets, p)
+        limits = self._dry_limits(x, wheelsets, p)
+        dry = [_resolved(push, limit[0], v) for push, limit, v in zip(pushes, limits, _speeds(x), strict=True)]
         other = [
-            _resolved(push - d, limit[1], v) for push, d, limit, v in zip(pushes, dry, limits, now.speeds, strict=True)
+            _resolved(push - d, limit[1], v) for push, d, limit, v in zip(pushes, dry, limits, _speeds(x), strict=True)
         ]
         creeps = [w.creep_force(p) for w in wheelsets]
         slips = [w.slip(p) for w in wheelsets]
-        rims = [p.wheel_radius * rate for rate in now.rates]
+        rims = [p.wheel_radius * rate for rate in x.axle_rate]
         return {
-            "position": now.position,
-            "speed": now.speeds[0],
+            "position": x.train_position,
+            "speed": x.train_speed,
             "acceleration": (pushes[0] - dry[0] - other[0]) / p.mass,
             "wheel_speed": rims[0],
             "slip": slips[0],
             "adhesion_force": _sum(creeps) - other[0],
-            "rim_effort": self._rim_effort(now, u, p),
-            "resistance_force": _sum([r + d for r, d in zip(self._resistances(now, p), dry, strict=True)]),
-            "gradient_force": _sum(self._gradients(now, p)),
+            "rim_effort": self._rim_effort(x, u, p),
+            "resistance_force": _sum([r + d for r, d in zip(self._resistances(x, p), dry, strict=True)]),
+            "gradient_force": _sum(self._gradients(x, p)),
             "wagon_brake_force": _sum(other[1:]),
             "adhesion_degraded": _largest([w.degraded for w in wheelsets]),
             "axle_speed": vector(*rims),
             "axle_slip": vector(*slips),
             "axle_creep_force": vector(*creeps),
-            "wagon_speed": vector(*now.speeds[1:]),
-            "coupler_force": vector(*self._couplers(now, p)),
-            "pipe_pressure": vector(*self._pipe_pressures(now, u, p)),
-            "cylinder_pressure": vector(*now.cylinders),
+            "wagon_speed": x.wagon_velocity,
+            "coupler_force": vector(*self._couplers(x, p)),
+            "pipe_pressure": vector(*self._pipe_pressures(x, u, p)),
+            "cylinder_pressure": x.cylinder,
         }
 
     # -- the brake ----------------------------------------------------------------------------------------------------
 
-    def _pipe_pressures(self, now: _Now, u: Any, p: Any) -> list[Array]:
-        return [self._pipe.pressure(u.brake_demand, now.readings, i, p) for i in range(self.wagons + 1)]
+    def _pipe_pressures(self, x: Any, u: Any, p: Any) -> list[Array]:
+        return [self._pipe.pressure(u.brake_demand, x.pipe_demand, i, p) for i in range(self.wagons + 1)]
 
-    def _rim_effort(self, now: _Now, u: Any, p: Any) -> Array:
+    def _rim_effort(self, x: Any, u: Any, p: Any) -> Array:
         """What the drive and the indirect brake do at the locomotive's rims [N]; at rest the brake pushes nothing."""
         drive = _sum([u.effort[k] for k in range(self.axles)]) if self.effort_per_axle else u.effort
-        return drive - np.sign(now.speeds[0]) * brake_force(now.cylinders[0], p.braked_mass, p)
+        return drive - np.sign(x.train_speed) * brake_force(x.cylinder[0], p.braked_mass, p)
 
     # -- forces, all against the motion but those of rail and couplers ------------------------------------------------
 
-    def _wheelsets(self, passed: Array, now: _Now, u: Any, p: Any) -> list[Wheelset]:
+    def _wheelsets(self, passed: Array, x: Any, u: Any, p: Any) -> list[Wheelset]:
         weight = p.mass * p.gravity / self.axles
-        pneumatic = brake_force(now.cylinders[0], p.braked_mass, p) / self.axles
+        pneumatic = brake_force(x.cylinder[0], p.braked_mass, p) / self.axles
         wheelsets = []
-        for k, rate in enumerate(now.rates):
+        for k, rate in enumerate(x.axle_rate):
             effort = u.effort[k] if self.effort_per_axle else u.effort / self.axles
             edges = len(self._track.edges)
             own = k * edges if self._track.zones == "position" else 0
             degraded = p.axle_degraded[k] * self._track.degraded([passed[own + i] for i in range(edges)])
             brake = np.maximum(-effort, 0.0) + pneumatic
-            wheelsets.append(Wheelset(self._law, rate, now.speeds[0], np.maximum(effort, 0.0), brake, weight, degraded))
+            wheelsets.append(Wheelset(self._law, rate, x.train_speed, np.maximum(effort, 0.0), brake, weight, degraded))
         return wheelsets
 
-    def _pushes(self, now: _Now, wheelsets: list[Wheelset], p: Any) -> list[Array]:
+    def _pushes(self, x: Any, wheelsets: list[Wheelset], p: Any) -> list[Array]:
         """Forces on the vehicles without dry friction [N]."""
-        couplers = [0.0, *self._couplers(now, p), 0.0]
-        resistances, gradients = self._resistances(now, p), self._gradients(now, p)
+        couplers = [0.0, *self._couplers(x, p), 0.0]
+        resistances, gradients = self._resistances(x, p), self._gradients(x, p)
         pushes = [couplers[i] - couplers[i + 1] - resistances[i] - gradients[i] for i in range(self.wagons + 1)]
         return [pushes[0] + _sum([w.creep_force(p) for w in wheelsets]), *pushes[1:]]
 
-    def _couplers(self, now: _Now, p: Any) -> list[Array]:
-        return [coupler_force(e, now.speeds[i] - now.speeds[i + 1], p) for i, e in enumerate(now.elongations)]
+    def _couplers(self, x: Any, p: Any) -> list[Array]:
+        return [coupler_force(e, rate, p) for e, rate in zip(x.elongation, _elongating(x), strict=True)]
 
-    def _resistances(self, now: _Now, p: Any) -> list[Array]:
-        first = moving_resistance(now.speeds[0], p.davis_b, p.davis_c)
-        return [first, *(moving_resistance(v, p.wagon_davis_b, p.wagon_davis_c) for v in now.speeds[1:])]
+    def _resistances(self, x: Any, p: Any) -> list[Array]:
+        first = moving_resistance(x.train_speed, p.davis_b, p.davis_c)
+        return [first, *(moving_resistance(v, p.wagon_davis_b, p.wagon_davis_c) for v in x.wagon_velocity)]
 
-    def _gradients(self, now: _Now, p: Any) -> list[Array]:
-        place = now.position - 0.5 * p.length
+    def _gradients(self, x: Any, p: Any) -> list[Array]:
+        place = x.train_position - 0.5 * p.length
         places = [place]
-        for i, elongation in enumerate(now.elongations):
+        for i, elongation in enumerate(x.elongation):
             place = place - elongation - (0.5 * (p.length + p.wagon_length) if i == 0 else p.wagon_length)
             places.append(place)
         slopes = [self._track.gradient(place, p) for place in places]
         return [gradient_resistance(mass, p.gravity, i) for mass, i in zip(self._masses(p), slopes, strict=True)]
 
-    def _dry_limits(self, now: _Now, wheelsets: list[Wheelset], p: Any) -> list[tuple[Array, Array]]:
+    def _dry_limits(self, x: Any, wheelsets: list[Wheelset], p: Any) -> list[tuple[Array, Array]]:
         """Dry frictions of each vehicle [N]: the constant Davis term, and brake shoes or the hold of braked wheels."""
         first = (p.davis_a, _sum([w.hold(p) for w in wheelsets]))
-        shoes = [brake_force(now.cylinders[i + 1], p.wagon_braked_mass[i], p) for i in range(self.wagons)]
+        shoes = [brake_force(x.cylinder[i + 1], p.wagon_braked_mass[i], p) for i in range(self.wagons)]
         return [first, *((p.wagon_davis_a, force) for force in shoes)]
 
     def _masses(self, p: Any) -> list[Array]:
         return [p.mass, *(p.wagon_mass[i] for i in range(self.wagons))]
 
 
-class _Now:
-    """The state by what it means: lists of scalars (or of batches of them)."""
+def _speeds(x: Any) -> list[Array]:
+    """Speeds of all vehicles [m/s]."""
+    return [x.train_speed, *x.wagon_velocity]
 
-    def __init__(self, train: Train, x: Array) -> None:
-        n, axles = train.wagons, train.axles
-        ends = np.cumsum([1, n, n + 1, axles, n + 1, 1])
-        position, self.elongations, self.speeds, self.rates, self.cylinders, integral, self.readings = (
-            [x[i] for i in range(low, high)] for low, high in zip([0, *ends], [*ends, x.shape[0]], strict=True)
-        )
-        self.position, self.demand_integral = position[0], integral[0]
+
+def _elongating(x: Any) -> list[Array]:
+    """Derivatives of the couplers' elongations [m/s]."""
+    return [before - behind for before, behind in pairwise(_speeds(x))]
 
 
 def _resolved(push: Array, limit: Array, speed: Array) -> Array:
