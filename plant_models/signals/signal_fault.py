@@ -59,6 +59,7 @@ class SignalFault(HybridSystem):
     name = "signal_fault"
     description = "Faults of any signal: stuck, gain, offset, drift, ramped, lost samples"
     source = "Omar 2012, section 7.4, (7.6.12)"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     purpose = Purpose.FAULTS
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
@@ -96,8 +97,8 @@ class SignalFault(HybridSystem):
             self.events = (PeriodicEvent("sampling", "sample_period", None, (chance,), "A sample is taken, or lost"),)
         super().__init__(channels=channels, fault_count=fault_count, unit=unit, losses=losses)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """A sample is taken, or lost, shape (channels,) or (channels, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """A sample is taken, or lost."""
         a, b = u.chance_normal[0], u.chance_normal[1]
         share = np.exp(-0.5 * (a * a + b * b))  # of the uniform distribution: the same in Python and in C
         values = []
@@ -106,15 +107,15 @@ class SignalFault(HybridSystem):
             for i in range(self.fault_count):
                 within = self._within(i, t, p, p.fault_rise[i] + p.fault_length[i]) * self._concerns(i, channel, p)
                 lost = np.maximum(lost, within * np.where(share < p.fault_loss[i], 1.0, 0.0))
-            values.append(np.where(lost > 0.0, x[channel], self._healthy(channel, u)))
-        return vector(*values)
+            values.append(np.where(lost > 0.0, self._of(channel, x.held), self._of(channel, u.healthy)))
+        return {"held": self._together(values)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The signals with their faults, whether one acts, and how many are not over."""
         weights = [self._weight(i, t, p) for i in range(self.fault_count)]
         readings = []
         for channel in range(self.channels):
-            value = x[channel] if self.losses else self._healthy(channel, u)
+            value = self._of(channel, x.held if self.losses else u.healthy)
             wrong: Array = 0.0 * value
             for i, weight in enumerate(weights):
                 change = (p.fault_gain[i] - 1.0) * value + p.fault_offset[i]
@@ -125,15 +126,17 @@ class SignalFault(HybridSystem):
         for i, length in enumerate(lengths):
             acting = np.maximum(acting, self._within(i, t, p, length))
             unfinished = unfinished + np.where(length > 0.0, np.where(t < p.fault_onset[i] + length, 1.0, 0.0), 0.0)
-        reading = readings[0] if self.channels == 1 else vector(*readings)
-        return {"reading": reading, "active": acting, "faults_unfinished": unfinished}
+        return {"reading": self._together(readings), "active": acting, "faults_unfinished": unfinished}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
-    def _healthy(self, channel: int, u: Any) -> Array:
-        return u.healthy if self.channels == 1 else u.healthy[channel]
+    def _of(self, channel: int, values: Array) -> Array:
+        return values if self.channels == 1 else values[channel]
+
+    def _together(self, values: list[Array]) -> Array:
+        return values[0] if self.channels == 1 else vector(*values)
 
     def _concerns(self, i: int, channel: int, p: Any) -> Array:
         return 1.0 if self.channels == 1 else np.where(np.abs(p.fault_channel[i] - (channel + 1.0)) < 0.5, 1.0, 0.0)

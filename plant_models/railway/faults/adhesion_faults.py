@@ -42,40 +42,40 @@ class AdhesionFaults:
         self.switchings: tuple[str, ...] = ("locking", "half_locked", "locked", "spinning", "half_spun", "spun")
         self.events: tuple[PeriodicEvent, ...] = ()
 
-    def fault(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> Fault:
+    def fault(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> Fault:
         """See `FaultCause.fault`.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (6,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (6,). u: inputs. p: parameters.
         """
-        lock, spin = (np.where(share > 2.0 * ROLLING, np.minimum(share, 1.0), 0.0) for share in s)
+        lock, spin = (np.where(share > 2.0 * ROLLING, np.minimum(share, 1.0), 0.0) for share in (x.lock, x.spin))
         return Fault(p.spin_depth * spin - lock, 0.0)
 
-    def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
+    def rates(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> dict[str, Array]:
         """See `FaultCause.rates`.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (6,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (6,). u: inputs. p: parameters.
         """
         brake = np.maximum(-u.effort, 0.0) * (1.0 - braking_stopped(u))
         traction = np.maximum(u.effort, 0.0)
-        return [_rate(brake, passed[:3], u, p), _rate(traction, passed[3:], u, p)]
+        return {"lock": _rate(brake, passed[:3], u, p), "spin": _rate(traction, passed[3:], u, p)}
 
-    def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.
 
         Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs. p: parameters.
         """
-        return [share - bound for share in s for bound in (ROLLING, 0.5, 1.0)]
+        return [share - bound for share in (x.lock, x.spin) for bound in (ROLLING, 0.5, 1.0)]
 
-    def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def jump(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Nothing jumps.
 
         Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs. p: parameters.
         """
-        return s
+        return {}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Sliding adhesion is not above the limit.

@@ -23,7 +23,6 @@ _NOISES = tuple(
     )
     for part in ("a", "b")
 )
-_ONSET, _END, _SIGN, _DEPTH = 1, 2, 3, 4  # behind the clock of the release
 
 
 class DrawnFaults:
@@ -57,49 +56,55 @@ class DrawnFaults:
             PeriodicEvent("drawing", "draw_period", None, _NOISES, "A fault may be drawn"),
         )
 
-    def fault(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> Fault:
+    def fault(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> Fault:
         """See `FaultCause.fault`.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (3,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (3,). u: inputs. p: parameters.
         """
-        kept = one_where(s[_SIGN] * u.effort > 0.0)
-        return Fault(_window(passed) * kept * s[_SIGN] * s[_DEPTH], 0.0)
+        kept = one_where(x.drawn_sign * u.effort > 0.0)
+        return Fault(_window(passed) * kept * x.drawn_sign * x.drawn_depth, 0.0)
 
-    def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
+    def rates(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> dict[str, Array]:
         """See `FaultCause.rates`.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (3,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (3,). u: inputs. p: parameters.
         """
-        let_go = 1.0 - one_where(s[_SIGN] * u.effort > 0.0)
-        released = np.where(s[_SIGN] < 0.0, braking_stopped(u), 0.0)
-        return [_window(passed) * np.maximum(let_go, released)]
+        let_go = 1.0 - one_where(x.drawn_sign * u.effort > 0.0)
+        released = np.where(x.drawn_sign < 0.0, braking_stopped(u), 0.0)
+        return {"released_for": _window(passed) * np.maximum(let_go, released)}
 
-    def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.
 
         Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs. p: parameters.
         """
-        return [t - s[_ONSET], t - s[_END], s[0] - p.release_time]
+        return [t - x.drawn_onset, t - x.drawn_end, x.released_for - p.release_time]
 
-    def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def jump(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """See `FaultCause.jump`: the next fault, where none is on and one begins before the next draw.
 
         Args:
-            t: time [s]. s: states of the cause. u: inputs with the noises. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs with the noises. p: parameters.
         """
         rate = np.where(u.effort < 0.0, p.jam_rate, np.where(u.effort > 0.0, p.skid_rate, 0.0))
         chance = _exponential(u.onset_noise_a, u.onset_noise_b)
-        idle = np.maximum(one_where(t >= s[_END]), one_where(s[0] >= p.release_time))
+        idle = np.maximum(one_where(t >= x.drawn_end), one_where(x.released_for >= p.release_time))
         drawn = idle * one_where(chance < rate * p.draw_period)
         onset = t + chance / np.maximum(rate, 1e-300)
         length = np.minimum(p.mean_length * _exponential(u.length_noise_a, u.length_noise_b), p.longest_length)
         share = np.exp(-_exponential(u.depth_noise_a, u.depth_noise_b))
         depth = p.least_depth + (p.most_depth - p.least_depth) * share
-        new = [0.0 * t, onset, onset + length, np.where(u.effort < 0.0, -1.0, 1.0), depth]
-        return [np.where(drawn > 0.0, fresh, old) for fresh, old in zip(new, s, strict=True)]
+        new = {
+            "released_for": 0.0,
+            "drawn_onset": onset,
+            "drawn_end": onset + length,
+            "drawn_sign": np.where(u.effort < 0.0, -1.0, 1.0),
+            "drawn_depth": depth,
+        }
+        return {name: np.where(drawn > 0.0, fresh, getattr(x, name)) for name, fresh in new.items()}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """The depths are in order.

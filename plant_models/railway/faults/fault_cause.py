@@ -40,33 +40,33 @@ class FaultCause(Protocol):
     switchings: tuple[str, ...]
     events: tuple[PeriodicEvent, ...]
 
-    def fault(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> Fault:
+    def fault(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> Fault:
         """What the wheel does.
 
         Args:
-            t: time [s]. s: states of the cause, continuous ones first. passed: 1 for switching functions that are not
+            t: time [s]. x: states of the wheel by name. passed: 1 for switching functions that are not
                 negative, else 0, shape (k,). u: inputs. p: parameters.
         """
 
-    def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
+    def rates(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the continuous states.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (k,). u: inputs. p: parameters.
         """
 
-    def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> list[Array]:
         """Switching functions.
 
         Args:
-            t: time [s]. s: states of the cause, continuous ones first. u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs. p: parameters.
         """
 
-    def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """All states of the cause after its periodic event.
+    def jump(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What the periodic event of the cause changes.
 
         Args:
-            t: time [s]. s: states of the cause, continuous ones first. u: inputs with the noises. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs with the noises. p: parameters.
         """
 
     def requirements(self, p: Any) -> dict[str, Array]:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from plant_models.hybrid.arrays import Array, vector
 from plant_models.hybrid.event import PeriodicEvent
 from plant_models.hybrid.signal import Signal, parameter, state
-from plant_models.hybrid.system import Array
 from plant_models.railway.faults.fault_cause import Fault, braking_stopped, one_where
 
 
@@ -41,44 +41,45 @@ class GivenFaults:
         )
         self.events: tuple[PeriodicEvent, ...] = ()
 
-    def fault(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> Fault:
+    def fault(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> Fault:
         """See `FaultCause.fault`.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (k,). u: inputs. p: parameters.
         """
         depth = sum(self._active(i, passed) * self._sign(i, p) * p.fault_depth[i] for i in range(self.count))
         over = [1.0 - (1.0 - passed[self.count + i]) * (1.0 - passed[2 * self.count + i]) for i in range(self.count)]
         used = [one_where(p.fault_length[i] > 0.0) for i in range(self.count)]
         return Fault(depth, sum(used[i] * (1.0 - over[i]) for i in range(self.count)))
 
-    def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
+    def rates(self, t: Array, x: Any, passed: Array, u: Any, p: Any) -> dict[str, Array]:
         """See `FaultCause.rates`.
 
         Args:
-            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. passed: switches, shape (k,). u: inputs. p: parameters.
         """
         released = braking_stopped(u)
-        return [released * self._active(i, passed) * one_where(p.fault_kind[i] < 0.0) for i in range(self.count)]
+        jams = [one_where(p.fault_kind[i] < 0.0) for i in range(self.count)]
+        return {"released_for": vector(*(released * self._active(i, passed) * jam for i, jam in enumerate(jams)))}
 
-    def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.
 
         Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs. p: parameters.
         """
         faults = range(self.count)
         begun = [t - p.fault_onset[i] for i in faults]
         ended = [t - (p.fault_onset[i] + p.fault_length[i]) for i in faults]
-        return [*begun, *ended, *(s[i] - p.release_time for i in faults)]
+        return [*begun, *ended, *(x.released_for[i] - p.release_time for i in faults)]
 
-    def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+    def jump(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Nothing jumps.
 
         Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+            t: time [s]. x: states of the wheel by name. u: inputs. p: parameters.
         """
-        return s
+        return {}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Faults are jams or skids, listed in the order of time, and do not overlap.

@@ -66,6 +66,7 @@ class WheelFault(HybridSystem):
     name = "wheel_fault"
     description = "Wheel that jams and skids, given, drawn or by adhesion: speed in, wheel speed and distance out"
     source = "Aguiar Cota 2019, (2.26)-(2.29), Figs. 2-13 and 2-14; causes and time laws are ours"
+    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     purpose = Purpose.FAULTS
     outputs = (
@@ -109,40 +110,37 @@ class WheelFault(HybridSystem):
         self.switchings, self.events = self._cause.switchings, self._cause.events
         super().__init__(cause=cause, fault_count=fault_count, distance_from=distance_from)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the distance and of the states of the cause, shape (nc,) or (nc, members)."""
-        s, passed = self._states(x), self.switches(t, x, u, p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the distance and of the states of the cause."""
+        passed = self.switches(t, x, u, p)
         turning = 1.0 if self.distance_from == "speed" else 0.0  # else only what the fault adds is integrated here
-        rate = u.speed * (turning + self._cause.fault(t, s, passed, u, p).depth)
-        return vector(rate, *self._cause.rates(t, s, passed, u, p))
+        rate = u.speed * (turning + self._cause.fault(t, x, passed, u, p).depth)
+        return {"rim_distance": rate, **self._cause.rates(t, x, passed, u, p)}
 
-    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Switching functions of the cause."""
-        return vector(*self._cause.switching(t, self._states(x), u, p))
+        return vector(*self._cause.switching(t, x, u, p))
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A fault is drawn, or none."""
-        return vector(x[0], *self._cause.jump(t, self._states(x), u, p))
+        return self._cause.jump(t, x, u, p)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs."""
-        depth, unfinished = self._cause.fault(t, self._states(x), self.switches(t, x, u, p), u, p)
+        depth, unfinished = self._cause.fault(t, x, self.switches(t, x, u, p), u, p)
         jammed, skidding = np.maximum(-depth, 0.0), np.maximum(depth, 0.0)
         return {
             "wheel_speed": u.speed * (1.0 + depth),
-            "wheel_distance": x[0] if self.distance_from == "speed" else u.position + x[0],
+            "wheel_distance": x.rim_distance if self.distance_from == "speed" else u.position + x.rim_distance,
             "active": one_where(np.abs(depth) > 0.0),
-            "depth": depth + 0.0 * x[0],
+            "depth": depth + 0.0 * x.rim_distance,
             "effort_loss": np.minimum(p.jam_loss * jammed + p.skid_loss * skidding, 1.0),
-            "faults_unfinished": unfinished + 0.0 * x[0],
+            "faults_unfinished": unfinished,
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and what the cause requires."""
         return {**within_bounds(self.parameters, p), **self._cause.requirements(p)}
-
-    def _states(self, x: Array) -> list[Array]:
-        return [x[i] for i in range(1, self.state_count)]
 
 
 _DISTANCE = state("rim_distance", "m", 0.0, "Distance run by the wheel's rim at start")
