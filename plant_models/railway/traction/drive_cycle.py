@@ -31,6 +31,7 @@ class DriveCycle(HybridSystem):
     name = "drive_cycle"
     description = "Speed reference and load torque of a drive, in steps"
     source = "Allaoui 2024, section III.3, Figs. 3.10, 4.16-4.18; speeds are ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     outputs = (
         output_signal("speed_reference", "rad/s", "Speed asked for", display_unit="rpm", variability="discrete"),
@@ -50,7 +51,7 @@ class DriveCycle(HybridSystem):
     }
     default_preset = "load_step"
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Reference and load now."""
         turns = p.reversal_period > 0.0
         # An instant that is on the edge but for rounding is on the edge.

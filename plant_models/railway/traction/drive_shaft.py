@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -28,6 +28,7 @@ class DriveShaft(HybridSystem):
     name = "drive_shaft"
     description = "Elastic drive shaft with gear between traction motors and wheels"
     source = "ours"
+    by_name = True
     internal_step = 1e-3
     states = (state("twist", "rad", 0.0, "Twist of the shaft, side of the motor"),)
     inputs = (
@@ -56,13 +57,13 @@ class DriveShaft(HybridSystem):
     presets: Mapping[str, Mapping[str, Any]] = {"locomotive": {}}
     default_preset = "locomotive"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the twist, shape (1,) or (1, members)."""
-        return vector(_slip(u, p) + 0.0 * x[0])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the twist."""
+        return {"twist": _slip(u, p)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Torque, effort and the speed of the rims."""
-        torque = p.stiffness * x[0] + p.damping * _slip(u, p)
+        torque = p.stiffness * x.twist + p.damping * _slip(u, p)
         return {
             "load_torque": torque,
             "effort": p.motors * p.gear_ratio * torque / p.wheel_radius,

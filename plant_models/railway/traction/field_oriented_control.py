@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
@@ -40,6 +40,7 @@ class FieldOrientedControl(HybridSystem):
     name = "field_oriented_control"
     description = "Field-oriented control of a synchronous motor, speed and currents"
     source = "Allaoui 2024, section IV.2.3.8, Fig. 4.15; gains and limits are ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("speed_integral", "A", 0.0, "Integral of the speed control"),
@@ -97,46 +98,55 @@ class FieldOrientedControl(HybridSystem):
         )
         super().__init__(frame=frame, reference=reference)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Voltages of the coming period from the signals of this instant, shape (7,) or (7, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Voltages of the coming period from the signals of this instant."""
         first, second = (getattr(u, f"current_{axis}") for axis in AXES[self.frame])
         current_d, current_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, u.angle)
         torque_constant = 1.5 * p.pole_pairs * p.rotor_flux
         if self.reference == "torque":
             reference = _limited(u.torque_reference / torque_constant, p.current_limit)
-            speed_integral = 0.0 * x[0]
+            speed_integral = 0.0
         else:
             push = p.speed_bandwidth * p.inertia / torque_constant * (u.speed_reference - u.speed)
-            reference = _limited(push + x[0], p.current_limit)
+            reference = _limited(push + x.speed_integral, p.current_limit)
             # Integrals go back by what a limit cuts off, with the time constant of their own PI.
-            cut = reference - push - x[0]
-            speed_integral = x[0] + p.control_period * p.speed_bandwidth / 5.0 * (push + cut)
+            cut = reference - push - x.speed_integral
+            speed_integral = x.speed_integral + p.control_period * p.speed_bandwidth / 5.0 * (push + cut)
 
         electrical, rate = p.pole_pairs * u.speed, p.current_bandwidth
         errors = (-current_d, reference - current_q)
         inductances = (p.inductance_d, p.inductance_q)
-        wanted_d = rate * p.inductance_d * errors[0] + x[1] - electrical * p.inductance_q * current_q
-        wanted_q = rate * p.inductance_q * errors[1] + x[2] + electrical * (p.inductance_d * current_d + p.rotor_flux)
+        wanted_d = rate * p.inductance_d * errors[0] + x.integral_d - electrical * p.inductance_q * current_q
+        flux_d = p.inductance_d * current_d + p.rotor_flux
+        wanted_q = rate * p.inductance_q * errors[1] + x.integral_q + electrical * flux_d
         length = np.sqrt(wanted_d * wanted_d + wanted_q * wanted_q)
         share = np.minimum(1.0, p.voltage_limit / np.maximum(length, p.voltage_limit))
         voltages = (share * wanted_d, share * wanted_q)
         integrals = [
             integral + p.control_period * p.stator_resistance * (rate * e + (limited - wanted) / inductance)
             for integral, e, limited, wanted, inductance in zip(
-                (x[1], x[2]), errors, voltages, (wanted_d, wanted_q), inductances, strict=True
+                (x.integral_d, x.integral_q), errors, voltages, (wanted_d, wanted_q), inductances, strict=True
             )
         ]
-        return vector(speed_integral, *integrals, *voltages, u.angle, reference)
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """The voltages of this period in both frames, and the current asked for."""
-        alpha, beta = to_stator(x[3], x[4], x[5])
         return {
-            "voltage_d": x[3],
-            "voltage_q": x[4],
+            "speed_integral": speed_integral,
+            "integral_d": integrals[0],
+            "integral_q": integrals[1],
+            "held_voltage_d": voltages[0],
+            "held_voltage_q": voltages[1],
+            "held_angle": u.angle,
+            "held_reference": reference,
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The voltages of this period in both frames, and the current asked for."""
+        alpha, beta = to_stator(x.held_voltage_d, x.held_voltage_q, x.held_angle)
+        return {
+            "voltage_d": x.held_voltage_d,
+            "voltage_q": x.held_voltage_q,
             "voltage_alpha": alpha,
             "voltage_beta": beta,
-            "current_reference": x[6],
+            "current_reference": x.held_reference,
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:

@@ -28,6 +28,7 @@ class Inverter(HybridSystem):
     name = "inverter"
     description = "Voltage-source inverter with space-vector modulation, averaged"
     source = "standard averaged model; Allaoui 2024, Fig. 4.15, names one"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     inputs = (
         input_signal("wanted_voltage_alpha", "V", 0.0, "Voltage asked for along alpha"),
@@ -45,7 +46,7 @@ class Inverter(HybridSystem):
     presets: Mapping[str, Mapping[str, Any]] = {"drive_100w": {}, "traction_200kw": {"direct_voltage": 1500.0}}
     default_preset = "drive_100w"
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Voltages, duties and direct current for the voltages asked for now."""
         a, b, c = inverse_clarke(u.wanted_voltage_alpha, u.wanted_voltage_beta)
         middle = 0.5 * (np.maximum(np.maximum(a, b), c) + np.minimum(np.minimum(a, b), c))

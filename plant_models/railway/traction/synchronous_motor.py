@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from plant_models.hybrid import HybridSystem, Signal, state, vector
+from plant_models.hybrid import HybridSystem, Signal, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import (
@@ -30,6 +30,7 @@ from plant_models.railway.traction.sampled_currents import (
 from plant_models.railway.traction.transforms import to_stator
 
 Noise = Literal["none", "sampled"]
+MOVING = ("rotor_current_d", "rotor_current_q", "shaft_speed", "electrical_angle")
 
 
 class SynchronousMotor(HybridSystem):
@@ -54,6 +55,7 @@ class SynchronousMotor(HybridSystem):
     name = "synchronous_motor"
     description = "Permanent-magnet synchronous motor in the rotor frame, continuous"
     source = "Allaoui 2024, (4.27)-(4.38), Annex C"
+    by_name = True
     internal_step = 1e-4
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(state)
     parameters: tuple[Signal, ...] = MOTOR_PARAMETERS
@@ -81,35 +83,52 @@ class SynchronousMotor(HybridSystem):
         self.inputs, self.outputs = motor_inputs(frame), motor_outputs(frame)
         super().__init__(**{option: value for option, value in chosen.items() if option in self.option_choices})
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of currents, speed and angle, shape (4,) or (4, members)."""
-        voltages = rotor_voltages(self.frame, u, x[3])
-        return vector(*motor_rates((x[0], x[1], x[2], x[3]), *voltages, u.load_torque, p))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of currents, speed and angle."""
+        voltages = rotor_voltages(self.frame, u, x.electrical_angle)
+        return dict(zip(MOVING, motor_rates(moving(x), *voltages, u.load_torque, p), strict=True))
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """A sample: noise enters the state (not at the first one), the currents are measured; shape (7,)."""
-        before = (x[0], x[1], x[2], x[3])
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """A sample: noise enters the state, the currents are measured."""
+        return self.disturbed(moving(x), x.sampled, u, p)
+
+    def disturbed(self, state: tuple[Array, Array, Array, Array], sampled: Array, u: Any, p: Any) -> dict[str, Array]:
+        """State with the noise of a sample, which the first one has not, and the currents measured then.
+
+        Args:
+            state: currents along d and q [A], speed [rad/s], angle [rad]. sampled: 1 after the first sample. u: inputs
+                with the noises. p: parameters.
+        """
         first, second, third, fourth = (
-            value + x[6] * noise for value, noise in zip(before, process_noise(u, p), strict=True)
+            value + sampled * noise for value, noise in zip(state, process_noise(u, p), strict=True)
         )
         after = (first, second, third, fourth)
-        return vector(*after, *measured_currents(self.frame, after, u, p), 1.0)
+        names = (*MOVING, *(f"held_current_{axis}" for axis in AXES[self.frame]), "sampled")
+        return dict(zip(names, (*after, *measured_currents(self.frame, after, u, p), 1.0), strict=True))
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """State, torque and the measured currents."""
-        first, second = AXES[self.frame]
-        now = (x[0], x[1]) if self.frame == "rotor" else to_stator(x[0], x[1], x[3])
-        measured = (x[4], x[5]) if self.sampled else now
+        current_d, current_q, speed, angle = moving(x)
+        now = (current_d, current_q) if self.frame == "rotor" else to_stator(current_d, current_q, angle)
+        held = [getattr(x, f"held_current_{axis}") for axis in AXES[self.frame]] if self.sampled else now
         return {
-            "current_d": x[0],
-            "current_q": x[1],
-            "speed": x[2],
-            "angle": x[3],
-            "torque": electromagnetic_torque(x[0], x[1], p),
-            f"measured_current_{first}": measured[0],
-            f"measured_current_{second}": measured[1],
+            "current_d": current_d,
+            "current_q": current_q,
+            "speed": speed,
+            "angle": angle,
+            "torque": electromagnetic_torque(current_d, current_q, p),
+            **{f"measured_current_{axis}": value for axis, value in zip(AXES[self.frame], held, strict=True)},
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
+
+
+def moving(x: Any) -> tuple[Array, Array, Array, Array]:
+    """Currents along d and q [A], speed [rad/s] and angle [rad] of a motor.
+
+    Args:
+        x: states by name.
+    """
+    return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle

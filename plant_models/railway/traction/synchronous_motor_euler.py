@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
-from plant_models.hybrid import HybridSystem, Signal, memory, vector
+from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import FRAMES, Frame, euler_step, rotor_voltages
-from plant_models.railway.traction.sampled_currents import (
-    PUBLISHED_NOISE,
-    measured_currents,
-    process_noise,
-    sampling_event,
-)
-from plant_models.railway.traction.synchronous_motor import SynchronousMotor
+from plant_models.railway.traction.sampled_currents import PUBLISHED_NOISE, sampling_event
+from plant_models.railway.traction.synchronous_motor import SynchronousMotor, moving
 
 
 class SynchronousMotorEuler(SynchronousMotor):
@@ -57,17 +52,12 @@ class SynchronousMotorEuler(SynchronousMotor):
     def __init__(self, *, frame: Frame = "rotor") -> None:
         super().__init__(frame=frame, noise="sampled")
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Nothing flows, shape (0,)."""
-        return HybridSystem.flow(self, t, x, u, p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Nothing flows."""
+        return {}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """State and measured currents after a period; at the start they are measured only; shape (7,)."""
-        before = (x[0], x[1], x[2], x[3])
-        voltages = rotor_voltages(self.frame, u, x[3])
-        moved = euler_step(before, *voltages, u.load_torque, x[6] * p.sample_period, p)
-        first, second, third, fourth = (
-            value + x[6] * noise for value, noise in zip(moved, process_noise(u, p), strict=True)
-        )
-        after = (first, second, third, fourth)
-        return vector(*after, *measured_currents(self.frame, after, u, p), 1.0)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """State and measured currents after a period; at the start they are measured only."""
+        voltages = rotor_voltages(self.frame, u, x.electrical_angle)
+        moved = euler_step(moving(x), *voltages, u.load_torque, x.sampled * p.sample_period, p)
+        return self.disturbed(moved, x.sampled, u, p)

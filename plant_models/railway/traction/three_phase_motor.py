@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import MOTOR_PARAMETERS
@@ -32,6 +32,7 @@ class ThreePhaseMotor(HybridSystem):
     name = "three_phase_motor"
     description = "Permanent-magnet synchronous motor in its three phases"
     source = "Allaoui 2024, (4.22)-(4.26)"
+    by_name = True
     internal_step = 1e-4
     states = (
         state("phase_current_a", "A", 0.0, "Current of phase a"),
@@ -58,34 +59,35 @@ class ThreePhaseMotor(HybridSystem):
     presets: Mapping[str, Mapping[str, Any]] = {"annex_c": {}}
     default_preset = "annex_c"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of two phase currents, speed and angle, shape (4,) or (4, members)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of two phase currents, speed and angle."""
         currents = _currents(x)
-        slopes = _flux_slopes(x[3], p)
-        electrical = p.pole_pairs * x[2]
+        slopes = _flux_slopes(x.electrical_angle, p)
+        electrical = p.pole_pairs * x.shaft_speed
         driving = [
             voltage - p.stator_resistance * current - electrical * slope
             for voltage, current, slope in zip((u.voltage_a, u.voltage_b, u.voltage_c), currents, slopes, strict=True)
         ]
         star = (driving[0] + driving[1] + driving[2]) / 3.0  # voltage of the star point
-        return vector(
-            (driving[0] - star) / p.cyclic_inductance,
-            (driving[1] - star) / p.cyclic_inductance,
-            (_torque(currents, slopes, p) - u.load_torque - p.viscous_friction * x[2]) / p.inertia,
-            electrical,
-        )
+        torque = _torque(currents, slopes, p)
+        return {
+            "phase_current_a": (driving[0] - star) / p.cyclic_inductance,
+            "phase_current_b": (driving[1] - star) / p.cyclic_inductance,
+            "shaft_speed": (torque - u.load_torque - p.viscous_friction * x.shaft_speed) / p.inertia,
+            "electrical_angle": electrical,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Currents in phases and in the rotor frame, speed, angle and torque."""
         currents = _currents(x)
-        current_d, current_q = park(*currents, x[3])
+        current_d, current_q = park(*currents, x.electrical_angle)
         return {
             **{f"current_{phase}": current for phase, current in zip(PHASES, currents, strict=True)},
             "current_d": current_d,
             "current_q": current_q,
-            "speed": x[2],
-            "angle": x[3],
-            "torque": _torque(currents, _flux_slopes(x[3], p), p),
+            "speed": x.shaft_speed,
+            "angle": x.electrical_angle,
+            "torque": _torque(currents, _flux_slopes(x.electrical_angle, p), p),
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
@@ -93,8 +95,8 @@ class ThreePhaseMotor(HybridSystem):
         return within_bounds(self.parameters, p)
 
 
-def _currents(x: Array) -> tuple[Array, Array, Array]:
-    return x[0], x[1], -(x[0] + x[1])
+def _currents(x: Any) -> tuple[Array, Array, Array]:
+    return x.phase_current_a, x.phase_current_b, -(x.phase_current_a + x.phase_current_b)
 
 
 def _flux_slopes(angle: Array, p: Any) -> tuple[Array, Array, Array]:
