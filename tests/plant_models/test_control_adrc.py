@@ -23,6 +23,7 @@ class MassUnderAdrc(HybridSystem):
     """A mass, a constant disturbing acceleration and the controller, as one continuous system."""
 
     name = "mass_under_adrc"
+    by_name = True
     states = (*ADRC.states, state("speed", "m/s"))
     inputs = (input_signal("reference", "m/s"), input_signal("rise", "m/s2"), input_signal("disturbance", "m/s2"))
     parameters = (*ADRC.parameters, parameter("true_mass", "kg", MASS))
@@ -31,13 +32,12 @@ class MassUnderAdrc(HybridSystem):
     internal_step = 1e-2
 
     def told(self, x: Any, u: Any) -> Any:
-        return ADRC.unpack_inputs(vector(x[3], u.reference, u.rise))
+        return ADRC.unpack_inputs(vector(x.speed, u.reference, u.rise))
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         told = self.told(x, u)
-        rates = ADRC.flow(t, x, told, p)
-        effort = ADRC.output(t, x, told, p)["effort"] - x[2]
-        return vector(*(rates[i] for i in range(3)), effort / p.true_mass + u.disturbance)
+        effort = ADRC.output(t, x, told, p)["effort"] - x.built_up_brake
+        return {**ADRC.flow(t, x, told, p), "speed": effort / p.true_mass + u.disturbance}
 
 
 def test_a_step_is_followed_with_the_designed_pole() -> None:
@@ -90,9 +90,8 @@ def test_a_ramped_drive_keeps_its_rate_and_the_observer_knows_it() -> None:
         parameters = (*controller.parameters, parameter("true_mass", "kg", MASS))
 
         def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            told = controller.unpack_inputs(vector(x[4], u.reference, u.rise))
-            rates = controller.flow(t, x, told, p)
-            return vector(*(rates[i] for i in range(4)), (x[3] - x[2]) / p.true_mass + u.disturbance)
+            rates = controller.flow(t, x, self.told(x, u), p)
+            return {**rates, "speed": (x.drive_effort - x.built_up_brake) / p.true_mass + u.disturbance}
 
     loop = started(MassUnderRampedDrive(), u0=[25.0, 0.0, 0.0])
     times = np.arange(0.5, 3.01, 0.5)
@@ -113,7 +112,7 @@ def test_a_ramped_drive_keeps_its_rate_and_the_observer_knows_it() -> None:
 )
 def test_the_effort_stays_within_its_limits(x: Any, u: Any, preset: str) -> None:
     p = ADRC.unpack_parameters(parameters(ADRC, preset))
-    out = ADRC.output(0.0, np.array(x), ADRC.unpack_inputs(np.array(u)), p)
+    out = ADRC.output(0.0, ADRC.unpack_states(np.array(x)), ADRC.unpack_inputs(np.array(u)), p)
     assert -p.electric_brake_limit <= out["effort"] <= min(350e3, 4.2e6 / max(abs(u[0]), 1e-9)) * (1.0 + 1e-12)
     assert 0.0 <= out["brake_demand"] <= (1.0 if preset == "train" else 0.0)
 

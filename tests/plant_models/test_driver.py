@@ -13,6 +13,7 @@ from plant_models import Driver
 DRIVER = Driver()
 KMH_50 = 50.0 / 3.6
 NO_LAG = {"effort_lag": 0.01}
+REST = DRIVER.unpack_states(np.zeros(2))
 
 
 @given(t=st.floats(0.0, 150.0))
@@ -22,7 +23,7 @@ def test_the_reference_is_the_printed_profile(t: float) -> None:
         ("profile_b", [0.0, 30.0, 60.0, 90.0], [0.0, 50.0, 50.0, 0.0]),
     ):
         p = DRIVER.unpack_parameters(DRIVER.start_parameters(preset))
-        reference = DRIVER.output(t, np.zeros(2), DRIVER.unpack_inputs(np.zeros(1)), p)["speed_reference"]
+        reference = DRIVER.output(t, REST, DRIVER.unpack_inputs(np.zeros(1)), p)["speed_reference"]
         assert reference == pytest.approx(np.interp(t, times, speeds), abs=1e-12)
 
 
@@ -36,7 +37,7 @@ def test_a_profile_may_have_more_points_and_keeps_its_presets(count: int) -> Non
         assert p.power_limit == usual.power_limit
         for t in (0.0, 7.0, 44.0, 71.0, 100.0):
             inputs = driver.unpack_inputs(np.zeros(1))
-            told = [d.output(t, np.zeros(2), inputs, q)["speed_reference"] for d, q in ((driver, p), (DRIVER, usual))]
+            told = [d.output(t, REST, inputs, q)["speed_reference"] for d, q in ((driver, p), (DRIVER, usual))]
             assert told[0] == told[1]
 
 
@@ -51,8 +52,7 @@ def test_the_profiles_cover_the_distances_they_claim() -> None:
     for preset, distance in (("profile_d", 65.0 * KMH_50), ("profile_b", 3000.0)):
         p = DRIVER.unpack_parameters(DRIVER.start_parameters(preset))
         reference = [
-            float(DRIVER.output(s, np.zeros(2), DRIVER.unpack_inputs(np.zeros(1)), p)["speed_reference"])
-            for s in t[::100]
+            float(DRIVER.output(s, REST, DRIVER.unpack_inputs(np.zeros(1)), p)["speed_reference"]) for s in t[::100]
         ]
         assert np.trapezoid(reference, t[::100]) == pytest.approx(distance, rel=1e-9)  # corners lie on the grid
 

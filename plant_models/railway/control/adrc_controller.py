@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.brake_blending import air_brake_demand, building_up, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
@@ -19,7 +19,6 @@ from plant_models.railway.control.extended_state_observer import observer_deriva
 from plant_models.railway.control.logic import either, every, holds
 
 Drive = Literal["immediate", "ramped"]
-DRIVE_EFFORT = 3  # index of the effort of a ramped drive in the state
 
 
 class _Command(NamedTuple):
@@ -73,6 +72,7 @@ class AdrcController(HybridSystem):
     name = "adrc_controller"
     description = "ADRC speed controller on the odometer: extended state observer, effort and air brake demand out"
     source = "Bouchama 2024, sections 4.1 and 4.5; Gao 2003; gains ours"
+    by_name = True
     internal_step = 1e-2  # the observer's poles are at 1.5 rad/s
     states: tuple[Signal, ...] = (
         state("observed_speed", "m/s", 0.0, "Speed estimate z1 of the extended state observer"),
@@ -117,46 +117,49 @@ class AdrcController(HybridSystem):
             )
         super().__init__(drive=drive)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both estimates, of the air brake's force and of a ramped drive's effort, shape (n,) or (n,
-        members).
-        """
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of both estimates, of the air brake's force and of a ramped drive's effort."""
         command = self._command(x, u, p)
-        applied = (self._effort(x, command) - x[2]) / p.mass
-        speed, disturbance = observer_derivative(u.odometer, x[0], x[1], applied, p.observer_bandwidth)
-        relaxing = p.observer_bandwidth * (u.odometer - x[0])  # the brake that holds a standing train is no disturbance
-        return vector(
-            either(command.standing, relaxing, speed),
-            either(command.standing, -p.observer_bandwidth * x[1], disturbance),
-            building_up(x[2], command.brake_demand * p.full_brake_force, p.brake_build_up_time, p.brake_release_time),
-            *self._drive(x, command, p),
-        )
+        observed, estimated, built_up = x.observed_speed, x.disturbance_acceleration, x.built_up_brake
+        applied = (self._effort(x, command) - built_up) / p.mass
+        speed, disturbance = observer_derivative(u.odometer, observed, estimated, applied, p.observer_bandwidth)
+        relaxing = p.observer_bandwidth * (u.odometer - observed)  # the brake that holds a train is no disturbance
+        asked = command.brake_demand * p.full_brake_force
+        return {
+            "observed_speed": either(command.standing, relaxing, speed),
+            "disturbance_acceleration": either(command.standing, -p.observer_bandwidth * estimated, disturbance),
+            "built_up_brake": building_up(built_up, asked, p.brake_build_up_time, p.brake_release_time),
+            **self._drive(x, command, p),
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Effort, demand to the air brake, disturbance."""
         command = self._command(x, u, p)
-        effort = self._effort(x, command)
-        return {"effort": effort, "brake_demand": command.brake_demand, "disturbance_force": -p.mass * x[1]}
+        resisting = -p.mass * x.disturbance_acceleration
+        applied = {"effort": self._effort(x, command), "brake_demand": command.brake_demand}
+        return {**applied, "disturbance_force": resisting}
 
-    def _effort(self, x: Array, command: _Command) -> Array:
-        return x[DRIVE_EFFORT] if self._ramped else command.effort
+    def _effort(self, x: Any, command: _Command) -> Array:
+        return x.drive_effort if self._ramped else command.effort
 
-    def _drive(self, x: Array, command: _Command, p: Any) -> tuple[Array, ...]:
+    def _drive(self, x: Any, command: _Command, p: Any) -> dict[str, Array]:
         """Rate of the drive's effort [N/s], where it has one."""
         if not self._ramped:
-            return ()
-        return (np.clip((command.effort - x[DRIVE_EFFORT]) / p.effort_lag, -p.effort_rate, p.effort_rate),)
+            return {}
+        wanted = (command.effort - x.drive_effort) / p.effort_lag
+        return {"drive_effort": np.clip(wanted, -p.effort_rate, p.effort_rate)}
 
     @staticmethod
-    def _command(x: Array, u: Any, p: Any) -> _Command:
+    def _command(x: Any, u: Any, p: Any) -> _Command:
         acceleration, air = u.acceleration_reference, holds(p.full_brake_force > 0.0)
-        wanted = rejecting_force(u.speed_reference - x[0], acceleration, x[1], p.mass, p.control_bandwidth)
+        error, estimated = u.speed_reference - x.observed_speed, x.disturbance_acceleration
+        wanted = rejecting_force(error, acceleration, estimated, p.mass, p.control_bandwidth)
         brake_limit = electric_brake_limit(
             u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end
         )
         effort = np.where(
             wanted < 0.0,
-            electric_part(wanted, x[2], brake_limit),
+            electric_part(wanted, x.built_up_brake, brake_limit),
             np.minimum(wanted, traction_limit(u.odometer, p.effort_limit, p.power_limit)),
         )
         slow = holds(np.abs(u.odometer) < np.maximum(p.electric_fade_start, p.standstill_speed))

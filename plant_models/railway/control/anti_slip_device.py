@@ -52,6 +52,7 @@ class AntiSlipDevice(HybridSystem):
     name = "anti_slip_device"
     description = "Anti-slip device of a locomotive with four axles: effort cut and restored, sanding request"
     source = "Bouchama 2024, section 4.2.2; thresholds and slopes ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("filtered_speed", "m/s", 0.0, "Filtered axle speeds", size=AXLES),
@@ -98,46 +99,44 @@ class AntiSlipDevice(HybridSystem):
     )
     events = (PeriodicEvent("control", "control_period", description="The axles are compared"),)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Compare the axles and move the share, shape (15,) or (15, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Compare the axles and move the share."""
         found = _compared(x, u, p)
-        primed, share, break_point, slipped = x[AXLES], x[AXLES + 1], x[AXLES + 2], x[AXLES + 3]
         slipping = some(*found.flags)
-        onset = every(slipping, 1.0 - slipped)
-        cut = either(onset, p.cut_share * share, np.maximum(share - p.further_cut * p.control_period, 0.0))
-        break_point = either(onset, p.break_share * share, break_point)
-        share = either(slipping, cut, _restored(share, break_point, p))
+        onset = every(slipping, 1.0 - x.slipping)
+        cut = either(onset, p.cut_share * x.share, np.maximum(x.share - p.further_cut * p.control_period, 0.0))
+        break_point = either(onset, p.break_share * x.share, x.break_point)
+        share = either(slipping, cut, _restored(x.share, break_point, p))
         slow = holds(found.reference < p.sanding_speed)
         sanding = some(every(slow, slipping), *(holds(d > p.sanding_deviation) for d in found.deviations))
-        return vector(
-            *found.filtered,
-            1.0 + 0.0 * primed,
-            share,
-            break_point,
-            slipping,
-            *found.flags,
-            found.reference,
-            sanding,
-            share * u.effort_setpoint,
-        )
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """The effort let through, and what the device knows."""
-        share = x[AXLES + 1]
-        flags = x[AXLES + 4 : 2 * AXLES + 4]
         return {
-            "effort": x[2 * AXLES + 6],
-            "effort_share": share,
-            "reference_speed": x[2 * AXLES + 4],
-            "axle_slipping": flags,
-            "sanding_request": x[2 * AXLES + 5],
+            "filtered_speed": vector(*found.filtered),
+            "primed": 1.0,
+            "share": share,
+            "break_point": break_point,
+            "slipping": slipping,
+            "flags": vector(*found.flags),
+            "reference": found.reference,
+            "sanding": sanding,
+            "held_effort": share * u.effort_setpoint,
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The effort let through, and what the device knows."""
+        return {
+            "effort": x.held_effort,
+            "effort_share": x.share,
+            "reference_speed": x.reference,
+            "axle_slipping": x.flags,
+            "sanding_request": x.sanding,
         }
 
 
-def _compared(x: Array, u: Any, p: Any) -> _Finding:
+def _compared(x: Any, u: Any, p: Any) -> _Finding:
     # the first look takes the speeds as they are
-    fading = either(x[AXLES], np.exp(-p.control_period / p.filter_time), 0.0)
-    filtered = [u.axle_speed[i] + fading * (x[i] - u.axle_speed[i]) for i in range(AXLES)]
+    fading = either(x.primed, np.exp(-p.control_period / p.filter_time), 0.0)
+    speeds = zip(u.axle_speed, x.filtered_speed, strict=True)
+    filtered = [speed + fading * (before - speed) for speed, before in speeds]
     lowest, highest = filtered[0], filtered[0]
     for speed in filtered[1:]:
         lowest, highest = np.minimum(lowest, speed), np.maximum(highest, speed)

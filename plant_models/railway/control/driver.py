@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
@@ -82,6 +82,7 @@ class Driver(HybridSystem):
     name = "driver"
     description = "Driver: speed profile and PI controller on the odometer, with effort and power limits"
     source = "Bouchama 2024, section 3.4.3 (gains) and section 4.1 (limits)"
+    by_name = True
     internal_step = 1e-2  # the integral's fastest time constant is tracking_time
     states = (
         state("integral", "N", 0.0, "Integral part of the effort"),
@@ -121,22 +122,22 @@ class Driver(HybridSystem):
         self.presets = _presets(profile_count)
         super().__init__(profile_count=profile_count)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the integral part and of the developed effort [N/s], shape (2,) or (2, members)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the integral part and of the developed effort [N/s]."""
         error = self._reference(t, p) - u.odometer
-        wanted = p.proportional_gain * error + x[0]
+        wanted = p.proportional_gain * error + x.integral
         limited = _limited(wanted, u.odometer, p)
         standing = self._standing(t, u, p)
         following = p.integral_gain * error + (limited - wanted) / p.tracking_time
         demand = np.where(standing > 0.0, -np.minimum(p.holding_effort, p.effort_limit), limited)
-        return vector(
-            np.where(standing > 0.0, -x[0] / p.tracking_time, following),
-            (demand - x[1]) / p.effort_lag,
-        )
+        return {
+            "integral": np.where(standing > 0.0, -x.integral / p.tracking_time, following),
+            "developed_effort": (demand - x.developed_effort) / p.effort_lag,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Developed effort and speed reference."""
-        return {"effort": x[1], "speed_reference": self._reference(t, p) + 0.0 * x[0]}
+        return {"effort": x.developed_effort, "speed_reference": self._reference(t, p)}
 
     @staticmethod
     def _reference(t: Array, p: Any) -> Array:

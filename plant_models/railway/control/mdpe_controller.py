@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.available_adhesion import next_available_effort
 from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
@@ -36,23 +36,6 @@ from plant_models.railway.control.sampled_regulator import (
     tracking_integral,
     wanted_force,
 )
-
-
-class _Memory(NamedTuple):
-    """What the controller remembers from one control instant to the next, in the order of `states`."""
-
-    effort: Array
-    demand: Array
-    integral: Array
-    error: Array
-    feedforward: Array
-    target: Array
-    mode: Array
-    level: Array
-    quiet_time: Array
-    available: Array
-    built_up: Array
-    sanding: Array
 
 
 class _Limits(NamedTuple):
@@ -118,6 +101,7 @@ class MdpeController(HybridSystem):
         "Observer-based train control: regulators by mode and adhesion, limits by estimated adhesion and coupler force"
     )
     source = "Bouchama 2024, section 4.5 and Table 4.3; gains and thresholds ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("held_effort", "N", 0.0, "Effort of this period"),
@@ -212,46 +196,54 @@ class MdpeController(HybridSystem):
     presets: Mapping[str, Mapping[str, Any]] = PRESETS
     default_preset = "train"
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Decide, regulate, limit, share: the memory for the coming period, shape (12,) or (12, members)."""
-        m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Decide, regulate, limit, share: the memory for the coming period."""
         error = u.speed_reference - u.speed
         feedforward = p.mass * (u.acceleration_reference + p.gravity * u.slope) + u.disturbance_force
         standing = _standing(u, p)
         sliding = _sliding(u, p)
-        level, quiet = next_level(m.level, m.quiet_time, u.adhesion_condition, p.control_period, p.recovery_time)
-        available = _available(m, u, p, level, sliding)
-        wanted = wanted_force(_gains(m.mode, m.level, p), m.integral, feedforward, error)
+        level, quiet = next_level(x.held_level, x.quiet_time, u.adhesion_condition, p.control_period, p.recovery_time)
+        available = _available(x, u, p, level, sliding)
+        wanted = wanted_force(_gains(x.held_mode, x.held_level, p), x.integral, feedforward, error)
         slower = np.minimum(np.abs(u.speed), np.abs(u.odometer))  # a locked wheel has no electric brake
         mode = next_mode(
-            Situation(m.mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing), p
+            Situation(x.held_mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing), p
         )
-        limits = _limits(m, u, p, available)
-        regulated = _regulate(m, mode, level, error, feedforward, limits, p)
+        limits = _limits(x, u, p, available)
+        regulated = _regulate(x, mode, level, error, feedforward, limits, p)
         target = either(standing, 0.0, regulated.target)
-        effort, demand = _share(m, mode, target, standing, limits, p)
+        effort, demand = _share(x, mode, target, standing, limits, p)
         asked = demand * p.full_brake_force
-        built_up = built_up_after(m.built_up, asked, p.control_period, p.brake_build_up_time, p.brake_release_time)
-        sanding = every(sliding, holds(np.abs(error) > p.sanding_error))
-        integral = either(standing, 0.0, regulated.integral)
-        return vector(
-            *_Memory(
-                effort, demand, integral, error, feedforward, target, mode, level, quiet, available, built_up, sanding
-            )
+        built_up = built_up_after(
+            x.built_up_brake, asked, p.control_period, p.brake_build_up_time, p.brake_release_time
         )
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """What was decided at the last control instant."""
-        m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
+        sanding = every(sliding, holds(np.abs(error) > p.sanding_error))
         return {
-            "effort": m.effort,
-            "brake_demand": m.demand,
-            "mode": m.mode,
-            "adhesion_level": m.level,
-            "sanding_request": m.sanding,
-            "effort_available": m.available,
+            "held_effort": effort,
+            "held_demand": demand,
+            "integral": either(standing, 0.0, regulated.integral),
+            "last_error": error,
+            "last_feedforward": feedforward,
+            "target_force": target,
+            "held_mode": mode,
+            "held_level": level,
+            "quiet_time": quiet,
+            "available_effort": available,
+            "built_up_brake": built_up,
+            "sanding": sanding,
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What was decided at the last control instant."""
+        return {
+            "effort": x.held_effort,
+            "brake_demand": x.held_demand,
+            "mode": x.held_mode,
+            "adhesion_level": x.held_level,
+            "sanding_request": x.sanding,
+            "effort_available": x.available_effort,
             "speed_error": u.speed_reference - u.speed,
-            "drive_power": m.effort * u.odometer,
+            "drive_power": x.held_effort * u.odometer,
         }
 
 
@@ -268,14 +260,14 @@ def _sliding(u: Any, p: Any) -> Array:
     return every(holds(np.abs(u.slip) > p.slip_limit), holds(fastest > p.slip_min_speed))
 
 
-def _available(m: _Memory, u: Any, p: Any, level: Array, sliding: Array) -> Array:
+def _available(x: Any, u: Any, p: Any, level: Array, sliding: Array) -> Array:
     degraded = holds(level > 1.5)
     recovery = p.control_period * either(degraded, p.recovery_degraded, p.recovery_nominal)
     return next_available_effort(
-        m.available,
+        x.available_effort,
         u.adhesion_force,
         sliding,
-        every(degraded, holds(m.level < 1.5)),
+        every(degraded, holds(x.held_level < 1.5)),
         recovery,
         margin=p.adhesion_margin,
         floor=p.smallest_effort,
@@ -283,10 +275,10 @@ def _available(m: _Memory, u: Any, p: Any, level: Array, sliding: Array) -> Arra
     )
 
 
-def _limits(m: _Memory, u: Any, p: Any, available: Array) -> _Limits:
+def _limits(x: Any, u: Any, p: Any, available: Array) -> _Limits:
     electric = electric_brake_limit(u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end)
     largest = p.effort_rate * p.control_period
-    down, up = effort_steps(m.effort, u.coupler_force, largest, p.coupler_soft_limit, p.coupler_limit)
+    down, up = effort_steps(x.held_effort, u.coupler_force, largest, p.coupler_soft_limit, p.coupler_limit)
     return _Limits(
         np.minimum(traction_limit(u.odometer, p.effort_limit, p.power_limit), available),
         np.minimum(electric, available),
@@ -304,23 +296,23 @@ def _gains(mode: Array, level: Array, p: Any) -> RegulatorGains:
 
 
 def _regulate(
-    m: _Memory, mode: Array, level: Array, error: Array, feedforward: Array, limits: _Limits, p: Any
+    x: Any, mode: Array, level: Array, error: Array, feedforward: Array, limits: _Limits, p: Any
 ) -> _Regulated:
     gains = _gains(mode, level, p)
-    changed = some(holds(mode != m.mode), holds(level != m.level))
+    changed = some(holds(mode != x.held_mode), holds(level != x.held_level))
     # The new regulator starts from the force of the last instant; a step of the feedforward since then is kept.
-    integral = either(changed, tracking_integral(gains, m.target, m.feedforward, m.error), m.integral)
+    integral = either(changed, tracking_integral(gains, x.target_force, x.last_feedforward, x.last_error), x.integral)
     wanted = wanted_force(gains, integral, feedforward, error)
-    lowest, highest = _range(m, mode, limits, p)
+    lowest, highest = _range(x, mode, limits, p)
     target = np.minimum(np.maximum(wanted, lowest), highest)
     return _Regulated(target, next_integral(gains, integral, error, target - wanted))
 
 
-def _range(m: _Memory, mode: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:
+def _range(x: Any, mode: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:
     """Smallest and largest force of a mode [N]. A loaded coupler counts as a limit, else the integral would wind up."""
     unloaded = p.effort_rate * p.control_period
-    more = np.where(limits.up < unloaded, np.maximum(m.effort + limits.up, 0.0), limits.traction)
-    less = np.where(limits.down < unloaded, np.maximum(limits.down - m.effort, 0.0), limits.electric)
+    more = np.where(limits.up < unloaded, np.maximum(x.held_effort + limits.up, 0.0), limits.traction)
+    less = np.where(limits.down < unloaded, np.maximum(limits.down - x.held_effort, 0.0), limits.electric)
     traction, electric = np.minimum(limits.traction, more), np.minimum(limits.electric, less)
     brake = np.where(
         mode == ELECTRIC, electric, np.where(mode == INDIRECT, p.full_brake_force, p.full_brake_force + electric)
@@ -329,11 +321,11 @@ def _range(m: _Memory, mode: Array, limits: _Limits, p: Any) -> tuple[Array, Arr
     return either(driving, 0.0, -brake), either(driving, traction, 0.0)
 
 
-def _share(m: _Memory, mode: Array, target: Array, standing: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:
+def _share(x: Any, mode: Array, target: Array, standing: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:
     """Effort [N] and demand to the air brake [1] for a target force."""
     capacity = p.full_brake_force + np.where(mode == COMBINED, limits.electric, 0.0)
     braked = either(standing, -p.holding_effort, target)
     demand = either(holds(mode > 2.5), air_brake_demand(braked, capacity, p.full_brake_force), 0.0)
-    wanted = either(holds(mode == TRACTION), target, electric_part(braked, m.built_up, limits.electric))
-    effort = stepped_towards(m.effort, wanted, limits.down, limits.up)
+    wanted = either(holds(mode == TRACTION), target, electric_part(braked, x.built_up_brake, limits.electric))
+    effort = stepped_towards(x.held_effort, wanted, limits.down, limits.up)
     return np.minimum(np.maximum(effort, -limits.electric), limits.traction), demand

@@ -47,6 +47,7 @@ class Mission(HybridSystem):
     name = "mission"
     description = "Mission: speed reference of a journey over a distance, braking by time or by position"
     source = "Bouchama 2024, section 4.5 and Table 4.4"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     outputs = (
         output_signal("speed_reference", "m/s", "Speed to be driven", display_unit="km/h"),
@@ -82,7 +83,7 @@ class Mission(HybridSystem):
             self.inputs = (input_signal("position", "m", 0.0, "Position of the train, measured or estimated"),)
         super().__init__(braking=braking)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """References and phase."""
         elapsed = t - p.departure_time
         journey = Trapezoid(p.target_speed, p.acceleration, p.deceleration, p.distance)

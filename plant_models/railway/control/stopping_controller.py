@@ -7,11 +7,11 @@ from its own file.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.logic import either, every, holds, some
@@ -24,25 +24,6 @@ from plant_models.railway.control.stopping_planner import (
 )
 
 ROLLS_AWAY = 10.0  # times the speed of standstill: a train that was held and runs so fast is planned for anew
-
-
-class _Memory(NamedTuple):
-    """What the controller remembers from one control instant to the next, in the order of `states`."""
-
-    effort: Array
-    integral: Array
-    planned: Array
-    plan_start: Array
-    plan_speed: Array
-    plan_position: Array
-    plan_deceleration: Array
-    plan_duration: Array
-    drag_suffices: Array
-    limited: Array
-    standing: Array
-    fault: Array
-    request: Array
-    plans: Array
 
 
 class StoppingController(HybridSystem):
@@ -81,6 +62,7 @@ class StoppingController(HybridSystem):
     name = "stopping_controller"
     description = "Fault-tolerant stop at a mark: constant-brake plan, PI tracking with compensation, brake release"
     source = "Aguiar Cota 2019, (3.4)-(3.14), (3.34), Algorithm 3-1"
+    by_name = True
     internal_step = 1e-3  # nothing flows
     states = (
         memory("held_effort", "N", 0.0, "Effort of this period"),
@@ -196,66 +178,64 @@ class StoppingController(HybridSystem):
     }
     default_preset = "fault_tolerant"
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Plan where one is due, track it, hold at standstill: the memory for the coming period, shape (14,)."""
-        m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Plan where one is due, track it, hold at standstill: the memory for the coming period."""
         enabled = holds(u.enabled > 0.5)
         fault = every(holds(u.odometer_fault > 0.5), holds(p.heeds_faults > 0.5))
-        limit = either(m.standing, ROLLS_AWAY * p.standstill_speed, p.standstill_speed)
+        limit = either(x.standing, ROLLS_AWAY * p.standstill_speed, p.standstill_speed)
         standing = every(enabled, holds(u.estimated_speed <= limit))
-        recovered = every(m.fault, 1.0 - fault, holds(p.replans_after_faults > 0.5))
-        asked = every(1.0 - fault, holds(u.plan_request != m.request))
-        due = every(enabled, 1.0 - standing, some(1.0 - m.planned, recovered, asked))
-        m = _planned(m, due, recovered, t, u, p)
-        reference, _ = reference_motion(t - m.plan_start, m.plan_speed, m.plan_position, _plan(m), p.davis_b / p.mass)
+        recovered = every(x.fault_before, 1.0 - fault, holds(p.replans_after_faults > 0.5))
+        asked = every(1.0 - fault, holds(u.plan_request != x.request_before))
+        due = every(enabled, 1.0 - standing, some(1.0 - x.planned, recovered, asked))
+        planned = _planned(x, due, recovered, t, u, p)
+        x = x._replace(**planned)
+        reference, _ = reference_motion(t - x.plan_start, x.plan_speed, x.plan_position, _plan(x), p.davis_b / p.mass)
         error = u.estimated_speed - reference
-        integral = m.integral + p.control_period * error
-        wanted = _feedforward(m, t, p) + p.feedback_sign * p.mass / p.brake_coefficient * (
+        integral = x.integral + p.control_period * error
+        wanted = _feedforward(x, t, p) + p.feedback_sign * p.mass / p.brake_coefficient * (
             p.proportional_gain * error + p.integral_gain * integral + either(p.compensates, u.disturbance, 0.0)
         )
         effort = np.minimum(np.maximum(wanted, -p.effort_limit), p.traction_limit)
         winds_up = holds((wanted - effort) * p.feedback_sign * error > 0.0)
-        integral = either(winds_up, m.integral, integral)
+        integral = either(winds_up, x.integral, integral)
         effort = either(standing, -p.holding_effort, effort)
-        return vector(
-            *m._replace(
-                effort=either(enabled, effort, 0.0),
-                integral=either(every(enabled, 1.0 - standing), integral, 0.0),
-                planned=every(enabled, 1.0 - standing),
-                standing=standing,
-                fault=fault,
-                request=u.plan_request,
-            )
-        )
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """What was decided at the last control instant, and the reference now."""
-        m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
-        speed, position = reference_motion(
-            t - m.plan_start, m.plan_speed, m.plan_position, _plan(m), p.davis_b / p.mass
-        )
-        ever = holds(m.plans > 0.5)
         return {
-            "effort": m.effort,
+            **planned,
+            "held_effort": either(enabled, effort, 0.0),
+            "integral": either(every(enabled, 1.0 - standing), integral, 0.0),
+            "planned": every(enabled, 1.0 - standing),
+            "standing": standing,
+            "fault_before": fault,
+            "request_before": u.plan_request,
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What was decided at the last control instant, and the reference now."""
+        speed, position = reference_motion(
+            t - x.plan_start, x.plan_speed, x.plan_position, _plan(x), p.davis_b / p.mass
+        )
+        ever = holds(x.plan_count > 0.5)
+        return {
+            "effort": x.held_effort,
             "speed_reference": either(ever, speed, u.estimated_speed),
             "position_reference": either(ever, position, u.estimated_position),
-            "planned_effort": -m.plan_deceleration * p.mass / p.brake_coefficient,
-            "brake_released": every(m.fault, 1.0 - m.standing),
-            "no_braking_solution": m.drag_suffices,
-            "limited_plan": m.limited,
-            "stands_short": every(m.standing, holds(p.stop_position - u.estimated_position > p.stop_tolerance)),
-            "rolls_back": every(m.standing, holds(u.estimated_speed < -ROLLS_AWAY * p.standstill_speed)),
-            "plans": m.plans,
+            "planned_effort": -x.plan_deceleration * p.mass / p.brake_coefficient,
+            "brake_released": every(x.fault_before, 1.0 - x.standing),
+            "no_braking_solution": x.drag_suffices,
+            "limited_plan": x.limited,
+            "stands_short": every(x.standing, holds(p.stop_position - u.estimated_position > p.stop_tolerance)),
+            "rolls_back": every(x.standing, holds(u.estimated_speed < -ROLLS_AWAY * p.standstill_speed)),
+            "plans": x.plan_count,
             "remaining_distance": p.stop_position - u.estimated_position,
         }
 
 
-def _plan(m: _Memory) -> BrakePlan:
-    return BrakePlan(m.plan_deceleration, m.plan_duration, 1.0)
+def _plan(x: Any) -> BrakePlan:
+    return BrakePlan(x.plan_deceleration, x.plan_duration, 1.0)
 
 
-def _planned(m: _Memory, due: Array, recovered: Array, t: Array, u: Any, p: Any) -> _Memory:
-    """The memory with a new plan where one is due; after a fault the integral, which has summed the fault, restarts."""
+def _planned(x: Any, due: Array, recovered: Array, t: Array, u: Any, p: Any) -> dict[str, Array]:
+    """What a new plan changes where one is due; after a fault the integral, which has summed the fault, restarts."""
     drag_rate = p.davis_b / p.mass
     distance = p.stop_position - u.estimated_position
     largest = p.effort_limit * p.brake_coefficient / p.mass
@@ -265,21 +245,21 @@ def _planned(m: _Memory, due: Array, recovered: Array, t: Array, u: Any, p: Any)
     behind = every(faster, holds(distance <= 0.0))
     limited = some(behind, every(wanted.possible, holds(wanted.deceleration > largest)))
     drag_suffices = every(faster, 1.0 - wanted.possible, 1.0 - behind)
-    first = 1.0 - m.planned
-    return m._replace(
-        integral=either(every(due, some(recovered, first)), 0.0, m.integral),
-        plan_start=either(due, t, m.plan_start),
-        plan_speed=either(due, u.estimated_speed, m.plan_speed),
-        plan_position=either(due, u.estimated_position, m.plan_position),
-        plan_deceleration=either(due, either(limited, largest, wanted.deceleration), m.plan_deceleration),
-        plan_duration=either(due, either(limited, hardest.duration, wanted.duration), m.plan_duration),
-        drag_suffices=either(due, drag_suffices, m.drag_suffices),
-        limited=either(due, limited, m.limited),
-        plans=m.plans + due,
-    )
+    first = 1.0 - x.planned
+    return {
+        "integral": either(every(due, some(recovered, first)), 0.0, x.integral),
+        "plan_start": either(due, t, x.plan_start),
+        "plan_speed": either(due, u.estimated_speed, x.plan_speed),
+        "plan_position": either(due, u.estimated_position, x.plan_position),
+        "plan_deceleration": either(due, either(limited, largest, wanted.deceleration), x.plan_deceleration),
+        "plan_duration": either(due, either(limited, hardest.duration, wanted.duration), x.plan_duration),
+        "drag_suffices": either(due, drag_suffices, x.drag_suffices),
+        "limited": either(due, limited, x.limited),
+        "plan_count": x.plan_count + due,
+    }
 
 
-def _feedforward(m: _Memory, t: Array, p: Any) -> Array:
+def _feedforward(x: Any, t: Array, p: Any) -> Array:
     """Effort of the plan [N]; after its end what keeps the final speed. A stop is braked for until the train stands."""
-    over = every(holds(t - m.plan_start >= m.plan_duration), holds(p.final_speed > 0.0))
-    return either(over, p.davis_b * p.final_speed, -m.plan_deceleration * p.mass) / p.brake_coefficient
+    over = every(holds(t - x.plan_start >= x.plan_duration), holds(p.final_speed > 0.0))
+    return either(over, p.davis_b * p.final_speed, -x.plan_deceleration * p.mass) / p.brake_coefficient

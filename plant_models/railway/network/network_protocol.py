@@ -53,6 +53,7 @@ class NetworkProtocol(HybridSystem):
     name = "network_protocol"
     description = "Network: signals in, values last received out, one node at a time, delayed"
     source = "Hann 2014, section 1.1.3, (2.3) to (2.7); loss is ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     purpose = Purpose.NETWORK
     events = (
@@ -110,42 +111,38 @@ class NetworkProtocol(HybridSystem):
         )
         super().__init__(signals=signals, nodes=nodes, protocol=protocol, turns=turns, delay_periods=delay_periods)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A node sends; what was sent a delay ago is received."""
         y = [u.signal[i] for i in range(self.signals)]
         owner = [p.node_of[i] for i in range(self.signals)]
-        held, sent, _, stamps, (_, turn, begun), queue = self._parts(x)
-        first = begun < 0.5
-        held = [np.where(first, y[i], held[i]) for i in range(self.signals)]
-        sent = [np.where(first, y[i], sent[i]) for i in range(self.signals)]
-        stamps = [np.where(first, t, stamp) for stamp in stamps]
+        first, turn = x.begun < 0.5, x.turn
+        held = [np.where(first, y[i], x.held_value[i]) for i in range(self.signals)]
+        sent = [np.where(first, y[i], x.sent_value[i]) for i in range(self.signals)]
+        stamps = [np.where(first, t, stamp) for stamp in x.held_stamp]
         error = [sent[i] - y[i] for i in range(self.signals)]
         sender = self._sender(turn, error, p)
         sent = [np.where(sender == owner[i], y[i], sent[i]) for i in range(self.signals)]
         arrives = np.where(u.loss_noise < loss_threshold(p.loss_fraction), 0.0, sender)
-        queue = [*queue, (y, arrives, t + 0.0 * turn)]
+        under_way = zip(x.packet_value, x.packet_sender, x.packet_stamp, strict=True) if self.delay_periods else ()
+        queue = [*under_way, (y, arrives, t)]
         values, of, when = queue[0]
         held = [np.where(of == owner[i], values[i], held[i]) for i in range(self.signals)]
         stamps = [np.where(of == j + 1.0, when, stamps[j]) for j in range(self.nodes)]
         following = np.where(turn + 1.0 >= float(self.turns), 0.0, turn + 1.0)
-        under_way = queue[1:]
-        return vector(
-            *held,
-            *sent,
-            *error,
-            *stamps,
-            sender,
-            following,
-            1.0,
-            *(value for packet in under_way for value in packet[0]),
-            *(packet[1] for packet in under_way),
-            *(packet[2] for packet in under_way),
-        )
+        return {
+            "held_value": vector(*held),
+            "sent_value": vector(*sent),
+            "last_error": vector(*error),
+            "held_stamp": vector(*stamps),
+            "last_sender": sender,
+            "turn": following,
+            "begun": 1.0,
+            **self._packets_of(queue[1:]),
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What is held, by whom it was sent and when it was measured."""
-        held, _, error, stamps, (sender, _, _), _ = self._parts(x)
-        return {"received": vector(*held), "error": vector(*error), "sender": sender, "stamp": vector(*stamps)}
+        return {"received": x.held_value, "error": x.last_error, "sender": x.last_sender, "stamp": x.held_stamp}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds; every signal has a node, and every node its turn."""
@@ -178,19 +175,18 @@ class NetworkProtocol(HybridSystem):
         rows = [entries[i : i + count] for i in range(0, len(entries), count)]
         return smallest(quadratic_costs([rows[i : i + count] for i in range(0, len(rows), count)], error)) + 1.0
 
-    def _parts(self, x: Array) -> tuple[Any, ...]:
-        """Held, sent, errors, stamps, (sender, turn, begun), and packets under way, the oldest first."""
-        count, places, cursor = self.signals, self.delay_periods, 0
-
-        def take(n: int) -> list[Array]:
-            nonlocal cursor
-            cursor += n
-            return [x[i] for i in range(cursor - n, cursor)]
-
-        held, sent, error, stamps, rest = take(count), take(count), take(count), take(self.nodes), take(3)
-        values, senders, times = take(places * count), take(places), take(places)
-        queue = [(values[i * count : (i + 1) * count], senders[i], times[i]) for i in range(places)]
-        return held, sent, error, stamps, tuple(rest), queue
+    def _packets_of(self, under_way: list[tuple[Any, Array, Array]]) -> dict[str, Array]:
+        """Packets under way, the oldest first, as they are remembered."""
+        if not under_way:
+            return {}
+        values, senders, stamps = zip(*under_way, strict=True)
+        together = vector(*(value for packet in values for value in packet))
+        shape = (self.delay_periods, self.signals, *together.shape[1:])
+        return {
+            "packet_value": np.reshape(together, shape),
+            "packet_sender": vector(*senders),
+            "packet_stamp": vector(*stamps),
+        }
 
 
 def spread(signals: int, nodes: int) -> list[int]:
@@ -235,7 +231,7 @@ def _packets(signals: int, places: int) -> tuple[Any, ...]:
     if places == 0:
         return ()
     return (
-        memory("packet_value", "1", 0.0, "Measurements under way, the oldest first", size=places * signals),
+        memory("packet_value", "1", 0.0, "Measurements under way, the oldest first", shape=(places, signals)),
         memory("packet_sender", "1", 0.0, "Who sent them, from 1; 0 where the packet is lost", size=places),
         memory("packet_stamp", "s", 0.0, "When they were measured", size=places),
     )
