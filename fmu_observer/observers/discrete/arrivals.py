@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fmu_observer.models.filter_model import FilterModel
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import stacked_of
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from plant_models.hybrid import Event, PeriodicEvent, Signal, TriggeredEvent, input_signal
 from plant_models.hybrid.system import Array
@@ -96,4 +96,4 @@ class Arrivals:
             event: its name. u: inputs of the filter, payload included.
         """
         prefix = "measured" if event == SAMPLING else event
-        return stacked(tuple(getattr(u, f"{prefix}_{self.signals[i].name}") for i in self.rows(event)))
+        return stacked_of(u, [self.signals[i] for i in self.rows(event)], f"{prefix}_")

@@ -15,7 +15,7 @@ import numpy as np
 from fmu_observer.condition import Condition
 from fmu_observer.filtering.kalman import Corrected, log_likelihood, normalised_square
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked, stacked_of
 from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
@@ -181,7 +181,7 @@ class GaussianFilter(GatedObserver):
         Args:
             t: [s]. u: inputs of the filter. p: its parameters.
         """
-        return Known(t, stacked(tuple(getattr(u, s.name) for s in self.model.inputs)), self.known_parameters(p))
+        return Known(t, stacked_of(u, self.model.inputs), self.known_parameters(p))
 
     def known_parameters(self, p: Any) -> Array:
         """Parameters of the model, shape (k,).
@@ -201,7 +201,7 @@ class GaussianFilter(GatedObserver):
         Args:
             x: states by name.
         """
-        return Belief(stacked(tuple(getattr(x, name) for name in self._estimated)), getattr(x, self._spread))
+        return Belief(stacked_of(x, self.model.states, "estimated_"), getattr(x, self._spread))
 
     def covariance_of(self, spread: Array) -> Array:
         """The covariance that a spread stands for, shape (n, n).
@@ -272,8 +272,7 @@ class GaussianFilter(GatedObserver):
         return chosen(x.primed > 0.5, self.predicted(before, known, p.sample_period, noise, p), self.unmoved(before, p))
 
     def _remembered(self, belief: Belief) -> dict[str, Array]:
-        estimates = {name: belief.estimate[i] for i, name in enumerate(self._estimated)}
-        return estimates | {self._spread: belief.spread}
+        return named_as(self.model.states, belief.estimate, "estimated_") | {self._spread: belief.spread}
 
     def _lapsed(self, x: Any) -> Array:
         """Whether the covariance is none, or was none before; a correction may hide that."""
@@ -289,9 +288,9 @@ class GaussianFilter(GatedObserver):
         """Estimates, their standard deviations, and what is known of the last innovation."""
         n, q, states = self.model.order, len(self.model.measurements), self.model.states
         P = self.covariance_of(self.belief(x).spread)
-        values = {s.name: getattr(x, name) for s, name in zip(states, self._estimated, strict=True)}
+        values = {s.name: getattr(x, f"estimated_{s.name}") for s in states}
         values |= {f"{s.name}_std": np.sqrt(np.maximum(P[i, i], 0.0)) for i, s in enumerate(states)}
-        values |= {f"innovation_{s.name}": x.last_innovation[i] for i, s in enumerate(self.model.measurements)}
+        values |= named_as(self.model.measurements, x.last_innovation, "innovation_")
         values["innovation_covariance"] = np.reshape(x.last_innovation_covariance, (q * q,))
         values |= {"nis": x.last_nis, "innovation_likelihood": x.log_likelihood}
         if self.arrivals.several:

@@ -12,7 +12,7 @@ from fmu_observer.condition import Condition
 from fmu_observer.filtering.ensemble import drawn
 from fmu_observer.filtering.kalman import decoupled
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked, stacked_of
 from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.observers.discrete.covariance_requirements import positive
@@ -156,7 +156,7 @@ class MemberFilter(HybridSystem):
         for s in self.model.parameters:
             value = getattr(p, s.name)
             values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
-        return Known(t, stacked(tuple(getattr(u, s.name) for s in self.model.inputs)), stacked(tuple(values)))
+        return Known(t, stacked_of(u, self.model.inputs), stacked(tuple(values)))
 
     def spread(self, members: Array, p: Any) -> Array:
         """The members before a correction, shape (n, M).
@@ -180,16 +180,16 @@ class MemberFilter(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Members drawn at the first sample, or moved over the period, then corrected."""
-        n, names = self.model.order, self._estimated
-        estimate = stacked(tuple(getattr(x, name) for name in names))
+        n, states = self.model.order, self.model.states
+        estimate = stacked_of(x, states, "estimated_")
         normal = np.reshape(u.process_normal, (-1, self.members))[:n]
         start = estimate.reshape(n, 1) + drawn(as_matrix(p.start_covariance, n, n), normal)
         members = np.where(x.primed > 0.5, self._moved(x.drawn_members, t, u, p), start)
-        y = stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.model.measurements))
+        y = stacked_of(u, self.model.measurements, "measured_")
         sample = self.sample(self.spread(members, p), y, self.known(t, u, p), p)
         found = self.corrected(members, x, sample, u, p)
         return {
-            **{name: found.estimate[i] for i, name in enumerate(names)},
+            **named_as(states, found.estimate, "estimated_"),
             "last_nis": np.where(sample.count > 0.5, found.nis, x.last_nis),
             "deviations": np.sqrt(np.maximum(found.variances, 0.0)),
             "drawn_members": found.members.T,
@@ -201,7 +201,7 @@ class MemberFilter(HybridSystem):
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations and NIS."""
         names = [s.name for s in self.model.states]
-        values = {name: getattr(x, own) for name, own in zip(names, self._estimated, strict=True)}
+        values = {name: getattr(x, f"estimated_{name}") for name in names}
         values |= {f"{name}_std": x.deviations[i] for i, name in enumerate(names)}
         return values | {"nis": x.last_nis, "nis_degrees": x.last_count}
 
@@ -247,10 +247,6 @@ class MemberFilter(HybridSystem):
         inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
         return Known(0.0, inputs, parameters)
-
-    @property
-    def _estimated(self) -> tuple[str, ...]:
-        return tuple(f"estimated_{s.name}" for s in self.model.states)
 
     def _declare(self) -> None:
         model, count, normal = self.model, self.members, "Standard normal numbers of this sample"

@@ -12,7 +12,7 @@ import numpy as np
 from fmu_observer.condition import Condition
 from fmu_observer.filtering.kalman import through
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import stacked
+from fmu_observer.models.model import named_as, stacked
 from fmu_observer.models.system_model import Source
 from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.moving_horizon.real_time_iteration import (
@@ -138,8 +138,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         values = super().output(t, x, u, p)
         if self.robust:
             values.pop("nis")
-        values |= {s.name: inside[i] for i, s in enumerate(self.model.states)}
-        return values | told(x.last_pass)
+        return values | named_as(self.model.states, inside) | told(x.last_pass)
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Those of the filter; no lowest value above the highest; the scale of the loss within its bounds."""
