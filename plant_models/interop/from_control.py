@@ -22,7 +22,7 @@ from plant_models.hybrid import (
     state,
     vector,
 )
-from plant_models.hybrid.declarations import RESERVED_NAMES
+from plant_models.hybrid.declaration_checks import RESERVED_NAMES
 from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array, Method
 from plant_models.interop.continuous_part import Values, filled, known
