@@ -39,8 +39,8 @@ def _reference(speed: float, slip: float, effort: float) -> np.ndarray:
     """Another method, with error control, on the same equations; the train does not stop in these runs."""
     traced = _traced()
     p = LOCOMOTIVE.start_parameters()
-    given = LOCOMOTIVE.unpack_inputs(np.array([effort])), LOCOMOTIVE.unpack_parameters(p)
-    signs = np.concatenate([np.ones(2), LOCOMOTIVE.switches(0.0, _start(speed, slip), *given)])
+    switches = LOCOMOTIVE.switch_vector(0.0, _start(speed, slip), np.array([effort]), p)
+    signs = np.concatenate([np.ones(2), switches])
 
     def flow(t: float, x: np.ndarray) -> np.ndarray:
         return np.asarray(traced.derivative(t, x, np.array([effort]), p, signs)).ravel()
