@@ -18,7 +18,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
@@ -26,7 +25,6 @@ from plant_models.railway.track.table import piecewise_linear
 SlipDefinition = Literal["odometer", "speed"]
 
 LARGEST_SLIP = 0.95  # of the odometer ratio: beyond, the wheel spins under a train that stands, 19 times over
-FILTERED, CONDITION, CONTRARY_TIME = range(3)  # indices of the state
 
 
 class AdhesionDetector(HybridSystem):
@@ -53,6 +51,7 @@ class AdhesionDetector(HybridSystem):
     name = "adhesion_detector"
     description = "Nominal or degraded adhesion, by the optimal slip of two creep curves nearest to the slip"
     source = "Bouchama 2024, (4.16)-(4.17), Table 4.5; filter and debouncing ours"
+    by_name = True
     internal_step = 1e-2
     states = (
         state("filtered_slip", "1", 0.0, "Magnitude of the slip relative to the train speed, filtered"),
@@ -91,33 +90,33 @@ class AdhesionDetector(HybridSystem):
         self.presets = {"polach": computed, "as_published": _map_values(published_map(False), published_map(True))}
         super().__init__(slip_definition=slip_definition)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the filtered slip, shape (1,)."""
-        return vector((self._magnitude(u.slip) - x[FILTERED]) / p.slip_filter_time)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the filtered slip."""
+        return {"filtered_slip": (self._magnitude(u.slip) - x.filtered_slip) / p.slip_filter_time}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A check: a contrary verdict that has stood long enough comes into force."""
-        verdict = np.where(np.abs(u.speed) > p.min_speed, self._verdict(x, u, p), x[CONDITION])
-        time = np.where(verdict != x[CONDITION], x[CONTRARY_TIME] + p.check_period, 0.0)
+        verdict = np.where(np.abs(u.speed) > p.min_speed, self._verdict(x, u, p), x.judged_condition)
+        time = np.where(verdict != x.judged_condition, x.contrary_time + p.check_period, 0.0)
         changes = time - p.check_period >= p.debounce_time - 1e-9  # at its first check a verdict has stood for no time
-        changed = np.where(time > 0.0, np.where(changes, verdict, x[CONDITION]), x[CONDITION])
-        return vector(x[FILTERED], changed, np.where(changed != x[CONDITION], 0.0, time))
+        changed = np.where(time > 0.0, np.where(changes, verdict, x.judged_condition), x.judged_condition)
+        return {"judged_condition": changed, "contrary_time": np.where(changed != x.judged_condition, 0.0, time)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Verdicts, the two optima and the adhesion limit."""
         nominal, degraded = self._at_speed(u, p, p.nominal_slip_map, p.degraded_slip_map)
         high, low = self._at_speed(u, p, p.nominal_peak_map, p.degraded_peak_map)
         return {
-            "condition": x[CONDITION],
+            "condition": x.judged_condition,
             "raw_condition": self._verdict(x, u, p),
             "nominal_optimum": nominal,
             "degraded_optimum": degraded,
-            "adhesion_limit": np.where(x[CONDITION] == DEGRADED, low, high),
+            "adhesion_limit": np.where(x.judged_condition == DEGRADED, low, high),
         }
 
-    def _verdict(self, x: Array, u: Any, p: Any) -> Array:
+    def _verdict(self, x: Any, u: Any, p: Any) -> Array:
         nominal, degraded = self._at_speed(u, p, p.nominal_slip_map, p.degraded_slip_map)
-        return condition_of(x[FILTERED], nominal, degraded, p.advantage)
+        return condition_of(x.filtered_slip, nominal, degraded, p.advantage)
 
     def _magnitude(self, slip: Array) -> Array:
         if self.slip_definition == "speed":

@@ -15,11 +15,8 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.system import Array
-
-FILTERED, LEVEL, PEAK, PEAK_TIME, CHECKED = range(5)  # indices of the state
 
 
 class CouplerRisk(HybridSystem):
@@ -46,6 +43,7 @@ class CouplerRisk(HybridSystem):
     name = "coupler_risk"
     description = "Risk that a coupler breaks, from its force and the rate of it, with hysteresis and peak hold"
     source = "Named in Bouchama 2024, section 4.2; breaking loads of EN 15566; levels ours"
+    by_name = True
     internal_step = 1e-2
     states = (
         state("filtered_tension", "N", 0.0, "Tension behind the filter"),
@@ -79,35 +77,40 @@ class CouplerRisk(HybridSystem):
     }
     default_preset = "category_1_mn"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the filtered tension, shape (1,)."""
-        return vector(self._rate(x, u, p))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the filtered tension."""
+        return {"filtered_tension": self._rate(x, u, p)}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A check: the level rises at once and falls with hysteresis; the peak is renewed or forgotten."""
         tension = _tension(u)
-        filtered = np.where(x[CHECKED] > 0.0, x[FILTERED], tension)  # a tension there from the start has not risen
+        filtered = np.where(x.checked > 0.0, x.filtered_tension, tension)  # one from the start has not risen
         rate = (tension - filtered) / p.rate_filter_time
         level = np.maximum(
-            _level(tension, rate, 1.0, p), np.minimum(x[LEVEL], _level(tension, rate, p.release_ratio, p))
+            _level(tension, rate, 1.0, p), np.minimum(x.held_level, _level(tension, rate, p.release_ratio, p))
         )
-        forgotten = np.where(t - x[PEAK_TIME] > p.peak_hold_time + 1e-9, 1.0, 0.0)
-        renewed = np.where(tension >= x[PEAK], 1.0, forgotten)
-        peak, instant = np.where(renewed > 0.0, tension, x[PEAK]), np.where(renewed > 0.0, t, x[PEAK_TIME])
-        return vector(filtered, level, peak, instant, 1.0)
+        forgotten = np.where(t - x.peak_instant > p.peak_hold_time + 1e-9, 1.0, 0.0)
+        renewed = np.where(tension >= x.held_peak, 1.0, forgotten)
+        return {
+            "filtered_tension": filtered,
+            "held_level": level,
+            "held_peak": np.where(renewed > 0.0, tension, x.held_peak),
+            "peak_instant": np.where(renewed > 0.0, t, x.peak_instant),
+            "checked": 1.0,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Level, utilisation, rate and held peak."""
         return {
-            "risk": x[LEVEL],
+            "risk": x.held_level,
             "utilisation": _tension(u) / p.break_force,
             "tension_rate": self._rate(x, u, p),
-            "peak_tension": x[PEAK],
+            "peak_tension": x.held_peak,
         }
 
     @staticmethod
-    def _rate(x: Array, u: Any, p: Any) -> Array:
-        return (_tension(u) - x[FILTERED]) / p.rate_filter_time
+    def _rate(x: Any, u: Any, p: Any) -> Array:
+        return (_tension(u) - x.filtered_tension) / p.rate_filter_time
 
 
 def _tension(u: Any) -> Array:

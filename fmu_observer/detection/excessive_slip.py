@@ -17,10 +17,8 @@ from fmu_observer.detection.slip_indicator import (
     slip_filter_derivative,
 )
 from fmu_observer.detection.slip_ratio import odometer_slip
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.system import Array
-
-FILTERED, EXCEEDING_TIME, QUIET_TIME, LEVEL, PEAK = range(5)  # indices of the state
 
 
 class ExcessiveSlip(HybridSystem):
@@ -43,6 +41,7 @@ class ExcessiveSlip(HybridSystem):
     name = "excessive_slip"
     description = "Excessive slip from odometer and train speed: confirmed, held, and by how much"
     source = "Bouchama 2024, (4.14)-(4.15), Remark 16; times ours"
+    by_name = True
     internal_step = 1e-2
     states = (
         FILTERED_SLIP,
@@ -79,36 +78,35 @@ class ExcessiveSlip(HybridSystem):
     }
     default_preset = "experiment"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the filtered slip, shape (1,)."""
-        return vector(
-            slip_filter_derivative(x[FILTERED], odometer_slip(u.odometer, u.speed, p.slip_floor), p.slip_filter_time)
-        )
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the filtered slip."""
+        slip = odometer_slip(u.odometer, u.speed, p.slip_floor)
+        return {"filtered_slip": slip_filter_derivative(x.filtered_slip, slip, p.slip_filter_time)}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A check: count the times beyond the threshold and since, judge, keep the largest exceedance."""
-        over = indicator_level(x[FILTERED], u.odometer, u.speed, p.slip_threshold, p.slip_min_speed) == DEGRADED
-        time = np.where(over, x[EXCEEDING_TIME] + p.check_period, 0.0)
+        over = indicator_level(x.filtered_slip, u.odometer, u.speed, p.slip_threshold, p.slip_min_speed) == DEGRADED
+        time = np.where(over, x.exceeding_time + p.check_period, 0.0)
         confirmed = time - p.check_period >= p.confirm_time - 1e-9  # at its first check an excess has lasted no time
-        on_before = x[LEVEL] == DEGRADED
+        on_before = x.held_level == DEGRADED
         counts = np.where(over, np.where(on_before, 1.0, np.where(confirmed, 1.0, 0.0)), 0.0)
-        quiet = np.where(counts > 0.0, 0.0, x[QUIET_TIME] + p.check_period)
+        quiet = np.where(counts > 0.0, 0.0, x.quiet_time + p.check_period)
         held = np.where(on_before, np.where(quiet <= p.hold_time + 1e-9, DEGRADED, NOMINAL), NOMINAL)
         level = np.where(counts > 0.0, DEGRADED, held)
         episode = np.where(over, 1.0, np.where(level == DEGRADED, 1.0, 0.0))
-        peak = np.where(episode > 0.0, np.maximum(x[PEAK], self._exceedance(x, u, p)), 0.0)
-        return vector(x[FILTERED], time, quiet, level, peak)
+        peak = np.where(episode > 0.0, np.maximum(x.held_exceedance, self._exceedance(x, u, p)), 0.0)
+        return {"exceeding_time": time, "quiet_time": quiet, "held_level": level, "held_exceedance": peak}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Slip, indicator and exceedances."""
         return {
             "slip": odometer_slip(u.odometer, u.speed, p.slip_floor),
-            "slip_indicator": x[LEVEL],
+            "slip_indicator": x.held_level,
             "exceedance": self._exceedance(x, u, p),
-            "peak_exceedance": x[PEAK],
+            "peak_exceedance": x.held_exceedance,
         }
 
     @staticmethod
-    def _exceedance(x: Array, u: Any, p: Any) -> Array:
-        over = indicator_level(x[FILTERED], u.odometer, u.speed, p.slip_threshold, p.slip_min_speed) == DEGRADED
-        return np.where(over, np.abs(x[FILTERED]) - p.slip_threshold, 0.0)
+    def _exceedance(x: Any, u: Any, p: Any) -> Array:
+        over = indicator_level(x.filtered_slip, u.odometer, u.speed, p.slip_threshold, p.slip_min_speed) == DEGRADED
+        return np.where(over, np.abs(x.filtered_slip) - p.slip_threshold, 0.0)

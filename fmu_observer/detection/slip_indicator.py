@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.detection.slip_ratio import odometer_slip
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 NOMINAL, DEGRADED = 1.0, 2.0
@@ -64,6 +64,7 @@ class SlipIndicator(HybridSystem):
     name = "slip_indicator"
     description = "Slip ratio and indicator of degraded adhesion from odometer and train speed"
     source = "Bouchama 2024, (3.49), (4.14)"
+    by_name = True
     states = (FILTERED_SLIP,)
     inputs = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed r w"),
@@ -77,15 +78,14 @@ class SlipIndicator(HybridSystem):
     }
     default_preset = "simulation"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivative of the filtered slip, shape (1,)."""
-        return vector(
-            slip_filter_derivative(x[0], odometer_slip(u.odometer, u.speed, p.slip_floor), p.slip_filter_time)
-        )
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivative of the filtered slip."""
+        slip = odometer_slip(u.odometer, u.speed, p.slip_floor)
+        return {"filtered_slip": slip_filter_derivative(x.filtered_slip, slip, p.slip_filter_time)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Slip and indicator."""
         return {
             "slip": odometer_slip(u.odometer, u.speed, p.slip_floor),
-            "slip_indicator": indicator_level(x[0], u.odometer, u.speed, p.slip_threshold, p.slip_min_speed),
+            "slip_indicator": indicator_level(x.filtered_slip, u.odometer, u.speed, p.slip_threshold, p.slip_min_speed),
         }
