@@ -7,7 +7,7 @@ Its rules are pure functions, which an observer with a detector inside uses too;
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from plant_models.hybrid import (
     memory,
     output_signal,
     parameter,
-    vector,
 )
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -41,19 +40,10 @@ THRESHOLD_MEMORY = (
     memory("armed", "1", 1.0, "1 when the next rise of the residual counts, the flag of the thesis"),
     memory("fault_time", "s", 0.0, "Time since the fault was detected"),
 )
-"""What the detector remembers, in the order of `ThresholdMemory`."""
+"""What the detector remembers."""
 
 
-class ThresholdMemory(NamedTuple):
-    """Filtered residual [m/s], fault FD [1], flag [1], and time since the detection [s]."""
-
-    residual: Array
-    fault: Array
-    armed: Array
-    fault_time: Array
-
-
-def judge(before: ThresholdMemory, residual: Array, sample_period: Array, p: Any) -> ThresholdMemory:
+def judge(x: Any, residual: Array, sample_period: Array, p: Any) -> dict[str, Array]:
     """One sample of the detector.
 
     1. ``r > eps1``, flag, no fault: a fault begins, the flag falls.
@@ -64,27 +54,32 @@ def judge(before: ThresholdMemory, residual: Array, sample_period: Array, p: Any
     left in the residual that could rise.
 
     Args:
-        before: what is remembered. residual: ``v - vhat`` of this sample [m/s]. sample_period: time since the last one
-            [s].
+        x: named tuple with the `THRESHOLD_MEMORY`. residual: ``v - vhat`` of this sample [m/s].
+        sample_period: time since the last one [s].
         p: named tuple with the `THRESHOLD_PARAMETERS`.
 
     Returns:
-        What is remembered after it.
+        The memory after it, by name.
 
     Source: Aguiar Cota 2019, (3.18) and 3.2.2.3.
     """
     unfiltered = p.residual_filter_time <= 0.0
     weight = np.where(unfiltered, 1.0, -np.expm1(-sample_period / np.where(unfiltered, 1.0, p.residual_filter_time)))
-    level = before.residual + weight * (np.abs(residual) - before.residual)
-    time = np.where(before.fault > 0.0, before.fault_time + sample_period, 0.0)
-    begins = np.where(level > p.threshold_start, before.armed * (1.0 - before.fault), 0.0)
-    ends = np.where(level > p.threshold_end, before.armed * before.fault, 0.0)
-    given_up = np.where(time >= p.longest_fault - ROUNDING, before.fault, 0.0)
+    level = x.filtered_residual + weight * (np.abs(residual) - x.filtered_residual)
+    time = np.where(x.judged_fault > 0.0, x.fault_time + sample_period, 0.0)
+    begins = np.where(level > p.threshold_start, x.armed * (1.0 - x.judged_fault), 0.0)
+    ends = np.where(level > p.threshold_end, x.armed * x.judged_fault, 0.0)
+    given_up = np.where(time >= p.longest_fault - ROUNDING, x.judged_fault, 0.0)
     over = np.maximum(ends, given_up)
-    fault = np.where(begins > 0.0, 1.0, np.where(over > 0.0, 0.0, before.fault))
-    armed = np.where(level < p.threshold_quiet, 1.0, before.armed)
+    fault = np.where(begins > 0.0, 1.0, np.where(over > 0.0, 0.0, x.judged_fault))
+    armed = np.where(level < p.threshold_quiet, 1.0, x.armed)
     armed = np.where(np.maximum(begins, over) > 0.0, 0.0, armed)
-    return ThresholdMemory(level, fault, armed, np.where(fault > 0.0, time, 0.0))
+    return {
+        "filtered_residual": level,
+        "judged_fault": fault,
+        "armed": armed,
+        "fault_time": np.where(fault > 0.0, time, 0.0),
+    }
 
 
 def threshold_requirements(p: Any) -> dict[str, Array]:
@@ -122,6 +117,7 @@ class ThresholdDetector(HybridSystem):
     name = "threshold_detector"
     description = "Fault detector with three thresholds: begin, quiet, end of a fault in a residual"
     source = "Aguiar Cota 2019, (3.18), 3.2.2.3; the time-out is ours"
+    by_name = True
     internal_step = 1e-3  # nothing flows
     states = THRESHOLD_MEMORY
     inputs = (input_signal("residual", "m/s", 0.0, "Measured minus estimated speed"),)
@@ -148,11 +144,14 @@ class ThresholdDetector(HybridSystem):
         """Order and bounds of the thresholds, see `HybridSystem.requirements`."""
         return super().requirements(p) | threshold_requirements(p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Judge the residual: the memory after it, shape (4,)."""
-        return vector(*judge(ThresholdMemory(x[0], x[1], x[2], x[3]), u.residual, p.sample_period, p))
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Judge the residual."""
+        return judge(x, u.residual, p.sample_period, p)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The verdict."""
-        level, fault, armed = x[0], x[1], x[2]
-        return {"odometer_fault": fault, "recovering": fault * armed, "residual_level": level}
+        return {
+            "odometer_fault": x.judged_fault,
+            "recovering": x.judged_fault * x.armed,
+            "residual_level": x.filtered_residual,
+        }

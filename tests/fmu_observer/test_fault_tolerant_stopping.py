@@ -7,6 +7,7 @@ those of the package. The shipped scenario has the same through systems and co-s
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy.integrate import solve_ivp
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.fault_cycle import first_crossing
 from fmu_observer.design.extended_disturbance import extended_gain
-from fmu_observer.detection.threshold_detector import THRESHOLD_PARAMETERS, ThresholdMemory, judge
+from fmu_observer.detection.threshold_detector import THRESHOLD_MEMORY, THRESHOLD_PARAMETERS, judge
 from fmu_observer.observers.train.stopping_uio import PRINTED_GAIN, observer_matrix, sampled_error
 from plant_models.hybrid import Runtime, scalar_names
 from plant_models.railway.control.stopping_planner import BrakePlan, constant_brake, plan_stop
@@ -99,7 +100,7 @@ def stops() -> Stop:
     A = observer_matrix(W1)
     moved = np.eye(3) + A * H + A @ A * H**2 / 2.0 + A @ A @ A * H**3 / 6.0
     driven = np.eye(3) * H + A * H**2 / 2.0 + A @ A * H**3 / 6.0
-    memory = ThresholdMemory(np.zeros(members), np.zeros(members), np.ones(members), np.zeros(members))
+    memory = SimpleNamespace(**{s.name: np.full(members, s.start) for s in THRESHOLD_MEMORY})
     plan = BrakePlan(*(np.full(members, float(value)) for value in constant_brake(30.0, 100.0, W1)))
     began = (np.zeros(members), v.copy())  # when, and at which speed
     known = np.full(members, np.inf)  # when the jam was detected
@@ -117,7 +118,7 @@ def stops() -> Stop:
         released = (known >= onset - 1e-9) & (t >= known + RELEASE - 1e-9)
         jammed = (t < onset + jam - 1e-9) & ~released if np.isfinite(onset) else np.zeros(members, bool)
         innovation = v - z[0]
-        believed = np.where(memory.fault * switches > 0.0, 0.0, B * u)
+        believed = np.where(memory.judged_fault * switches > 0.0, 0.0, B * u)
         z = moved @ z + driven @ (np.stack([believed, 0.0 * u, 0.0 * u]) + GAIN[:, None] * innovation)
         push = np.where(jammed, 0.0, B * u)
         slopes = [push - W0 - W1 * v - W2 * v * v]
@@ -128,9 +129,10 @@ def stops() -> Stop:
         p = p + 0.5 * H * (v + following)
         v = following
         k += 1
-        before, memory = memory, judge(memory, v - z[0], H, thresholds)
+        before, memory = memory, SimpleNamespace(**judge(memory, v - z[0], H, thresholds))
         running = np.isnan(errors) & (v > 0.2)
-        begins, ends = running & (memory.fault > before.fault), running & (memory.fault < before.fault)
+        change = memory.judged_fault - before.judged_fault
+        begins, ends = running & (change > 0.0), running & (change < 0.0)
         detected += [(k * H, int(i)) for i in np.flatnonzero(begins)]
         recovered += [(k * H, int(i)) for i in np.flatnonzero(ends)]
         known = np.where(begins, k * H, known)

@@ -18,14 +18,12 @@ from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,
     THRESHOLD_PARAMETERS,
-    ThresholdMemory,
     judge,
     threshold_requirements,
 )
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.train.train_observer import BALISE
-from fmu_observer.observers.train.train_observer import POSITION as POSITION_STATE
+from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import (
     PeriodicEvent,
     Signal,
@@ -34,21 +32,10 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 
-POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states, and then of the memory
-HELD_INNOVATION, AT_BALISE, BALISES, DETECTOR, READING, UNCHANGED, HELD = (
-    4,
-    5,
-    6,
-    7,
-    11,
-    12,
-    13,
-)  # indices of the memory
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
 _PRINTED_START = {"estimated_speed": 30.0, "disturbance_estimate": -0.91, "disturbance_rate": 0.13}
 
@@ -83,10 +70,11 @@ class StoppingUio(GatedObserver, GapCertified):
         "Unknown-input observer for fault-tolerant stopping: speed, disturbance, and detection of a lost brake"
     )
     source = "Aguiar Cota 2019, (3.15)-(3.18) and 3.2.3"
+    by_name = True
     internal_step = 1e-3
     weighing = "position"
     states = (
-        POSITION_STATE,
+        POSITION,
         state("estimated_speed", "m/s", 30.0, "Estimate of the train speed"),
         state("disturbance_estimate", "m/s2", -0.91, "Estimate of all accelerations that the model does not know"),
         state("disturbance_rate", "m/s3", 0.337, "Estimate of the rate of the disturbance"),
@@ -155,58 +143,53 @@ class StoppingUio(GatedObserver, GapCertified):
         """Order of the thresholds, and a sampling that can be called quasi-continuous."""
         return super().requirements(p) | threshold_requirements(p)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of position, speed, disturbance and its rate, shape (4,)."""
-        innovation, fault = x[HELD_INNOVATION], x[DETECTOR + 1]
-        effort = u.effort * (1.0 - fault * p.switches_effort)
-        acceleration = (p.brake_coefficient * effort - p.davis_b * x[SPEED]) / p.mass + x[DISTURBANCE]
-        return vector(
-            x[SPEED],
-            acceleration + p.observer_gain[0] * innovation,
-            x[RATE] + p.observer_gain[1] * innovation,
-            p.observer_gain[2] * innovation,
-        )
-
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """A sample: innovation, verdict, and whether the odometer is held; a balise: its position, shape (14,)."""
-        if event == BALISE.name:
-            own = [x[i] for i in range(self.own_count)]
-            own[POSITION], own[AT_BALISE] = u.balise_position, x[POSITION] - u.balise_position
-            own[BALISES] = x[BALISES] + 1.0
-            return vector(*own)
-        innovation = u.odometer - x[SPEED]
-        before = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
-        judged = judge(before, innovation, p.sample_period, p)
-        moves = np.maximum(u.odometer, x[SPEED]) >= p.min_speed
-        kept = (np.where(moves, new, old) for new, old in zip(judged, before, strict=True))
-        jump = np.abs(u.odometer - x[READING])
-        # One sample without a change is enough: a jump after it looks like a fault as soon as it is as large as one.
-        stood = np.where(x[UNCHANGED] > 0.5 * p.sample_period, np.where(jump > p.threshold_start, 1.0, 0.0), 0.0)
-        return vector(
-            *(x[i] for i in range(4)),
-            innovation,
-            x[AT_BALISE],
-            x[BALISES],
-            *kept,
-            u.odometer,
-            np.where(jump > 0.0, 0.0, x[UNCHANGED] + p.sample_period),
-            np.maximum(x[HELD], stood),
-        )
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """The estimate, the residual and the verdict."""
-        detector = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of position, speed, disturbance and its rate."""
+        innovation = x.held_innovation
+        effort = u.effort * (1.0 - x.judged_fault * p.switches_effort)
+        acceleration = (p.brake_coefficient * effort - p.davis_b * x.estimated_speed) / p.mass + x.disturbance_estimate
         return {
-            "position": x[POSITION],
-            "speed": x[SPEED],
-            "disturbance": x[DISTURBANCE],
-            "innovation": x[AT_BALISE],
-            "balises": x[BALISES],
-            "residual": x[HELD_INNOVATION],
-            "residual_level": detector.residual,
-            "odometer_fault": detector.fault,
-            "recovering": detector.fault * detector.armed,
-            "held_odometer": x[HELD],
+            "estimated_position": x.estimated_speed,
+            "estimated_speed": acceleration + p.observer_gain[0] * innovation,
+            "disturbance_estimate": x.disturbance_rate + p.observer_gain[1] * innovation,
+            "disturbance_rate": p.observer_gain[2] * innovation,
+        }
+
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """A sample: innovation, verdict, and whether the odometer is held; a balise: its position."""
+        if event == BALISE.name:
+            return {
+                "estimated_position": u.balise_position,
+                "last_innovation": x.estimated_position - u.balise_position,
+                "balises_used": x.balises_used + 1.0,
+            }
+        innovation = u.odometer - x.estimated_speed
+        judged = judge(x, innovation, p.sample_period, p)
+        moves = np.maximum(u.odometer, x.estimated_speed) >= p.min_speed
+        jump = np.abs(u.odometer - x.last_reading)
+        # One sample without a change is enough: a jump after it looks like a fault as soon as it is as large as one.
+        stood = np.where(x.unchanged_time > 0.5 * p.sample_period, np.where(jump > p.threshold_start, 1.0, 0.0), 0.0)
+        return {
+            "held_innovation": innovation,
+            **{name: np.where(moves, new, getattr(x, name)) for name, new in judged.items()},
+            "last_reading": u.odometer,
+            "unchanged_time": np.where(jump > 0.0, 0.0, x.unchanged_time + p.sample_period),
+            "held_seen": np.maximum(x.held_seen, stood),
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The estimate, the residual and the verdict."""
+        return {
+            "position": x.estimated_position,
+            "speed": x.estimated_speed,
+            "disturbance": x.disturbance_estimate,
+            "innovation": x.last_innovation,
+            "balises": x.balises_used,
+            "residual": x.held_innovation,
+            "residual_level": x.filtered_residual,
+            "odometer_fault": x.judged_fault,
+            "recovering": x.judged_fault * x.armed,
+            "held_odometer": x.held_seen,
         }
 
     def odometer_of(self, u: Any) -> Array:
