@@ -16,7 +16,7 @@ from fmu_observer.detection.jam_rules import (
     doubt_limit,
 )
 from fmu_observer.detection.printed_jam_rules import PrintedRules
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal
 from plant_models.hybrid.system import Array
 
 NOISE = "odometer_noise"
@@ -47,16 +47,16 @@ def find_rules(name: str, rules: str) -> Rules:
     return RULES[rules]
 
 
-def verdict(rules: Rules, memory: tuple[Array, ...], p: Any) -> dict[str, Array]:
+def verdict(rules: Rules, m: Any, p: Any) -> dict[str, Array]:
     """Values of `FAULT_OUTPUTS`.
 
     Args:
-        rules: that judge. memory: in the order of their signals. p: parameters, as in `HybridSystem.flow`.
+        rules: that judge. m: named tuple with their `memory`. p: parameters, as in `HybridSystem.flow`.
     """
     return {
-        "odometer_fault": rules.fault(memory),
-        "recovering": rules.recovering(memory),
-        "residual_limit": rules.limit(memory, p),
+        "odometer_fault": rules.fault(m),
+        "recovering": rules.recovering(m),
+        "residual_limit": rules.limit(m, p),
     }
 
 
@@ -109,6 +109,7 @@ class JamDetector(HybridSystem):
     name = "jam_detector"
     description = "Jams and skids of the odometer's wheel from the residual of an observer"
     source = "Aguiar Cota 2019, Algorithm 3-3; the repaired rules ours"
+    by_name = True
     internal_step = 1e-2
     inputs = (
         input_signal("residual", "m/s", 0.0, "Residual of the observer, M (y - vh)"),
@@ -140,15 +141,11 @@ class JamDetector(HybridSystem):
         """
         return noise_doubts(p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A sample is judged."""
         told = Reading(u.odometer, u.estimated_speed, u.residual, u.effort)
-        return vector(*self.rules.at_sample(self._memory(x), told, p).memory)
+        return self.rules.at_sample(x, told, p).memory
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Verdict, recovery, and how long the residual has been small."""
-        memory = self._memory(x)
-        return {**verdict(self.rules, memory, p), "settled_time": self.rules.settled_time(memory, p)}
-
-    def _memory(self, x: Array) -> tuple[Array, ...]:
-        return tuple(x[i] for i in range(self.state_count))
+        return {**verdict(self.rules, x, p), "settled_time": self.rules.settled_time(x, p)}

@@ -67,7 +67,7 @@ class Judgement(NamedTuple):
     """What follows from a sample or a balise.
 
     Args:
-        memory: of the rules, shape (count,) as a tuple of scalars.
+        memory: of the rules, what changes of it by name.
         restart: 1 where the estimated speed is to be set to the odometer.
         onset: 1 where a fault begins with this sample.
         shift: to be added to the estimated speed [m/s].
@@ -75,10 +75,10 @@ class Judgement(NamedTuple):
             to what the odometer's way makes of that at its onset.
     """
 
-    memory: tuple[Array, ...]
-    restart: Array
-    onset: Array
-    shift: Array
+    memory: dict[str, Array]
+    restart: Array = 0.0
+    onset: Array = 0.0
+    shift: Array = 0.0
     withdrawn: Array = 0.0
 
 
@@ -92,71 +92,54 @@ class Rules(Protocol):
     memory: tuple[Signal, ...]
     parameters: tuple[Signal, ...]
 
-    def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, told: Reading, p: Any) -> Judgement:
         """Judge an odometer sample.
 
         Args:
-            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
         """
 
-    def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
+    def at_balise(self, m: Any, told: Passing, p: Any) -> Judgement:
         """Judge the way between two balises.
 
         Args:
-            before: memory, in the order of `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
         """
 
-    def fault(self, memory: tuple[Array, ...]) -> Array:
+    def fault(self, m: Any) -> Array:
         """1 while the odometer is judged to lie or is not confirmed.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
 
-    def discarded(self, memory: tuple[Array, ...]) -> Array:
+    def discarded(self, m: Any) -> Array:
         """1 while the estimate must not follow the odometer.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
 
-    def recovering(self, memory: tuple[Array, ...]) -> Array:
+    def recovering(self, m: Any) -> Array:
         """1 while it begins to be believed again.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
 
-    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+    def limit(self, m: Any, p: Any) -> Array:
         """Residual at which the verdict changes [m/s].
 
         Args:
-            memory: in the order of the signals. p: parameters.
+            m: named tuple with the `memory`. p: parameters.
         """
 
-    def settled_time(self, memory: tuple[Array, ...], p: Any) -> Array:
+    def settled_time(self, m: Any, p: Any) -> Array:
         """Time that counts towards judging faults at all [s].
 
         Args:
-            memory: in the order of the signals. p: parameters.
+            m: named tuple with the `memory`. p: parameters.
         """
-
-
-class RuleMemory(NamedTuple):
-    """Memory of `RepairedRules`, in the order of their signals."""
-
-    mode: Array
-    hold_time: Array
-    agreeing: Array
-    settled: Array
-    faults: Array
-    last_odometer: Array
-    unchanged_time: Array
-    refutations: Array
-    samples: Array
-    effort_time: Array
-    against: Array
-    proven_time: Array
 
 
 class RepairedRules:
@@ -231,15 +214,14 @@ class RepairedRules:
         parameter("way_time", "s", 1.0, "Shortest time between balises for the odometer's way to be judged", min=1e-3),
     )
 
-    def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, told: Reading, p: Any) -> Judgement:
         """Judge an odometer sample; it takes effect at once.
 
         Args:
-            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
         """
-        m = RuleMemory(*before)
         rolls = _is(np.abs(told.odometer - m.last_odometer) <= rolling_limit(p)) * _is(m.samples > 0.0)
-        held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
+        held, open_ = _is(m.odometer_mode == HELD), _is(m.odometer_mode == UNCONFIRMED)
         size = np.abs(told.residual)
         small = _is(size <= settled_limit(p))
         sign = _is(told.effort > 0.0) - _is(told.effort < 0.0)
@@ -253,7 +235,7 @@ class RepairedRules:
         settled = np.where(held > 0.0, 0.0, np.where(small > 0.0, m.settled + 1.0, 0.0))
         passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
-        armed = _is(m.mode == TRUSTED) * _is(faults < p.fault_limit) * passed
+        armed = _is(m.odometer_mode == TRUSTED) * _is(faults < p.fault_limit) * passed
         moves = _is(np.abs(told.speed) > p.least_speed)
         onset = armed * moves * large
         # held: is the odometer believed again
@@ -277,112 +259,108 @@ class RepairedRules:
         unjudged = (1.0 - proven) * (1.0 - armed) * (1.0 - held) * rolling * large
         jumped = np.maximum(open_, unjudged) * (1.0 - rolls)
         mode = np.where(
-            onset > 0.0, HELD, np.where(expired > 0.0, UNCONFIRMED, np.where(believed + trusted > 0.0, TRUSTED, m.mode))
+            onset > 0.0,
+            HELD,
+            np.where(expired > 0.0, UNCONFIRMED, np.where(believed + trusted > 0.0, TRUSTED, m.odometer_mode)),
         )
-        changed = np.maximum(_is(mode != m.mode), open_ * jumped)
-        after = RuleMemory(
-            mode,
-            np.where(mode == HELD, hold, 0.0),
-            np.where(changed > 0.0, 0.0, np.where(held > 0.0, row, quiet)),
-            np.where(onset > 0.0, 0.0, settled),
-            np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
-            told.odometer,
-            np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
-            m.refutations,
-            m.samples + 1.0,
-            effort_time,
-            against,
-            np.where(trusted > 0.0, p.trust_time, self._proven_time(m, told, np.maximum(held, onset), small, p)),
-        )
+        changed = np.maximum(_is(mode != m.odometer_mode), open_ * jumped)
+        rolled = self._proven_time(m, told, np.maximum(held, onset), small, p)
+        after = {
+            "odometer_mode": mode,
+            "hold_time": np.where(mode == HELD, hold, 0.0),
+            "agreeing": np.where(changed > 0.0, 0.0, np.where(held > 0.0, row, quiet)),
+            "settled": np.where(onset > 0.0, 0.0, settled),
+            "faults": np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
+            "last_odometer": told.odometer,
+            "unchanged_time": np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
+            "samples": m.samples + 1.0,
+            "effort_time": effort_time,
+            "against": against,
+            "proven_time": np.where(trusted > 0.0, p.trust_time, rolled),
+        }
         restart = np.maximum(np.maximum(believed, expired), jumped)
-        return Judgement(tuple(after), restart, onset, 0.0 * size, over * doubtful)
+        return Judgement(after, restart, onset, withdrawn=over * doubtful)
 
     @staticmethod
-    def _proven_time(m: RuleMemory, told: Reading, doubted: Array, small: Array, p: Any) -> Array:
+    def _proven_time(m: Any, told: Reading, doubted: Array, small: Array, p: Any) -> Array:
         """How long the odometer has rolled since the last standstill [s]; `trust_time` where it fits the start."""
         rolled = np.where(m.proven_time >= p.trust_time, p.trust_time, small * (m.proven_time + p.odometer_period))
         stands = _is(np.maximum(np.abs(told.speed), np.abs(told.odometer)) <= p.odometer_noise)
-        later = np.where(doubted > 0.0, m.proven_time, _is(m.mode == TRUSTED) * rolled)
+        later = np.where(doubted > 0.0, m.proven_time, _is(m.odometer_mode == TRUSTED) * rolled)
         first = _is(np.abs(told.residual) <= doubt_limit(p)) * p.trust_time
         return np.where(stands > 0.0, 0.0, np.where(m.samples > 0.0, later, first))
 
-    def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
+    def at_balise(self, m: Any, told: Passing, p: Any) -> Judgement:
         """Judge the way between two balises, where nothing changed on it.
 
         Args:
-            before: memory, in the order of `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
         """
-        m = RuleMemory(*before)
         clean = told.known * _is(told.duration >= p.way_time) * _is(m.unchanged_time >= told.duration)
         right = _is(np.abs(told.way - np.abs(told.distance)) <= way_limit(told, p))
-        held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
+        held, open_ = _is(m.odometer_mode == HELD), _is(m.odometer_mode == UNCONFIRMED)
         row = clean * (1.0 - right) * (m.refutations + 1.0)
         # Once may be a jam that is over; what is not believed anyway is refuted by that.
-        confirmed, refuted = clean * right, _is(row >= np.where(m.mode == TRUSTED, REFUTATIONS, 1.0))
-        mode = np.where(refuted > 0.0, HELD, np.where(confirmed * (held + open_) > 0.0, TRUSTED, m.mode))
-        changed = _is(mode != m.mode)
+        confirmed, refuted = clean * right, _is(row >= np.where(m.odometer_mode == TRUSTED, REFUTATIONS, 1.0))
+        mode = np.where(refuted > 0.0, HELD, np.where(confirmed * (held + open_) > 0.0, TRUSTED, m.odometer_mode))
+        changed = _is(mode != m.odometer_mode)
         begun = refuted * (1.0 - held)
         # Mean error of the speed over the way; what is left of it grew within the way, half as long as that at most.
         shift = np.where(
             refuted > 0.0, (np.abs(told.distance) - told.believed) / np.maximum(told.duration, p.way_time), 0.0
         )
-        after = RuleMemory(
-            mode,
-            np.where(refuted > 0.0, 0.5 * told.duration, np.where(changed > 0.0, 0.0, m.hold_time)),
-            np.where(changed > 0.0, 0.0, m.agreeing),
-            np.where(changed > 0.0, 0.0, m.settled),
-            np.where(confirmed * changed > 0.0, UNSETTLED, m.faults + begun),
-            m.last_odometer,
-            np.where(changed > 0.0, 0.0, m.unchanged_time),
-            row,
-            m.samples,
-            m.effort_time,
-            m.against,
-            np.where(confirmed > 0.0, p.trust_time, m.proven_time),
-        )
-        return Judgement(tuple(after), confirmed * held, begun, shift)
+        after = {
+            "odometer_mode": mode,
+            "hold_time": np.where(refuted > 0.0, 0.5 * told.duration, np.where(changed > 0.0, 0.0, m.hold_time)),
+            "agreeing": np.where(changed > 0.0, 0.0, m.agreeing),
+            "settled": np.where(changed > 0.0, 0.0, m.settled),
+            "faults": np.where(confirmed * changed > 0.0, UNSETTLED, m.faults + begun),
+            "unchanged_time": np.where(changed > 0.0, 0.0, m.unchanged_time),
+            "refutations": row,
+            "proven_time": np.where(confirmed > 0.0, p.trust_time, m.proven_time),
+        }
+        return Judgement(after, confirmed * held, begun, shift)
 
-    def fault(self, memory: tuple[Array, ...]) -> Array:
+    def fault(self, m: Any) -> Array:
         """1 while the odometer is judged to lie or is not confirmed.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
-        return _is(RuleMemory(*memory).mode > TRUSTED)
+        return _is(m.odometer_mode > TRUSTED)
 
-    def discarded(self, memory: tuple[Array, ...]) -> Array:
+    def discarded(self, m: Any) -> Array:
         """1 while the estimate must not follow the odometer.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
-        return _is(RuleMemory(*memory).mode == HELD)
+        return _is(m.odometer_mode == HELD)
 
-    def recovering(self, memory: tuple[Array, ...]) -> Array:
+    def recovering(self, m: Any) -> Array:
         """1 while samples agree, and while the odometer is followed without being confirmed.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
-        m = RuleMemory(*memory)
-        return np.maximum(_is(m.mode == UNCONFIRMED), _is(m.mode == HELD) * _is(m.agreeing > 0.0))
+        return np.maximum(_is(m.odometer_mode == UNCONFIRMED), _is(m.odometer_mode == HELD) * _is(m.agreeing > 0.0))
 
-    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+    def limit(self, m: Any, p: Any) -> Array:
         """Residual beyond which the odometer is doubted, or, while it is held to lie, within which it agrees [m/s].
 
         Args:
-            memory: in the order of the signals. p: parameters.
+            m: named tuple with the `memory`. p: parameters.
         """
-        return agreement_limit(RuleMemory(*memory).hold_time, p)
+        return agreement_limit(m.hold_time, p)
 
-    def settled_time(self, memory: tuple[Array, ...], p: Any) -> Array:
+    def settled_time(self, m: Any, p: Any) -> Array:
         """Time for which the residual of an odometer that was followed has been small [s]; `settle_samples` periods of
         it are needed before faults are judged.
 
         Args:
-            memory: in the order of the signals. p: parameters.
+            m: named tuple with the `memory`. p: parameters.
         """
-        return RuleMemory(*memory).settled * p.odometer_period
+        return m.settled * p.odometer_period
 
 
 def agreement_limit(hold_time: Array, p: Any) -> Array:

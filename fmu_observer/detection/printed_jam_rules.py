@@ -6,24 +6,13 @@ falls, as in a braking, no rule fires that believes it again.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fmu_observer.detection.jam_rules import ROUNDING, Judgement, Passing, Reading
 from plant_models.hybrid import Signal, memory, parameter
 from plant_models.hybrid.system import Array
-
-
-class PrintedMemory(NamedTuple):
-    """Memory of `PrintedRules`, in the order of their signals."""
-
-    fault: Array
-    recovering: Array
-    next_fault: Array
-    next_recovering: Array
-    last_odometer: Array
-    samples: Array
 
 
 class PrintedRules:
@@ -58,14 +47,13 @@ class PrintedRules:
         ),
     )
 
-    def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, told: Reading, p: Any) -> Judgement:
         """Judge an odometer sample; it takes effect at the next one, or at once.
 
         Args:
-            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
         """
-        m = PrintedMemory(*before)
-        fault, recovering = m.next_fault, m.next_recovering  # in force from this sample on
+        fault, recovering = m.next_fault_state, m.next_recovering_state  # in force from this sample on
         y, last = told.odometer, m.last_odometer
         known = _is(m.samples > 0.0)
         rises, falls = known * _is(last < y), known * _is(last > y)
@@ -79,58 +67,63 @@ class PrintedRules:
         new_fault = np.where(fault * _is(y == 0.0) > 0.0, 1.0, new_fault)
         armed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         new_fault, new_recovering, late = armed * new_fault, armed * new_recovering, p.rule_delay > 0.5
-        in_force = np.where(late, fault, new_fault), np.where(late, recovering, new_recovering)
-        after = PrintedMemory(*in_force, new_fault, new_recovering, y, m.samples + 1.0)
-        return Judgement(tuple(after), 0.0 * y, 0.0 * y, 0.0 * y)
+        after = {
+            "fault_state": np.where(late, fault, new_fault),
+            "recovering_state": np.where(late, recovering, new_recovering),
+            "next_fault_state": new_fault,
+            "next_recovering_state": new_recovering,
+            "last_odometer": y,
+            "samples": m.samples + 1.0,
+        }
+        return Judgement(after)
 
-    def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
+    def at_balise(self, m: Any, told: Passing, p: Any) -> Judgement:
         """Nothing: the printed rules know no balises.
 
         Args:
-            before: memory. told: the way. p: parameters.
+            m: named tuple with the `memory`. told: the way. p: parameters.
         """
-        none = 0.0 * told.duration
-        return Judgement(tuple(before), none, none, none)
+        return Judgement({})
 
-    def fault(self, memory: tuple[Array, ...]) -> Array:
+    def fault(self, m: Any) -> Array:
         """1 while F is in force.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
-        return PrintedMemory(*memory).fault
+        return m.fault_state
 
-    def discarded(self, memory: tuple[Array, ...]) -> Array:
+    def discarded(self, m: Any) -> Array:
         """The same: the odometer is discarded while F is in force.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
-        return PrintedMemory(*memory).fault
+        return m.fault_state
 
-    def recovering(self, memory: tuple[Array, ...]) -> Array:
+    def recovering(self, m: Any) -> Array:
         """1 while R is in force.
 
         Args:
-            memory: in the order of the signals.
+            m: named tuple with the `memory`.
         """
-        return PrintedMemory(*memory).recovering
+        return m.recovering_state
 
-    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+    def limit(self, m: Any, p: Any) -> Array:
         """eps [m/s], always.
 
         Args:
-            memory: in the order of the signals. p: parameters.
+            m: named tuple with the `memory`. p: parameters.
         """
-        return p.threshold + 0.0 * memory[0]
+        return p.threshold
 
-    def settled_time(self, memory: tuple[Array, ...], p: Any) -> Array:
+    def settled_time(self, m: Any, p: Any) -> Array:
         """Time since the start [s]: `arming_delay` is all that the printed rules wait for.
 
         Args:
-            memory: in the order of the signals. p: parameters.
+            m: named tuple with the `memory`. p: parameters.
         """
-        return PrintedMemory(*memory).samples * p.odometer_period
+        return m.samples * p.odometer_period
 
 
 def _is(condition: Array) -> Array:

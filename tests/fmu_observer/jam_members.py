@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.detection.jam_rules import RuleMemory
 from fmu_observer.observers.train.quasi_lpv_uio import QuasiLpvUio
+from plant_models.hybrid import scalar_names
 
 PERIOD, PARTS = 0.2, 2
-FIRST_RULE = 15  # states of the observer before the memory of its rules
 
 
 class Members:
@@ -24,20 +23,24 @@ class Members:
         self.system = QuasiLpvUio()
         self.count, self.effort = count, effort
         self.x = np.repeat(self.system.start_state(preset)[:, None], count, axis=1)
-        self.p = self.system.unpack_parameters(self.system.start_parameters(preset))._replace(**values)
+        self.states = scalar_names(self.system.states)
+        self.parameters = self.system.start_parameters(preset)
+        for name, value in values.items():
+            self.parameters[scalar_names(self.system.parameter_signals).index(name)] = value
+        self.p = self.system.unpack_parameters(self.parameters)
         self.t = 0.0
 
     def set_rules(self, **memory: Any) -> None:
         for name, value in memory.items():
-            self.x[FIRST_RULE + RuleMemory._fields.index(name)] = value
+            self.x[self.states.index(name)] = value
 
     def rule(self, name: str) -> np.ndarray:
-        return self.x[FIRST_RULE + RuleMemory._fields.index(name)]
+        return self.x[self.states.index(name)]
 
     def sample(self, odometer: np.ndarray) -> None:
         """Read the odometer, shape (count,), and go on to the next sample."""
         u = self._inputs(odometer)
-        self.x = np.array(self.system.jump("odometer_sample", self.t, self.x, u, self.p))
+        self.x = self.system.jump_vector("odometer_sample", self.t, self.x, u, self.parameters)
         h = PERIOD / PARTS
         for _ in range(PARTS):
             k1 = self._rate(self.x, u)
@@ -49,18 +52,18 @@ class Members:
         self.t += PERIOD
 
     def balise(self, place: np.ndarray | float, odometer: np.ndarray | float = 0.0) -> None:
-        u = self._inputs(odometer)._replace(balise_position=place + np.zeros(self.count))
-        self.x = np.array(self.system.jump("balise", self.t, self.x, u, self.p))
+        self.x = self.system.jump_vector("balise", self.t, self.x, self._inputs(odometer, place), self.parameters)
 
-    def _inputs(self, odometer: np.ndarray | float) -> Any:
+    def _inputs(self, odometer: np.ndarray | float, place: np.ndarray | float = 0.0) -> np.ndarray:
         flat = np.repeat(self.system.start_inputs()[:, None], self.count, axis=1)
-        return self.system.unpack_inputs(flat)._replace(
-            effort=np.full(self.count, self.effort), odometer=odometer + np.zeros(self.count)
-        )
+        names = scalar_names(self.system.input_signals)
+        for name, value in (("effort", self.effort), ("odometer", odometer), ("balise_position", place)):
+            flat[names.index(name)] = value
+        return flat
 
-    def _rate(self, x: np.ndarray, u: Any) -> np.ndarray:
-        rates = np.array(self.system.flow(self.t, x, u, self.p))
-        friction = self.system.friction(self.t, x, u, self.p)[0]
+    def _rate(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        rates = np.array(self.system.state_derivative(self.t, x, u, self.parameters))
+        friction = self.system.friction_vector(self.t, x, u, self.parameters)[0]
         held = np.clip(rates[1], -friction, friction)  # at rest
         rates[1] -= np.where(x[1] > 0.0, friction, held * (x[1] == 0.0))
         return rates

@@ -4,6 +4,7 @@ docs/jam_detection.md.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,11 +23,10 @@ from fmu_observer.detection.jam_rules import (
     Passing,
     Reading,
     RepairedRules,
-    RuleMemory,
     agreement_limit,
     certain_fault,
 )
-from fmu_observer.detection.printed_jam_rules import PrintedMemory, PrintedRules
+from fmu_observer.detection.printed_jam_rules import PrintedRules
 from fmu_observer.observers.train import QuasiLpvUio
 from fmu_observer.observers.train.quasi_lpv_uio import speed_errors
 from plant_models.hybrid import Runtime
@@ -34,22 +34,30 @@ from plant_models.hybrid import Runtime
 SHARED = {"odometer_period": PERIOD, "threshold": 0.9, "residual_gain": 2.3, "arming_delay": 0.0}
 PRINTED = SimpleNamespace(**SHARED, rule_4=0.0, rule_delay=1.0)
 P = SimpleNamespace(**SHARED, **{s.name: s.start for s in RepairedRules.parameters})
+RuleMemory: Any = namedtuple("RuleMemory", [s.name for s in RepairedRules.memory])
+PrintedMemory: Any = namedtuple("PrintedMemory", [s.name for s in PrintedRules.memory])
 ARMED = RuleMemory(TRUSTED, 0.0, 0.0, 9.0, 0.0, 20.0, 9.0, 0.0, 99.0, -99.0, 0.0, 20.0)  # while braking
 THETA = 0.9 / 2.3
 
 
+def after(before: Any, judged: Any) -> Any:
+    """A judgement whose memory is all of it."""
+    return judged._replace(memory=before._replace(**judged.memory))
+
+
 def printed(readings: list[float], speed: float, p: Any = PRINTED) -> list[tuple[float, float]]:
     """(F, R) in force at each sample beside an estimate that stays."""
-    memory: tuple[Any, ...] = tuple(0.0 for _ in PrintedRules.memory)
+    memory = PrintedMemory(*(0.0 for _ in PrintedRules.memory))
     found = []
     for y in readings:
-        memory = PrintedRules().at_sample(memory, Reading(y, speed, 2.3 * (y - speed), -1.0), p).memory
-        found.append((float(memory[0]), float(memory[1])))
+        memory = after(memory, PrintedRules().at_sample(memory, Reading(y, speed, 2.3 * (y - speed), -1.0), p)).memory
+        found.append((float(memory.fault_state), float(memory.recovering_state)))
     return found
 
 
-def repaired(before: RuleMemory, y: float, speed: float, effort: float = -1.0, p: Any = P) -> Any:
-    return RepairedRules().at_sample(before, Reading(y, speed, p.residual_gain * (y - speed), effort), p)
+def repaired(before: Any, y: float, speed: float, effort: float = -1.0, p: Any = P) -> Any:
+    told = Reading(y, speed, p.residual_gain * (y - speed), effort)
+    return after(before, RepairedRules().at_sample(before, told, p))
 
 
 # -- printed
@@ -78,13 +86,13 @@ def test_rule_4_calls_a_rise_a_fault_and_rule_5_a_standing_wheel() -> None:
     assert (1.0, 1.0) not in printed(rising, 19.9)
     assert (1.0, 1.0) in printed(rising, 19.9, SimpleNamespace(**SHARED, rule_4=1.0, rule_delay=1.0))
     memory = PrintedMemory(1.0, 1.0, 1.0, 1.0, 0.5, 9.0)  # rule 3 and rule 5 at once: the later one counts
-    after = PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED).memory
-    assert PrintedMemory(*after).next_fault == 1.0
+    judged = PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED)
+    assert judged.memory["next_fault_state"] == 1.0
 
 
 def test_the_printed_rules_know_no_balises() -> None:
-    memory = tuple(0.5 for _ in PrintedRules.memory)
-    assert PrintedRules().at_balise(memory, Passing(4.0, 200.0, 9.0, 200.0, 0.0, 0.0, 1.0), PRINTED).memory == memory
+    memory = PrintedMemory(*(0.5 for _ in PrintedRules.memory))
+    assert PrintedRules().at_balise(memory, Passing(4.0, 200.0, 9.0, 200.0, 0.0, 0.0, 1.0), PRINTED).memory == {}
 
 
 # -- repaired, sample by sample
@@ -94,15 +102,15 @@ def test_the_printed_rules_know_no_balises() -> None:
 def test_a_fault_begins_at_the_sample_that_shows_it() -> None:
     for gap, expected in ((THETA - 1e-6, TRUSTED), (THETA + 1e-6, HELD)):
         judged = repaired(ARMED, 20.0 - gap, 20.0)
-        assert RuleMemory(*judged.memory).mode == expected
+        assert judged.memory.odometer_mode == expected
         assert judged.onset == (expected == HELD)
 
 
-def until(memory: RuleMemory, mode: float, y: float, speed: float, effort: float, p: Any = P) -> int:
+def until(memory: Any, mode: float, y: float, speed: float, effort: float, p: Any = P) -> int:
     """Samples of one reading until a mode is reached; 0 where it is not within `hold_limit`."""
     for k in range(1, 80):
-        memory = RuleMemory(*repaired(memory, y, speed, effort, p).memory)
-        if memory.mode == mode:
+        memory = repaired(memory, y, speed, effort, p).memory
+        if memory.odometer_mode == mode:
             return k
     return 0
 
@@ -117,7 +125,7 @@ def test_faults_of_both_signs_begin_and_those_against_the_effort_are_short(
     """1.2 s of what the effort does not cause, 15 s of what it does; then the odometer is followed, and not trusted."""
     armed = ARMED._replace(effort_time=99.0 * effort)
     judged = repaired(armed, 20.0 + offset, 20.0, effort)
-    assert (RuleMemory(*judged.memory).mode, judged.onset, judged.restart) == (HELD, 1.0, 0.0)
+    assert (judged.memory.odometer_mode, judged.onset, judged.restart) == (HELD, 1.0, 0.0)
     assert until(armed, UNCONFIRMED, 20.0 + offset, 20.0, effort) == lasting + 1
     without = SimpleNamespace(**{**vars(P), "sign_rule": 0.0})
     assert until(armed, UNCONFIRMED, 20.0 + offset, 20.0, effort, without) == 76
@@ -125,7 +133,7 @@ def test_faults_of_both_signs_begin_and_those_against_the_effort_are_short(
 
 def test_a_hold_that_balises_began_ends_in_trust_where_samples_against_the_effort_last() -> None:
     """What balises corrected the speed by was a mean over the way, and at no jump of the wheel."""
-    driven = ARMED._replace(mode=HELD, effort_time=99.0, last_odometer=18.0)
+    driven = ARMED._replace(odometer_mode=HELD, effort_time=99.0, last_odometer=18.0)
     for refutations, ends in ((2.0, TRUSTED), (1.0, UNCONFIRMED)):
         assert until(driven._replace(refutations=refutations), ends, 18.0, 20.0, 1.0) == 6
 
@@ -136,7 +144,7 @@ def test_an_odometer_that_is_not_proven_is_held_to_lie_for_a_second(offset: floa
     young = ARMED._replace(proven_time=4.0)
     assert until(young, UNCONFIRMED, 20.0 + offset, 20.0, 0.0) == 7
     assert until(young._replace(proven_time=8.0), UNCONFIRMED, 20.0 + offset, 20.0, 0.0) == 11
-    last = RuleMemory(*repaired(young, 20.0 + offset, 20.0, 0.0).memory)._replace(hold_time=1.0)
+    last = repaired(young, 20.0 + offset, 20.0, 0.0).memory._replace(hold_time=1.0)
     judged = repaired(last, 20.0 + offset, 20.0, 0.0)
     assert (judged.restart, judged.withdrawn) == (1.0, 1.0)
     proven = repaired(last._replace(proven_time=20.0, hold_time=14.8), 20.0 + offset, 20.0, 0.0)
@@ -144,17 +152,17 @@ def test_an_odometer_that_is_not_proven_is_held_to_lie_for_a_second(offset: floa
 
 
 def test_an_odometer_is_proven_by_rolling_by_its_start_and_by_balises_and_not_for_longer_than_the_next_stop() -> None:
-    start = RuleMemory(*(float(s.start) for s in RepairedRules.memory))  # type: ignore[arg-type]
-    assert RuleMemory(*repaired(start, 20.0, 20.1).memory).proven_time == 20.0
-    memory = RuleMemory(*repaired(start, 15.0, 20.0).memory)  # it contradicts the speed that the start was told
+    start = RuleMemory(*(float(s.start) for s in RepairedRules.memory))
+    assert repaired(start, 20.0, 20.1).memory.proven_time == 20.0
+    memory = repaired(start, 15.0, 20.0).memory  # it contradicts the speed that the start was told
     assert memory.proven_time == 0.0
     for _ in range(99):
-        memory = RuleMemory(*repaired(memory, 15.0, 15.0).memory)
+        memory = repaired(memory, 15.0, 15.0).memory
     assert memory.proven_time == pytest.approx(19.8)
-    assert RuleMemory(*repaired(memory, 15.0, 15.0).memory).proven_time == pytest.approx(20.0)
-    assert RuleMemory(*RepairedRules().at_balise(memory, passing(200.0), P).memory).proven_time == 20.0
-    assert RuleMemory(*repaired(ARMED, 0.1, 0.0).memory).proven_time == 0.0
-    assert RuleMemory(*repaired(ARMED, 0.0, 9.0).memory).proven_time == 20.0  # a wheel that locks
+    assert repaired(memory, 15.0, 15.0).memory.proven_time == pytest.approx(20.0)
+    assert at_balise(memory, passing(200.0)).memory.proven_time == 20.0
+    assert repaired(ARMED, 0.1, 0.0).memory.proven_time == 0.0
+    assert repaired(ARMED, 0.0, 9.0).memory.proven_time == 20.0  # a wheel that locks
 
 
 def test_before_faults_are_judged_an_odometer_that_is_not_proven_is_followed_where_it_jumps() -> None:
@@ -166,32 +174,32 @@ def test_before_faults_are_judged_an_odometer_that_is_not_proven_is_followed_whe
 
 def test_nothing_is_judged_before_it_is_armed_or_near_standstill() -> None:
     for before in (ARMED._replace(faults=1000.0, settled=0.0), ARMED._replace(faults=3.0, settled=0.0)):
-        assert RuleMemory(*repaired(before, 15.0, 20.0).memory).mode == TRUSTED
+        assert repaired(before, 15.0, 20.0).memory.odometer_mode == TRUSTED
     late = SimpleNamespace(**{**vars(P), "arming_delay": 60.0})
-    assert RuleMemory(*repaired(ARMED, 15.0, 20.0, p=late).memory).mode == TRUSTED
-    assert RuleMemory(*repaired(ARMED, 0.0, 0.49).memory).mode == TRUSTED
+    assert repaired(ARMED, 15.0, 20.0, p=late).memory.odometer_mode == TRUSTED
+    assert repaired(ARMED, 0.0, 0.49).memory.odometer_mode == TRUSTED
     settling = ARMED._replace(faults=1000.0, settled=0.0)
     for _ in range(5):
-        settling = RuleMemory(*repaired(settling, 20.0, 20.0).memory)
+        settling = repaired(settling, 20.0, 20.0).memory
     assert settling.faults == 0.0
-    assert RuleMemory(*repaired(settling, 15.0, 20.0).memory).mode == HELD
+    assert repaired(settling, 15.0, 20.0).memory.odometer_mode == HELD
 
 
 def test_agreement_widens_with_the_time_held_and_takes_two_samples() -> None:
     for held, gap, expected in ((1.0, 0.45, TRUSTED), (1.0, 0.55, HELD), (4.0, 0.75, TRUSTED)):
-        memory = ARMED._replace(mode=HELD, hold_time=held - PERIOD, last_odometer=20.0 - gap)
+        memory = ARMED._replace(odometer_mode=HELD, hold_time=held - PERIOD, last_odometer=20.0 - gap)
         first = repaired(memory, 20.0 - gap, 20.0)
-        assert RuleMemory(*first.memory).mode == HELD
-        second = repaired(RuleMemory(*first.memory), 20.0 - gap, 20.0)
-        assert RuleMemory(*second.memory).mode == expected
+        assert first.memory.odometer_mode == HELD
+        second = repaired(first.memory, 20.0 - gap, 20.0)
+        assert second.memory.odometer_mode == expected
         assert second.restart == (expected == TRUSTED)
     assert float(agreement_limit(2.0, P)) == pytest.approx(0.9 + 2.3 * 0.1 * 2.0)
 
 
 def test_a_wheel_that_jumps_does_not_roll() -> None:
-    memory = ARMED._replace(mode=HELD, hold_time=5.0, agreeing=1.0, last_odometer=19.0)
+    memory = ARMED._replace(odometer_mode=HELD, hold_time=5.0, agreeing=1.0, last_odometer=19.0)
     jumped = repaired(memory, 20.0, 20.0)  # 1 m/s in a sample: it agrees, and the row begins anew
-    assert (RuleMemory(*jumped.memory).mode, RuleMemory(*jumped.memory).agreeing) == (HELD, 1.0)
+    assert (jumped.memory.odometer_mode, jumped.memory.agreeing) == (HELD, 1.0)
 
 
 def test_one_sample_too_fast_while_braking_moves_nothing() -> None:
@@ -199,15 +207,15 @@ def test_one_sample_too_fast_while_braking_moves_nothing() -> None:
     memory, told = ARMED, []
     for y in (24.0, 19.8, 19.6):
         judged = repaired(memory, y, 20.0)
-        memory = RuleMemory(*judged.memory)
-        told.append((memory.mode, float(judged.restart)))
+        memory = judged.memory
+        told.append((memory.odometer_mode, float(judged.restart)))
     assert told == [(HELD, 0.0), (HELD, 0.0), (TRUSTED, 1.0)]
 
 
 @pytest.mark.parametrize("before", [-9.0, 0.0, 0.8])
 def test_a_driven_wheel_that_was_braked_of_late_may_have_jammed(before: float) -> None:
     judged = repaired(ARMED._replace(effort_time=before), 19.0, 20.0, effort=1.0)
-    assert (RuleMemory(*judged.memory).mode, judged.onset, judged.restart) == (HELD, 1.0, 0.0)
+    assert (judged.memory.odometer_mode, judged.onset, judged.restart) == (HELD, 1.0, 0.0)
 
 
 def test_a_brake_that_is_released_in_a_jam_believes_nothing() -> None:
@@ -218,31 +226,31 @@ def test_a_brake_that_is_released_in_a_jam_believes_nothing() -> None:
     memory, estimate, told = ARMED._replace(last_odometer=22.11), 22.15, []
     for y, effort in ((14.74, -1307.0), (17.05, 7003.0), (22.11, 14278.0), (21.97, 20538.0)):
         judged = repaired(memory, y, estimate, effort)
-        memory = RuleMemory(*judged.memory)
-        told.append((memory.mode, float(judged.restart)))
+        memory = judged.memory
+        told.append((memory.odometer_mode, float(judged.restart)))
     assert told == [(HELD, 0.0), (HELD, 0.0), (HELD, 0.0), (TRUSTED, 1.0)]
 
 
 def test_a_wheel_that_is_driven_for_twice_the_release_time_has_not_jammed() -> None:
     """From a second and a period after the change on, slow samples count; as many again, and the estimate gives up."""
-    memory, told = ARMED._replace(mode=HELD, hold_time=0.2), []
+    memory, told = ARMED._replace(odometer_mode=HELD, hold_time=0.2), []
     for k in range(11):
-        memory = RuleMemory(*repaired(memory, 19.0 + 0.01 * k, 22.0, effort=1.0).memory)
-        told.append((memory.mode, float(memory.against)))
+        memory = repaired(memory, 19.0 + 0.01 * k, 22.0, effort=1.0).memory
+        told.append((memory.odometer_mode, float(memory.against)))
     assert told == [*((HELD, float(max(0, k - 5))) for k in range(1, 11)), (UNCONFIRMED, 6.0)]
 
 
 def test_a_hold_ends_at_its_limit_and_is_not_called_healthy() -> None:
-    judged = repaired(ARMED._replace(mode=HELD, hold_time=P.hold_limit - PERIOD), 5.0, 20.0)
-    memory = RuleMemory(*judged.memory)
-    assert (memory.mode, judged.restart, memory.faults) == (UNCONFIRMED, 1.0, 1000.0)
+    judged = repaired(ARMED._replace(odometer_mode=HELD, hold_time=P.hold_limit - PERIOD), 5.0, 20.0)
+    memory = judged.memory
+    assert (memory.odometer_mode, judged.restart, memory.faults) == (UNCONFIRMED, 1.0, 1000.0)
     rules = RepairedRules()
     assert (rules.fault(judged.memory), rules.recovering(judged.memory), rules.discarded(judged.memory)) == (1, 1, 0)
     for _ in range(99):
-        memory = RuleMemory(*repaired(memory, 5.0, 5.0).memory)
-    assert memory.mode == UNCONFIRMED
-    memory = RuleMemory(*repaired(memory, 5.0, 5.0).memory)  # 100 samples are the 20 s of trust_time
-    assert (memory.mode, memory.faults) == (TRUSTED, 0.0)
+        memory = repaired(memory, 5.0, 5.0).memory
+    assert memory.odometer_mode == UNCONFIRMED
+    memory = repaired(memory, 5.0, 5.0).memory  # 100 samples are the 20 s of trust_time
+    assert (memory.odometer_mode, memory.faults) == (TRUSTED, 0.0)
 
 
 # -- noise
@@ -266,8 +274,8 @@ def test_noise_that_is_told_is_not_taken_for_faults(preset: str, deviation: floa
     onsets, mode = 0, np.full(members, TRUSTED)
     for k in range(count):
         run.sample(v[k] + deviation * rng.standard_normal(members))
-        onsets += int(((run.rule("mode") == HELD) & (mode != HELD)).sum())
-        mode = run.rule("mode").copy()
+        onsets += int(((run.rule("odometer_mode") == HELD) & (mode != HELD)).sum())
+        mode = run.rule("odometer_mode").copy()
     assert onsets <= 9
     assert (run.rule("faults") == 0.0).all()  # all were armed
 
@@ -276,12 +284,12 @@ def test_noise_that_is_told_does_not_keep_an_odometer_from_being_proven() -> Non
     """20 s without a residual that noise does not explain; below eps / 2, 1.6 deviations, there are none such."""
     members, rng, deviation = 100, np.random.default_rng(3), 0.05
     run = Members(members, -0.68, "as_published_5_3_1", **{**NO_DRAG, "odometer_noise": 4.0 * deviation})
-    run.set_rules(mode=UNCONFIRMED, faults=1000.0, samples=99.0)
+    run.set_rules(odometer_mode=UNCONFIRMED, faults=1000.0, samples=99.0)
     v = wheel(rng, members, 40.0)
     run.x[1], run.x[2], run.x[7] = v[0], 0.12, 0.12
     for k in range(len(v)):
         run.sample(v[k] + deviation * rng.standard_normal(members))
-    assert (run.rule("mode") == TRUSTED).all()
+    assert (run.rule("odometer_mode") == TRUSTED).all()
     assert (run.rule("proven_time") >= run.p.trust_time - 1e-9).all()
 
 
@@ -294,11 +302,11 @@ def test_a_fault_that_is_larger_than_noise_hides_is_seen_at_its_first_sample(
     p = SimpleNamespace(**{**vars(P), "threshold": threshold, "odometer_noise": noise})
     for nu in np.linspace(-noise, noise, 9):
         judged = repaired(ARMED, 20.0 + sign * (certain_fault(p) + 1e-9) + nu, 20.0, p=p)
-        assert RuleMemory(*judged.memory).mode == HELD
-        assert RuleMemory(*repaired(ARMED, 20.0 + nu, 20.0, p=p).memory).mode == TRUSTED
+        assert judged.memory.odometer_mode == HELD
+        assert repaired(ARMED, 20.0 + nu, 20.0, p=p).memory.odometer_mode == TRUSTED
     # At an estimate that was just set to a reading: independent noise of both.
     both = np.sqrt(2.0) * noise
-    assert RuleMemory(*repaired(ARMED, 20.0 + sign * both * (1.0 - 1e-9), 20.0, p=p).memory).mode == TRUSTED
+    assert repaired(ARMED, 20.0 + sign * both * (1.0 - 1e-9), 20.0, p=p).memory.odometer_mode == TRUSTED
 
 
 @pytest.mark.parametrize("preset", DESIGNS)
@@ -327,36 +335,40 @@ def passing(way: float, believed: float = 200.0, **changed: float) -> Passing:
     return Passing(5.0, 200.0, way, believed, 0.0, 0.0, 1.0)._replace(**changed)
 
 
+def at_balise(before: Any, told: Passing) -> Any:
+    return after(before, RepairedRules().at_balise(before, told, P))
+
+
 @pytest.mark.parametrize(("way", "expected"), [(197.1, True), (196.9, False), (202.9, True), (203.1, False)])
 def test_the_way_of_the_odometer_is_right_within_1_m_and_1_percent(way: float, expected: bool) -> None:
-    held = ARMED._replace(mode=HELD)
-    judged = RepairedRules().at_balise(held, passing(way), P)
-    assert (RuleMemory(*judged.memory).mode == TRUSTED) == expected
+    held = ARMED._replace(odometer_mode=HELD)
+    judged = at_balise(held, passing(way))
+    assert (judged.memory.odometer_mode == TRUSTED) == expected
     assert judged.restart == expected
 
 
 def test_a_refuted_hold_corrects_the_speed_by_its_mean_error_and_halves_the_clock() -> None:
-    judged = RepairedRules().at_balise(ARMED._replace(mode=HELD, hold_time=9.0), passing(180.0, 210.0), P)
+    judged = at_balise(ARMED._replace(odometer_mode=HELD, hold_time=9.0), passing(180.0, 210.0))
     assert judged.shift == pytest.approx(-2.0)  # 10 m too far in 5 s
-    assert RuleMemory(*judged.memory).hold_time == 2.5
+    assert judged.memory.hold_time == 2.5
 
 
 def test_an_odometer_that_is_believed_must_be_refuted_twice() -> None:
-    first = RuleMemory(*RepairedRules().at_balise(ARMED, passing(180.0), P).memory)
-    assert first.mode == TRUSTED
-    assert RuleMemory(*RepairedRules().at_balise(first, passing(200.0), P).memory).refutations == 0.0
-    assert RuleMemory(*RepairedRules().at_balise(first, passing(180.0), P).memory).mode == HELD
-    unconfirmed = ARMED._replace(mode=UNCONFIRMED)
-    assert RuleMemory(*RepairedRules().at_balise(unconfirmed, passing(180.0), P).memory).mode == HELD
-    assert RuleMemory(*RepairedRules().at_balise(unconfirmed, passing(200.0), P).memory).mode == TRUSTED
+    first = at_balise(ARMED, passing(180.0)).memory
+    assert first.odometer_mode == TRUSTED
+    assert at_balise(first, passing(200.0)).memory.refutations == 0.0
+    assert at_balise(first, passing(180.0)).memory.odometer_mode == HELD
+    unconfirmed = ARMED._replace(odometer_mode=UNCONFIRMED)
+    assert at_balise(unconfirmed, passing(180.0)).memory.odometer_mode == HELD
+    assert at_balise(unconfirmed, passing(200.0)).memory.odometer_mode == TRUSTED
 
 
 @pytest.mark.parametrize("changed", [{"known": 0.0}, {"duration": 0.5}, {"duration": 9.5}])
 def test_a_way_with_a_change_in_it_says_nothing(changed: dict[str, float]) -> None:
     """No balise before; too short; longer than the mode has been what it is (9 s)."""
-    held = ARMED._replace(mode=HELD, hold_time=3.0)
-    judged = RepairedRules().at_balise(held, passing(100.0, **changed), P)
-    assert RuleMemory(*judged.memory)[:5] == held[:5]
+    held = ARMED._replace(odometer_mode=HELD, hold_time=3.0)
+    judged = at_balise(held, passing(100.0, **changed))
+    assert judged.memory[:5] == held[:5]
     assert judged.shift == 0.0
 
 
@@ -399,8 +411,8 @@ def test_a_by_agreement_it_is_believed_at_the_second_rolling_sample() -> None:
         assert (np.abs(run.x[1] - v[k])[held] <= held_speed_error(k * PERIOD, run.p, onset_error) + 1e-9).all()
         run.sample(now)
         if k == 0:
-            assert (run.rule("mode") == HELD).all()
-        believed = np.where((believed < 0) & (run.rule("mode") == TRUSTED), k, believed)
+            assert (run.rule("odometer_mode") == HELD).all()
+        believed = np.where((believed < 0) & (run.rule("odometer_mode") == TRUSTED), k, believed)
     late = (believed - end + 1) * PERIOD
     assert (believed > 0).all()
     assert late.max() <= bounds.agreement + 1e-9
@@ -422,7 +434,7 @@ def test_b_from_every_state_it_is_believed_for_good_within_the_bound(members: in
     run.x[2], run.x[3] = rng.uniform(-1.0, 1.0, members), rng.uniform(-0.2, 0.2, members)
     run.x[7], run.x[8] = run.x[2], run.x[3]
     run.set_rules(
-        mode=rng.integers(0, 3, members),
+        odometer_mode=rng.integers(0, 3, members),
         hold_time=rng.uniform(0.0, 15.0, members),
         agreeing=rng.integers(0, 5, members),
         settled=rng.integers(0, 9, members),
@@ -434,7 +446,7 @@ def test_b_from_every_state_it_is_believed_for_good_within_the_bound(members: in
     last = np.zeros(members)
     for k in range(len(v)):
         run.sample(v[k] + rng.uniform(-noise, noise, members))
-        last = np.where(run.rule("mode") > TRUSTED, (k + 1) * PERIOD, last)
+        last = np.where(run.rule("odometer_mode") > TRUSTED, (k + 1) * PERIOD, last)
     assert last.max() <= bounds.any_state
     assert last.max() > run.p.trust_time  # some went all the way
     assert np.percentile(last, 99.0) < 60.0  # the bound, 107 s, is of the worst that could follow the worst
@@ -462,7 +474,7 @@ def test_b_holds_from_stop_to_stop() -> None:
         run.sample(v + rng.uniform(-noise, noise, members))
         large = run.p.residual_gain * np.abs(run.x[6]) > 0.5 * run.p.threshold
         late = k * PERIOD if large.any() else late
-    assert (run.rule("mode") == TRUSTED).all()
+    assert (run.rule("odometer_mode") == TRUSTED).all()
     assert late <= bounds.any_state - run.p.trust_time
 
 
@@ -498,7 +510,7 @@ def test_b_holds_for_a_speed_that_changes_from_period_to_period(preset: str) -> 
 
 def test_the_position_strays_by_no_more_than_its_bound_while_the_model_runs_alone() -> None:
     run = Members(1, -0.68, **NO_DRAG)
-    run.set_rules(mode=HELD, faults=0.0, samples=99.0, proven_time=20.0)
+    run.set_rules(odometer_mode=HELD, faults=0.0, samples=99.0, proven_time=20.0)
     run.x[1], run.x[2], run.x[7] = 150.3, 0.1, 0.1
     run.x[2] += 0.1  # delta: the model brakes too much or too little
     true, way = 150.0 - 0.78 * PERIOD * np.arange(60), 0.0

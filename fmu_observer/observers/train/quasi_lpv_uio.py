@@ -39,9 +39,6 @@ from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 
-P, V, D, RATE, WAY = range(5)  # continuous states
-HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION = range(5, 10)
-BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES, LEAD = range(10, 15)
 SPEEDS = 21  # between the vertices, for the certificate
 HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
@@ -120,6 +117,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     name = "quasi_lpv_uio"
     description = "Quasi-LPV unknown-input observer with jam detection and balise reset"
     source = "Aguiar Cota 2019, (3.36)-(3.45), Algorithm 3-3, section 3.3.2; the repaired rules ours"
+    by_name = True
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "position"
@@ -182,40 +180,47 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     # -- equations --------------------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of position, speed, disturbance, its rate and the odometer's way, shape (5,)."""
-        lies = self.rules.discarded(self._rule_memory(x))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of position, speed, disturbance, its rate and the odometer's way."""
+        lies = self.rules.discarded(x)
         z = self._scheduling(x)
         h = np.clip((p.schedule_max - z) / (p.schedule_max - p.schedule_min), 0.0, 1.0)
         gain = [h * p.gain_low[i] + (1.0 - h) * p.gain_high[i] for i in range(3)]
         innovation = (1.0 - lies) * self._difference(x)
         acceleration = self._free_acceleration(x, u, p) + gain[0] * innovation
         runs_on = 1.0 - lies if self.repaired else 1.0
-        drifts = runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation
-        standing = stands(x[V], x[HELD], p.odometer_noise if self.repaired else 0.0)
-        return vector(x[V], acceleration, *held_disturbance(standing, *drifts, x[RATE]), x[HELD])
+        drifts = runs_on * x.unknown_deceleration_rate + gain[1] * innovation, gain[2] * innovation
+        standing = stands(x.estimated_speed, x.held_odometer, p.odometer_noise if self.repaired else 0.0)
+        disturbance, rate = held_disturbance(standing, *drifts, x.unknown_deceleration_rate)
+        return {
+            "estimated_position": x.estimated_speed,
+            "estimated_speed": acceleration,
+            "unknown_deceleration": disturbance,
+            "unknown_deceleration_rate": rate,
+            "odometer_way": x.held_odometer,
+        }
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
         return vector((p.davis_a + np.maximum(-u.effort, 0.0)) / p.mass)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """An odometer sample is judged and held; a balise gives the position and a judgement of the way."""
         return self._at_balise(t, x, u, p) if event == BALISE.name else self._at_sample(x, u, p)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, the residual and the verdict."""
         return {
-            "position": x[P],
-            "speed": x[V],
-            "innovation": x[INNOVATION],
-            "disturbance": x[D],
+            "position": x.estimated_position,
+            "speed": x.estimated_speed,
+            "innovation": x.last_innovation,
+            "disturbance": x.unknown_deceleration,
             "residual": p.residual_gain * self._difference(x),
-        } | verdict(self.rules, self._rule_memory(x), p)
+        } | verdict(self.rules, x, p)
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """While the odometer is not believed no balise is to be doubted: it is what the speed is corrected by."""
-        return OPEN_BOUND * self.rules.fault(self._rule_memory(x))
+        return OPEN_BOUND * self.rules.fault(x)
 
     def odometer_of(self, u: Any) -> Array:
         """The odometer [m/s]."""
@@ -278,59 +283,71 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(LEAD + 1)]
+    def _at_sample(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        speed = x.estimated_speed
         acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
-        now = u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0)
-        told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
-        judged = self.rules.at_sample(self._rule_memory(x), told, p)
-        own[V] = np.where(judged.restart > 0.0, now, x[V])
-        own[CORRECTION] = now - own[V]
-        own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
-        own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
-        own[HELD], own[LAST_D], own[LAST_RATE] = now, own[D], own[RATE]
+        now = u.odometer + p.reading_age * np.where(speed > 0.0, acceleration, 0.0)
+        judged = self.rules.at_sample(x, Reading(u.odometer, speed, p.residual_gain * (now - speed), u.effort), p)
+        after, begins = np.where(judged.restart > 0.0, now, speed), judged.onset > 0.0
+        disturbance = np.where(begins, x.last_disturbance, x.unknown_deceleration)
+        rate = np.where(begins, x.last_disturbance_rate, x.unknown_deceleration_rate)
         # What may have been the estimate's mistake costs no more than the odometer would have.
-        own[P] = np.where(judged.withdrawn > 0.0, x[WAY] + x[LEAD], x[P])
-        own[LEAD] = np.where(judged.onset > 0.0, x[P] - x[WAY], x[LEAD])
-        return vector(*own, *judged.memory)
+        position = np.where(judged.withdrawn > 0.0, x.odometer_way + x.onset_lead, x.estimated_position)
+        return {
+            "estimated_position": position,
+            "estimated_speed": after,
+            "unknown_deceleration": disturbance,
+            "unknown_deceleration_rate": rate,
+            "held_odometer": now,
+            "held_innovation": now - after,
+            "last_disturbance": disturbance,
+            "last_disturbance_rate": rate,
+            "onset_lead": np.where(begins, x.estimated_position - x.odometer_way, x.onset_lead),
+            **judged.memory,
+        }
 
-    def _at_balise(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        own = [x[i] for i in range(LEAD + 1)]
+    def _at_balise(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        position, place = x.estimated_position, u.balise_position
         told = Passing(
-            t - x[BALISE_TIME],
-            u.balise_position - x[BALISE_PLACE],
-            x[WAY],
-            x[P] - x[BALISE_PLACE],
-            x[HELD] - x[BALISE_ODOMETER],
+            t - x.balise_stamp,
+            place - x.balise_place,
+            x.odometer_way,
+            position - x.balise_place,
+            x.held_odometer - x.balise_reading,
             2.0 * known_accuracy(u.balise_location_accuracy),
             # Exactly on the balise: the gate has restarted the position there, and the way before it says nothing.
-            np.where(x[BALISES] > 0.0, np.where(x[P] == u.balise_position, 0.0, 1.0), 0.0),
+            np.where(x.balises_used > 0.0, np.where(position == place, 0.0, 1.0), 0.0),
         )
-        judged = self.rules.at_balise(self._rule_memory(x), told, p)
-        own[V] = np.where(judged.restart > 0.0, x[HELD], x[V]) + judged.shift
-        own[CORRECTION] = np.where(judged.restart > 0.0, 0.0, x[CORRECTION])
-        own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
-        own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
-        own[BALISES], own[LEAD] = x[BALISES] + 1.0, u.balise_position
-        return vector(*own, *judged.memory)
+        judged = self.rules.at_balise(x, told, p)
+        restarts = judged.restart > 0.0
+        return {
+            "estimated_position": place,
+            "estimated_speed": np.where(restarts, x.held_odometer, x.estimated_speed) + judged.shift,
+            "odometer_way": 0.0,
+            "held_innovation": np.where(restarts, 0.0, x.held_innovation),
+            "last_innovation": position - place,
+            "balise_stamp": t,
+            "balise_place": place,
+            "balise_reading": x.held_odometer,
+            "balises_used": x.balises_used + 1.0,
+            "onset_lead": place,
+            **judged.memory,
+        }
 
-    def _difference(self, x: Array) -> Array:
+    def _difference(self, x: Any) -> Array:
         """Odometer minus estimate, as held [m/s]."""
-        return x[CORRECTION] if self.hold == "innovation" else x[HELD] - x[V]
+        return x.held_innovation if self.hold == "innovation" else x.held_odometer - x.estimated_speed
 
-    def _scheduling(self, x: Array) -> Array:
+    def _scheduling(self, x: Any) -> Array:
         """Speed of the scheduling [m/s]."""
         if not self.repaired:
-            return x[HELD]
-        return np.where(self.rules.discarded(self._rule_memory(x)) > 0.0, x[V], x[HELD])
+            return x.held_odometer
+        return np.where(self.rules.discarded(x) > 0.0, x.estimated_speed, x.held_odometer)
 
-    def _free_acceleration(self, x: Array, u: Any, p: Any) -> Array:
+    def _free_acceleration(self, x: Any, u: Any, p: Any) -> Array:
         """Acceleration without innovation and dry friction [m/s2]."""
-        drag = (p.davis_b + p.davis_c * np.abs(self._scheduling(x))) * x[V]
-        return (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D]
-
-    def _rule_memory(self, x: Array) -> tuple[Array, ...]:
-        return tuple(x[LEAD + 1 + i] for i in range(len(self.rules.memory)))
+        drag = (p.davis_b + p.davis_c * np.abs(self._scheduling(x))) * x.estimated_speed
+        return (np.maximum(u.effort, 0.0) - drag) / p.mass - x.unknown_deceleration
 
 
 def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:
