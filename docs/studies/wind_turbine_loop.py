@@ -70,7 +70,7 @@ _ENDS = np.cumsum([s.width for s in _STATES])
 LAYOUT = {s.name: slice(int(end) - s.width, int(end)) for s, end in zip(_STATES, _ENDS, strict=True)}
 """Where each state of the loop stands."""
 
-FIXED = {name: system.unpack_parameters(system.start_parameters()) for name, system in PARTS.items()}
+FIXED = {name: system.start_parameters() for name, system in PARTS.items()}
 """Parameters of the parts."""
 
 
@@ -112,8 +112,8 @@ class WindTurbineLoop(HybridSystem):
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The turbine turns."""
-        turbine = PARTS["turbine"]
-        return turbine.flow(t, self._part("turbine", x), self._turbine_inputs(t, x, None, p), FIXED["turbine"])
+        inputs = self._turbine_inputs(t, x, None, p)
+        return PARTS["turbine"].state_derivative(t, self._part("turbine", x), inputs, FIXED["turbine"])
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimated efficiency."""
@@ -124,15 +124,10 @@ class WindTurbineLoop(HybridSystem):
         if event != "sampling":
             told = DIAGNOSIS.jump(event, t, self._part("diagnosis", x), None, p)
             return self._with(x, diagnosis=told)
-        wind = PARTS["wind"].jump("gust", t, self._part("wind", x), u, self._wind(p))
+        wind = PARTS["wind"].jump_vector("gust", t, self._part("wind", x), vector(u.gust_noise), self._wind(p))
         x = self._with(x, wind=wind)
-        fixed = FIXED["turbine"]
-        x = self._with(
-            x,
-            turbine=PARTS["turbine"].jump(
-                "sampling", t, self._part("turbine", x), self._turbine_inputs(t, x, u, p), fixed
-            ),
-        )
+        inputs, turbine = self._turbine_inputs(t, x, u, p), self._part("turbine", x)
+        x = self._with(x, turbine=PARTS["turbine"].jump_vector("sampling", t, turbine, inputs, FIXED["turbine"]))
         readings = self._readings(t, x, p)
         controller = self._part("controller", x)
         given = DIAGNOSIS.unpack_inputs(
@@ -148,8 +143,8 @@ class WindTurbineLoop(HybridSystem):
         )
         before = self._part("diagnosis", x)
         told = DIAGNOSIS.jump("sampling", t, before, given, p)
-        asked = PARTS["controller"].unpack_inputs(vector(readings["generator"][0], readings["power"]))
-        moved = PARTS["controller"].jump("sampling", t, controller, asked, FIXED["controller"])
+        asked = vector(readings["generator"][0], readings["power"])
+        moved = PARTS["controller"].jump_vector("sampling", t, controller, asked, FIXED["controller"])
         log = self._logged(t, x, before, told, p)
         return self._with(self._with(x, diagnosis=told, controller=moved), log=log)
 
@@ -175,10 +170,11 @@ class WindTurbineLoop(HybridSystem):
 
     def _wind(self, p: Any) -> Any:
         names = ("mean_from", "mean_to", "sine_amplitude", "turbulence_std", "sample_period")
-        return FIXED["wind"]._replace(**{name: getattr(p, name) for name in names})
+        pairs = zip(PARTS["wind"].parameter_signals, FIXED["wind"], strict=True)
+        return vector(*(getattr(p, s.name) if s.name in names else value for s, value in pairs))
 
     def _turbine_inputs(self, t: Array, x: Array, u: Any, p: Any) -> Any:
-        blown = PARTS["wind"].output(t, self._part("wind", x), None, self._wind(p))["wind_speed"]
+        blown = PARTS["wind"].output_vector(t, self._part("wind", x), np.zeros(1), self._wind(p))[0]
         controller = self._part("controller", x)
         acts = self._acts(t, p)
         into = [self._is(p, 7) * acts * 1000.0 * p.size]
@@ -193,7 +189,7 @@ class WindTurbineLoop(HybridSystem):
         if u is not None:
             parts = [getattr(u, s.name) for s in PARTS["turbine"].noises]
             noises = [part[i] for part, s in zip(parts, PARTS["turbine"].noises, strict=True) for i in range(s.width)]
-        return PARTS["turbine"].unpack_inputs(vector(blown, controller[2], controller[1], *into, *noises))
+        return vector(blown, controller[2], controller[1], *into, *noises)
 
     def _readings(self, t: Array, x: Array, p: Any) -> dict[str, Any]:
         def held(name: str) -> list[Array]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.system import Array
 
 
@@ -26,6 +26,7 @@ class Wind(HybridSystem):
     name = "wind"
     description = "Wind speed, stand-in for a recording: mean, sine and turbulence"
     source = "stand-in for Omar 2012, Fig. 7.2"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("turbulence", "m/s", 0.0, "Turbulent part of the wind at the last instant"),
@@ -58,12 +59,14 @@ class Wind(HybridSystem):
     }
     default_preset = "benchmark_script"
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The next value of the turbulence, and one instant more, shape (2,) or (2, members)."""
-        kept = np.where(x[1] > 0.0, np.exp(-p.sample_period / p.turbulence_time), 0.0)  # the first is drawn afresh
-        return vector(kept * x[0] + np.sqrt(1.0 - kept * kept) * p.turbulence_std * u.gust_noise, x[1] + 1.0)
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The next value of the turbulence, and one instant more."""
+        kept = np.where(x.gusts > 0.0, np.exp(-p.sample_period / p.turbulence_time), 0.0)  # the first is drawn afresh
+        turbulence = kept * x.turbulence + np.sqrt(1.0 - kept * kept) * p.turbulence_std * u.gust_noise
+        return {"turbulence": turbulence, "gusts": x.gusts + 1.0}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The speed of the wind."""
         mean = p.mean_from + (p.mean_to - p.mean_from) * np.clip(t / p.mean_time, 0.0, 1.0)
-        return {"wind_speed": np.maximum(mean + p.sine_amplitude * np.sin(p.sine_frequency * t) + x[0], 0.0)}
+        swinging = mean + p.sine_amplitude * np.sin(p.sine_frequency * t)
+        return {"wind_speed": np.maximum(swinging + x.turbulence, 0.0)}

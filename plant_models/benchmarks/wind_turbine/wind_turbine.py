@@ -27,9 +27,6 @@ from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
 BLADES = 3
-ROTOR, GENERATOR, TORSION, TORQUE = 0, 1, 2, 3  # places in the state
-PITCH, PITCH_RATE = 4, 7  # of the first blade
-HELD = 10  # of the first held measurement
 
 _MEASURED = (
     ("wind", "m/s", None, "wind speed"),
@@ -65,6 +62,7 @@ class WindTurbine(HybridSystem):
     name = "wind_turbine"
     description = "Wind turbine of the benchmark on fault detection, with two sensors for each speed and pitch"
     source = "Omar 2012, (7.3.1)-(7.3.5); Odgaard, Stoustrup, Kinnaert 2009; power coefficient: Heier, stand-in"
+    by_name = True
     internal_step = 1e-2  # the shaft swings with 28 rad/s; with this step its damping is 0.6 % too strong
     states = (
         state("rotor_turning", "rad/s", 1.1, "Speed of the rotor"),
@@ -165,59 +163,56 @@ class WindTurbine(HybridSystem):
     }
     default_preset = "repaired"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the ten continuous states, shape (10,) or (10, members)."""
-        pitches, rates = _blades(x, PITCH), _blades(x, PITCH_RATE)
-        torque = x[TORQUE] + u.torque_offset
-        turning = (x[ROTOR], x[GENERATOR], x[TORSION])
-        turned = _drive_train(u, p).rates(turning, _rotor(p).torque(u.wind_speed, x[ROTOR], pitches), torque)
-        wn, zeta = u.pitch_frequency, u.pitch_damping
-        bent = (
-            wn[i] * wn[i] * (u.pitch_reference - pitches[i]) - 2.0 * zeta[i] * wn[i] * rates[i] for i in range(BLADES)
-        )
-        return vector(*turned, (u.torque_reference - x[TORQUE]) / p.converter_time, *rates, *bent)
-
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The sensors are read: new held readings, shape (23,) or (23, members)."""
-        torque = x[TORQUE] + u.torque_offset
-        noise = p.pitch_noise
-        read = (
-            u.wind_speed + p.wind_bias + p.wind_noise * u.wind_normal[0],
-            *(x[ROTOR] + p.rotor_speed_noise * u.rotor_speed_normal[j] for j in range(2)),
-            *(x[GENERATOR] + p.generator_speed_noise * u.generator_speed_normal[j] for j in range(2)),
-            torque + p.torque_noise * u.torque_normal[0],
-            p.generator_efficiency * x[GENERATOR] * torque + p.power_noise * u.power_normal[0],
-            *(x[PITCH + i] + noise * u.pitch_normal[2 * i + j] for i in range(BLADES) for j in range(2)),
-        )
-        return vector(*(x[i] for i in range(HELD)), *read)
-
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """What the turbine does, and the readings, held."""
-        torque = x[TORQUE] + u.torque_offset
-        stable = [np.where(value > 0.0, 1.0, 0.0) for value in _drive_train(u, p).hurwitz()]
-        held, at = {}, HELD
-        for name, _, n, _ in _MEASURED:
-            held[f"measured_{name}"] = x[at] if n is None else x[at : at + n]
-            at += n or 1
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the continuous states."""
+        turning = (x.rotor_turning, x.generator_turning, x.shaft_torsion)
+        rotor_torque = _rotor(p).torque(u.wind_speed, x.rotor_turning, x.blade_pitch)
+        turned = _drive_train(u, p).rates(turning, rotor_torque, x.converter_torque + u.torque_offset)
+        blades = zip(x.blade_pitch, x.blade_pitch_rate, u.pitch_frequency, u.pitch_damping, strict=True)
+        bent = (wn * wn * (u.pitch_reference - pitch) - 2.0 * zeta * wn * rate for pitch, rate, wn, zeta in blades)
         return {
-            "rotor_speed": x[ROTOR],
-            "generator_speed": x[GENERATOR],
-            "torsion": x[TORSION],
-            "rotor_torque": _rotor(p).torque(u.wind_speed, x[ROTOR], _blades(x, PITCH)),
+            "rotor_turning": turned[0],
+            "generator_turning": turned[1],
+            "shaft_torsion": turned[2],
+            "converter_torque": (u.torque_reference - x.converter_torque) / p.converter_time,
+            "blade_pitch": x.blade_pitch_rate,
+            "blade_pitch_rate": vector(*bent),
+        }
+
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The sensors are read: new held readings."""
+        torque, rotor, speed = x.converter_torque + u.torque_offset, x.rotor_turning, x.generator_turning
+        pitches = (
+            pitch + p.pitch_noise * u.pitch_normal[2 * i + j] for i, pitch in enumerate(x.blade_pitch) for j in range(2)
+        )
+        return {
+            "held_wind": u.wind_speed + p.wind_bias + p.wind_noise * u.wind_normal[0],
+            "held_rotor_speed": vector(*(rotor + p.rotor_speed_noise * n for n in u.rotor_speed_normal)),
+            "held_generator_speed": vector(*(speed + p.generator_speed_noise * n for n in u.generator_speed_normal)),
+            "held_torque": torque + p.torque_noise * u.torque_normal[0],
+            "held_power": p.generator_efficiency * speed * torque + p.power_noise * u.power_normal[0],
+            "held_pitch": vector(*pitches),
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What the turbine does, and the readings, held."""
+        torque = x.converter_torque + u.torque_offset
+        stable = [np.where(value > 0.0, 1.0, 0.0) for value in _drive_train(u, p).hurwitz()]
+        return {
+            "rotor_speed": x.rotor_turning,
+            "generator_speed": x.generator_turning,
+            "torsion": x.shaft_torsion,
+            "rotor_torque": _rotor(p).torque(u.wind_speed, x.rotor_turning, x.blade_pitch),
             "generator_torque": torque,
-            "generator_power": p.generator_efficiency * x[GENERATOR] * torque,
-            "pitch": x[PITCH : PITCH + BLADES],
-            **held,
+            "generator_power": p.generator_efficiency * x.generator_turning * torque,
+            "pitch": x.blade_pitch,
+            **{f"measured_{name}": getattr(x, f"held_{name}") for name, *_ in _MEASURED},
             "drive_train_unstable": 1.0 - stable[0] * stable[1] * stable[2],
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
-
-
-def _blades(x: Array, first: int) -> tuple[Array, Array, Array]:
-    return x[first], x[first + 1], x[first + 2]
 
 
 def _rotor(p: Any) -> Rotor:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.benchmarks.wind_turbine.rotor import Rotor, optimal_torque_gain
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -33,6 +33,7 @@ class WindTurbineController(HybridSystem):
     name = "wind_turbine_controller"
     description = "Controller of a wind turbine: measured generator speed and power in, torque and pitch out"
     source = "Omar 2012, section 7.2.2; Odgaard, Stoustrup, Kinnaert 2009"
+    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("strong_wind", "1", 0.0, "1 in zone 3, 0 in zone 2"),
@@ -69,21 +70,22 @@ class WindTurbineController(HybridSystem):
     )
     events = (PeriodicEvent("sampling", "sample_period", description="References are computed"),)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Zone, references and error, shape (4,) or (4, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Zone, references and error."""
         error = u.generator_speed - p.rated_speed
         rated = np.where(u.generator_power >= p.rated_power, 1.0, np.where(error >= 0.0, 1.0, 0.0))
-        strong = np.where(x[0] > 0.0, np.where(error < -p.speed_margin, 0.0, 1.0), rated)
-        moved = x[1] + p.proportional_gain * error + (p.integral_gain * p.sample_period - p.proportional_gain) * x[3]
+        strong = np.where(x.strong_wind > 0.0, np.where(error < -p.speed_margin, 0.0, 1.0), rated)
+        share = p.integral_gain * p.sample_period - p.proportional_gain
+        moved = x.held_pitch + p.proportional_gain * error + share * x.last_error
         pitch = np.where(strong > 0.0, np.clip(moved, p.least_pitch, p.most_pitch), p.least_pitch)
         speed = np.maximum(u.generator_speed, LEAST_SPEED)
         most_power = p.optimal_gain * u.generator_speed * u.generator_speed
         torque = np.where(strong > 0.0, p.rated_power / (p.generator_efficiency * speed), most_power)
-        return vector(strong, pitch, torque, error)
+        return {"strong_wind": strong, "held_pitch": pitch, "held_torque": torque, "last_error": error}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The references, held."""
-        return {"torque_reference": x[2], "pitch_reference": x[1], "zone": 2.0 + x[0]}
+        return {"torque_reference": x.held_torque, "pitch_reference": x.held_pitch, "zone": 2.0 + x.strong_wind}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and the limits of the pitch are in order."""
