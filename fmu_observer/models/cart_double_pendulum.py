@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.model import ObserverModel
-from plant_models.benchmarks.cart_double_pendulum import SECTION_IV_2_2_3, double_pendulum_flow
+from plant_models.benchmarks.cart_double_pendulum import SECTION_IV_2_2_3, accelerations
 from plant_models.hybrid import input_signal, state
 from plant_models.hybrid.system import Array, vector
 
@@ -41,5 +41,7 @@ def cart_double_pendulum() -> ObserverModel:
 
 
 def _remainder(x: Array, u: Array) -> Array:
-    _, cart, _, first, _, second = double_pendulum_flow(x, u[0], SECTION_IV_2_2_3)
-    return vector(0.0, cart, 0.0, first, 0.0, second)
+    _, _, first, first_rate, second, second_rate = x
+    found = accelerations((first, second), (first_rate, second_rate), u[0], SECTION_IV_2_2_3)
+    acceleration, first_angular, second_angular = found
+    return vector(0.0, acceleration, 0.0, first_angular, 0.0, second_angular)

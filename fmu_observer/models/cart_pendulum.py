@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.model import ObserverModel
-from plant_models.benchmarks.cart_pendulum import TABLE_4_1, cart_pendulum_flow
+from plant_models.benchmarks.cart_pendulum import TABLE_4_1, accelerations
 from plant_models.hybrid import input_signal, state
 from plant_models.hybrid.system import Array, vector
 
@@ -38,5 +38,6 @@ def cart_pendulum() -> ObserverModel:
 
 
 def _remainder(x: Array, u: Array) -> Array:
-    _, cart, _, pendulum = cart_pendulum_flow(x, u[0], TABLE_4_1)
-    return vector(0.0, cart, 0.0, pendulum)
+    _, speed, angle, rate = x
+    acceleration, angular = accelerations(speed, angle, rate, u[0], TABLE_4_1)
+    return vector(0.0, acceleration, 0.0, angular)

@@ -14,10 +14,12 @@ from plant_models.benchmarks.flexible_joint_arm import (
     STIFFNESS_MOTOR,
     WEIGHT,
     Gravity,
-    gravity_index,
+    checked_gravity,
 )
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
+
+NAMES = ("motor_angle", "link_angle", "motor_speed", "link_speed")
 
 
 def flexible_joint_arm(gravity: Gravity = "link_angle") -> ObserverModel:
@@ -29,7 +31,7 @@ def flexible_joint_arm(gravity: Gravity = "link_angle") -> ObserverModel:
     Raises:
         ValueError: another word.
     """
-    at = gravity_index(gravity, "flexible_joint_arm")
+    at = NAMES.index(checked_gravity(gravity, "flexible_joint_arm"))
     return ObserverModel(
         name="flexible_joint_arm" + ("" if gravity == "link_angle" else "_as_printed"),
         description="Robot arm with a flexible joint, two angles measured by two nodes",
@@ -48,7 +50,7 @@ def flexible_joint_arm(gravity: Gravity = "link_angle") -> ObserverModel:
         A=shift_matrix(2, 2),
         B=np.array([[0.0], [0.0], [DRIVE], [0.0]]),
         C=np.eye(2, 4),
-        phi=partial(_remainder, at),
+        phi=partial(_remainder, gravity),
         slopes=tuple(_slope(at, cosine) for cosine in (-1.0, 1.0)),
         event="packet",
     )
@@ -59,11 +61,11 @@ def flexible_joint_arm_as_printed() -> ObserverModel:
     return flexible_joint_arm("motor_speed")
 
 
-def _remainder(at: int, x: Array, _u: Array) -> Array:
+def _remainder(gravity: Gravity, x: Array, _u: Array) -> Array:
     motor_angle, link_angle, motor_speed, _ = x
     twist = motor_angle - link_angle
-    spring, weight = -STIFFNESS_MOTOR * twist - DAMPING * motor_speed, WEIGHT * np.sin(x[at])
-    return vector(0.0, 0.0, spring, STIFFNESS_LINK * twist - weight)
+    weight = WEIGHT * np.sin(link_angle if gravity == "link_angle" else motor_speed)
+    return vector(0.0, 0.0, -STIFFNESS_MOTOR * twist - DAMPING * motor_speed, STIFFNESS_LINK * twist - weight)
 
 
 def _slope(at: int, cosine: float) -> np.ndarray:

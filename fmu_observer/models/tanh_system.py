@@ -47,5 +47,5 @@ def tanh_system(reading: Reading = "minus") -> ObserverModel:
 
 
 def _remainder(reading: Reading, x: Array, _u: Array) -> Array:
-    x1, _ = x
-    return vector(0.0, -STIFFNESS * x1 + tanh_term(x, reading))
+    first, second = x
+    return vector(0.0, -STIFFNESS * first + tanh_term(first, second, reading))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant
-from plant_models.hybrid import output_signal, parameter, state, vector
+from plant_models.hybrid import output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 Variant = Literal["mixed", "speed", "root"]
@@ -65,16 +65,18 @@ class BrakedOscillator(NoisyPlant):
         )
         super().__init__(variant=variant)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both states, shape (2,) or (2, members)."""
-        driven = np.sqrt(np.abs(x[1])) if self.variant == "root" else x[1]
-        braked = p.braking * (1.0 - BRAKING[self.variant] * x[0] * x[0]) * driven
-        return vector(p.rate_factor * x[1], -STIFFNESS * x[0] + braked)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of both states."""
+        first, second = x.state_1, x.state_2
+        driven = np.sqrt(np.abs(second)) if self.variant == "root" else second
+        braked = p.braking * (1.0 - BRAKING[self.variant] * first * first) * driven
+        return {"state_1": p.rate_factor * second, "state_2": -STIFFNESS * first + braked}
 
-    def measured(self, x: Array) -> tuple[Array, ...]:
+    def measured(self, x: Any) -> tuple[Array, ...]:
         """The output of the variant."""
-        return ({"mixed": 0.2 * np.sin(x[0]) + x[1], "speed": x[1], "root": x[0]}[self.variant],)
+        mixed = 0.2 * np.sin(x.state_1) + x.state_2
+        return ({"mixed": mixed, "speed": x.state_2, "root": x.state_1}[self.variant],)
 
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """States and output."""
-        return {"x1": x[0], "x2": x[1], "y": self.measured(x)[0]}
+        return {"x1": x.state_1, "x2": x.state_2, "y": self.measured(x)[0]}

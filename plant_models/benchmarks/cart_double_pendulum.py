@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant, solved_3
-from plant_models.hybrid import input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
+
+Pair = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -123,24 +125,38 @@ class CartDoublePendulum(NoisyPlant):
         )
         super().__init__()
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the six states, shape (6,) or (6, members)."""
-        return double_pendulum_flow(x, u.force, p)
-
-    def measured(self, x: Array) -> tuple[Array, ...]:
-        """Position and both angles: (4.18)."""
-        return x[0], x[2], x[4]
-
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
-        """The states and the energy, as the mass matrix in use has it."""
-        a11, a12, a13, a22, a23, a33 = mass_matrix(x, p)
-        kinetic = 0.5 * (a11 * x[1] ** 2 + a22 * x[3] ** 2 + a33 * x[5] ** 2)
-        coupled = a12 * x[1] * x[3] + a13 * x[1] * x[5] + a23 * x[3] * x[5]
-        heights = both_masses(p) * p.first_length * np.cos(x[2]) + p.second_mass * p.second_length * np.cos(x[4])
-        names = [s.name for s in self.plain_outputs[:6]]
-        return dict(zip(names, (x[i] for i in range(6)), strict=True)) | {
-            "energy": kinetic + coupled + p.gravity * heights
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the six states."""
+        acceleration, lower, upper = accelerations(*_turning(x), u.force, p)
+        return {
+            "cart_position": x.cart_speed,
+            "cart_speed": acceleration,
+            "lower_angle": x.lower_rate,
+            "lower_rate": lower,
+            "upper_angle": x.upper_rate,
+            "upper_rate": upper,
         }
+
+    def measured(self, x: Any) -> tuple[Array, ...]:
+        """Position and both angles: (4.18)."""
+        return x.cart_position, x.lower_angle, x.upper_angle
+
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
+        """The states and the energy, as the mass matrix in use has it."""
+        (first, second), (first_rate, second_rate) = _turning(x)
+        a11, a12, a13, a22, a23, a33 = mass_matrix((first, second), p)
+        speed = x.cart_speed
+        kinetic = 0.5 * (a11 * speed**2 + a22 * first_rate**2 + a33 * second_rate**2)
+        coupled = a12 * speed * first_rate + a13 * speed * second_rate + a23 * first_rate * second_rate
+        heights = both_masses(p) * p.first_length * np.cos(first) + p.second_mass * p.second_length * np.cos(second)
+        values = (x.cart_position, speed, first, first_rate, second, second_rate)
+        energy = kinetic + coupled + p.gravity * heights
+        return dict(zip((s.name for s in self.plain_outputs), (*values, energy), strict=True))
+
+
+def _turning(x: Any) -> tuple[Pair, Pair]:
+    """Both angles and their rates."""
+    return (x.lower_angle, x.upper_angle), (x.lower_rate, x.upper_rate)
 
 
 def both_masses(p: Any) -> Array:
@@ -152,46 +168,47 @@ def both_masses(p: Any) -> Array:
     return p.first_mass + 2.0 * p.second_mass
 
 
-def mass_matrix(x: Array, p: Any) -> tuple[Array, ...]:
+def mass_matrix(angles: Pair, p: Any) -> tuple[Array, ...]:
     """Entries 11, 12, 13, 22, 23, 33 of the symmetric matrix A(q): (4.13).
 
     Args:
-        x: state, shape (6,) or (6, members). p: constants by the names of `DoublePendulumConstants`.
+        angles: of the lower and of the upper rod from upright [rad]. p: constants by the names of
+            `DoublePendulumConstants`.
     """
+    first, second = angles
     lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
     return (
         p.cart_mass + p.first_mass + p.second_mass,
-        p.coupling_sign * lower * np.cos(x[2]),
-        p.coupling_sign * upper * np.cos(x[4]),
+        p.coupling_sign * lower * np.cos(first),
+        p.coupling_sign * upper * np.cos(second),
         4.0 * (p.first_mass / 3.0 + p.second_mass) * p.first_length**2,
-        2.0 * upper * p.first_length * np.cos(x[4] - x[2]),
+        2.0 * upper * p.first_length * np.cos(second - first),
         4.0 / 3.0 * upper * p.second_length,
     )
 
 
-def right_hand_side(x: Array, force: Array, p: Any) -> tuple[Array, Array, Array]:
+def right_hand_side(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Array, Array, Array]:
     """b1, b2 and b3: (4.14), with its signs repaired or not.
 
     Args:
-        x: state, shape (6,) or (6, members). force: on the cart [N]. p: constants by the names of
-            `DoublePendulumConstants`.
+        angles: of the lower and of the upper rod from upright [rad]. rates: their derivatives [rad/s].
+        force: on the cart [N]. p: constants by the names of `DoublePendulumConstants`.
     """
+    (first, second), (first_rate, second_rate) = angles, rates
     lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
-    centrifugal = p.centrifugal_sign * 2.0 * upper * p.first_length * np.sin(x[4] - x[2])
+    centrifugal = p.centrifugal_sign * 2.0 * upper * p.first_length * np.sin(second - first)
     return (
-        force + lower * x[3] ** 2 * np.sin(x[2]) + upper * x[5] ** 2 * np.sin(x[4]),
-        lower * p.gravity * np.sin(x[2]) + centrifugal * x[5] ** 2,
-        upper * p.gravity * np.sin(x[4]) - centrifugal * x[3] ** 2,
+        force + lower * first_rate**2 * np.sin(first) + upper * second_rate**2 * np.sin(second),
+        lower * p.gravity * np.sin(first) + centrifugal * second_rate**2,
+        upper * p.gravity * np.sin(second) - centrifugal * first_rate**2,
     )
 
 
-def double_pendulum_flow(x: Array, force: Array, p: Any) -> Array:
-    """Derivatives of position, speed, both angles and their rates, shape (6,) or (6, members): (4.12) solved.
+def accelerations(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Array, Array, Array]:
+    """Acceleration of the cart [m/s2] and angular accelerations of both rods [rad/s2]: (4.12) solved.
 
     Args:
-        x: state, shape (6,) or (6, members). force: on the cart [N]. p: constants by the names of
-            `DoublePendulumConstants`.
+        angles: of the lower and of the upper rod from upright [rad]. rates: their derivatives [rad/s].
+        force: on the cart [N]. p: constants by the names of `DoublePendulumConstants`.
     """
-    matrix, right = mass_matrix(x, p), right_hand_side(x, force, p)
-    acceleration, lower, upper = solved_3(matrix, right)
-    return vector(x[1], acceleration, x[3], lower, x[5], upper)
+    return solved_3(mass_matrix(angles, p), right_hand_side(angles, rates, force, p))

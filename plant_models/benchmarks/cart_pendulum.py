@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant, solved_2
-from plant_models.hybrid import input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
@@ -89,36 +89,41 @@ class CartPendulum(NoisyPlant):
         )
         super().__init__()
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the four states, shape (4,) or (4, members)."""
-        return cart_pendulum_flow(x, u.force, p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the four states."""
+        acceleration, angular = accelerations(x.cart_speed, x.pendulum_angle, x.pendulum_rate, u.force, p)
+        return {
+            "cart_position": x.cart_speed,
+            "cart_speed": acceleration,
+            "pendulum_angle": x.pendulum_rate,
+            "pendulum_rate": angular,
+        }
 
-    def measured(self, x: Array) -> tuple[Array, ...]:
+    def measured(self, x: Any) -> tuple[Array, ...]:
         """Position and angle: (4.8)."""
-        return x[0], x[2]
+        return x.cart_position, x.pendulum_angle
 
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """The states and the energy."""
-        lever = p.bob_mass * p.length
+        speed, angle, rate, lever = x.cart_speed, x.pendulum_angle, x.pendulum_rate, p.bob_mass * p.length
         kinetic = 0.5 * (
-            (p.cart_mass + p.bob_mass) * x[1] ** 2
-            + 2.0 * lever * np.cos(x[2]) * x[1] * x[3]
-            + (lever * p.length + p.inertia) * x[3] ** 2
+            (p.cart_mass + p.bob_mass) * speed**2
+            + 2.0 * lever * np.cos(angle) * speed * rate
+            + (lever * p.length + p.inertia) * rate**2
         )
-        energy = kinetic + lever * p.gravity * np.cos(x[2])
-        return {"position": x[0], "speed": x[1], "angle": x[2], "rate": x[3], "energy": energy}
+        energy = kinetic + lever * p.gravity * np.cos(angle)
+        return {"position": x.cart_position, "speed": speed, "angle": angle, "rate": rate, "energy": energy}
 
 
-def cart_pendulum_flow(x: Array, force: Array, p: Any) -> Array:
-    """Derivatives of position, speed, angle and rate, shape (4,) or (4, members): (4.4) and (4.5) solved.
+def accelerations(speed: Array, angle: Array, rate: Array, force: Array, p: Any) -> tuple[Array, Array]:
+    """Acceleration of the cart [m/s2] and angular acceleration [rad/s2]: (4.4) and (4.5) solved.
 
     Args:
-        x: state, shape (4,) or (4, members). force: on the cart [N]. p: constants by the names of
-            `CartPendulumConstants`.
+        speed: of the cart [m/s]. angle: from upright [rad]. rate: angular speed [rad/s]. force: on the cart [N].
+        p: constants by the names of `CartPendulumConstants`.
     """
-    lever, cosine, sine = p.bob_mass * p.length, np.cos(x[2]), np.sin(x[2])
+    lever, cosine, sine = p.bob_mass * p.length, np.cos(angle), np.sin(angle)
     matrix = (p.cart_mass + p.bob_mass, lever * cosine, lever * p.length + p.inertia)
-    on_cart = force - p.cart_friction * x[1] + lever * x[3] ** 2 * sine
-    on_pendulum = lever * p.gravity * sine - p.pivot_friction * x[3]
-    acceleration, angular = solved_2(matrix, (on_cart, on_pendulum))
-    return vector(x[1], acceleration, x[3], angular)
+    on_cart = force - p.cart_friction * speed + lever * rate**2 * sine
+    on_pendulum = lever * p.gravity * sine - p.pivot_friction * rate
+    return solved_2(matrix, (on_cart, on_pendulum))

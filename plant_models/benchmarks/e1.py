@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
@@ -21,6 +21,7 @@ class TriangularisablePlant(HybridSystem):
     name = "triangularisable_plant"
     description = "First academic plant of chapter 2: four states, one nonlinear damping"
     source = "Bouchama 2024, section 2.5.1"
+    by_name = True
     internal_step = 1e-3
     states = tuple(state(f"state_{i}", "1", 1.0, f"State {i}") for i in (1, 2, 3, 4))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
@@ -33,19 +34,20 @@ class TriangularisablePlant(HybridSystem):
         parameter("damping_gain", "1", 3.3, "Factor of sin(x1) + x2^2"),
     )
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the four states, shape (4,)."""
-        damping = p.damping_gain * (np.sin(x[0]) + x[1] * x[1])
-        return vector(
-            -1.25 * x[0] - 48.6 * x[1] + x[2] + 21.6 * self._drive(t, u, p),
-            x[0] + x[3],
-            x[1],
-            -19.5 * x[1] - 19.5 * x[2] - damping * x[3],
-        )
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the four states."""
+        x1, x2, x3, x4 = x
+        damping = p.damping_gain * (np.sin(x1) + x2 * x2)
+        return {
+            "state_1": -1.25 * x1 - 48.6 * x2 + x3 + 21.6 * self._drive(t, u, p),
+            "state_2": x1 + x4,
+            "state_3": x2,
+            "state_4": -19.5 * x2 - 19.5 * x3 - damping * x4,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The states and the drive."""
-        return {f"x{i + 1}": x[i] for i in range(4)} | {"total_drive": self._drive(t, u, p)}
+        return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
 
     @staticmethod
     def _drive(t: Array, u: Any, p: Any) -> Array:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
@@ -21,6 +21,7 @@ class NonTriangularisablePlant(HybridSystem):
     name = "non_triangularisable_plant"
     description = "Second academic plant of chapter 2: five states, no triangular form"
     source = "Bouchama 2024, section 2.5.2"
+    by_name = True
     internal_step = 1e-3
     states = tuple(state(f"state_{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4, 5))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
@@ -30,21 +31,22 @@ class NonTriangularisablePlant(HybridSystem):
     )
     parameters = (parameter("drive_gain", "1", 1.0, "Size of the printed drive"),)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the five states, shape (5,)."""
-        a = 1.0 / (1.0 + x[3] * x[3])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the five states."""
+        x1, x2, x3, x4, x5 = x
+        a = 1.0 / (1.0 + x4 * x4)
         drive = self._drive(t, u, p)
-        return vector(
-            -x[0] + x[1] + drive,
-            -x[1] + x[2],
-            -x[1] - x[2] - a * x[4] + drive,
-            -x[0] * x[1] - x[3] + x[4] - 0.3 * a * drive,
-            -x[1] - x[2] - x[4] - drive,
-        )
+        return {
+            "state_1": -x1 + x2 + drive,
+            "state_2": -x2 + x3,
+            "state_3": -x2 - x3 - a * x5 + drive,
+            "state_4": -x1 * x2 - x4 + x5 - 0.3 * a * drive,
+            "state_5": -x2 - x3 - x5 - drive,
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The states and the drive."""
-        return {f"x{i + 1}": x[i] for i in range(5)} | {"total_drive": self._drive(t, u, p)}
+        return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
 
     @staticmethod
     def _drive(t: Array, u: Any, p: Any) -> Array:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant
-from plant_models.hybrid import output_signal, parameter, state, vector
+from plant_models.hybrid import output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 Glycerol = Literal["clamped", "as_published"]
@@ -85,25 +85,30 @@ class EcoliCulture(NoisyPlant):
         )
         super().__init__(glycerol=glycerol)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the three states, shape (3,) or (3, members)."""
-        X, P = x[0], x[2]
-        mu, fed = self._growth(x, p)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the three states."""
+        X, P = x.biomass_state, x.enzyme_state
+        mu, fed = self._growth(x.glycerol_state, p)
         decay = np.where(P > 0.0, p.decay_rate * np.exp(-p.decay_threshold / np.where(P > 0.0, P, 1.0)), 0.0)
         made = p.enzyme_yield * mu * _induction(p) * X
-        return vector(mu * X - decay * X, -(p.glycerol_yield * mu + p.maintenance * fed) * X, made - decay * P)
+        return {
+            "biomass_state": mu * X - decay * X,
+            "glycerol_state": -(p.glycerol_yield * mu + p.maintenance * fed) * X,
+            "enzyme_state": made - decay * P,
+        }
 
-    def measured_under(self, x: Array, p: Any) -> tuple[Array, ...]:
+    def measured_under(self, x: Any, p: Any) -> tuple[Array, ...]:
         """Biomass and light, (4.7.4)."""
-        return x[0], p.light_yield * self._growth(x, p)[0] * _induction(p) * x[0] * x[2]
+        X, growing = x.biomass_state, self._growth(x.glycerol_state, p)[0]
+        return X, p.light_yield * growing * _induction(p) * X * x.enzyme_state
 
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """States and light."""
-        return {"biomass": x[0], "glycerol": x[1], "enzyme": x[2], "light": self.measured_under(x, p)[1]}
+        biomass, light = self.measured_under(x, p)
+        return {"biomass": biomass, "glycerol": x.glycerol_state, "enzyme": x.enzyme_state, "light": light}
 
-    def _growth(self, x: Array, p: Any) -> tuple[Array, Array]:
+    def _growth(self, S: Array, p: Any) -> tuple[Array, Array]:
         """Growth rate mu [1/s], and 1 where there is glycerol to live on."""
-        S = x[1]
         if self.glycerol == "as_published":
             return p.growth_rate * S / (p.half_saturation + S), 1.0
         left = np.maximum(S, 0.0)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 Gravity = Literal["link_angle", "motor_speed"]
@@ -40,6 +40,7 @@ class FlexibleJointArm(HybridSystem):
     name = "flexible_joint_arm"
     description = "Robot arm with a flexible joint, two angles measured"
     source = "Hann 2014, (2.60) to (2.62)"
+    by_name = True
     internal_step = 1e-3
     states = (
         state("motor_angle", "rad", 0.0, "Angle of the motor"),
@@ -59,31 +60,31 @@ class FlexibleJointArm(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"gravity": GRAVITY}
 
     def __init__(self, gravity: Gravity = "link_angle") -> None:
-        self.gravity_index = gravity_index(gravity, self.name)
+        self.gravity = checked_gravity(gravity, self.name)
         super().__init__(gravity=gravity)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the four states, shape (4,)."""
-        twist = x[0] - x[1]
-        return vector(
-            x[2],
-            x[3],
-            -STIFFNESS_MOTOR * twist - DAMPING * x[2] + DRIVE * self._drive(t, u, p),
-            STIFFNESS_LINK * twist - WEIGHT * np.sin(x[self.gravity_index]),
-        )
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the four states."""
+        twist = x.motor_angle - x.link_angle
+        return {
+            "motor_angle": x.motor_speed,
+            "link_angle": x.link_speed,
+            "motor_speed": -STIFFNESS_MOTOR * twist - DAMPING * x.motor_speed + DRIVE * self._drive(t, u, p),
+            "link_speed": STIFFNESS_LINK * twist - WEIGHT * np.sin(getattr(x, self.gravity)),
+        }
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The states and the drive."""
         names = [s.name for s in self.outputs[:4]]
-        return dict(zip(names, (x[0], x[1], x[2], x[3]), strict=True)) | {"total_drive": self._drive(t, u, p)}
+        return dict(zip(names, x, strict=True)) | {"total_drive": self._drive(t, u, p)}
 
     @staticmethod
     def _drive(t: Array, u: Any, p: Any) -> Array:
         return p.drive_gain * 0.1 * np.sin(t) + u.drive
 
 
-def gravity_index(gravity: str, where: str) -> int:
-    """Position of the state on which the weight depends.
+def checked_gravity(gravity: Gravity, where: str) -> Gravity:
+    """Name of the state on which the weight depends.
 
     Args:
         gravity: one of `GRAVITY`. where: what asks, for the message.
@@ -93,4 +94,4 @@ def gravity_index(gravity: str, where: str) -> int:
     """
     if gravity not in GRAVITY:
         raise ValueError(f"{where}: unknown gravity {gravity!r}; choose one of: {', '.join(GRAVITY)}.")
-    return {"link_angle": 1, "motor_speed": 2}[gravity]
+    return gravity

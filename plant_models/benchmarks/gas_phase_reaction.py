@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant
-from plant_models.hybrid import output_signal, parameter, state, vector
+from plant_models.hybrid import output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
@@ -49,15 +49,15 @@ class GasPhaseReaction(NoisyPlant):
         )
         super().__init__()
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both states, shape (2,) or (2, members)."""
-        reaction = p.rate * x[0] * x[0]
-        return vector(-2.0 * reaction, reaction)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of both states."""
+        reaction = p.rate * x.state_1 * x.state_1
+        return {"state_1": -2.0 * reaction, "state_2": reaction}
 
-    def measured(self, x: Array) -> tuple[Array, ...]:
+    def measured(self, x: Any) -> tuple[Array, ...]:
         """The total pressure."""
-        return (x[0] + x[1],)
+        return (x.state_1 + x.state_2,)
 
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """States and output."""
-        return {"x1": x[0], "x2": x[1], "y": x[0] + x[1]}
+        return {"x1": x.state_1, "x2": x.state_2, "y": x.state_1 + x.state_2}

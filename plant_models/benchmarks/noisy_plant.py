@@ -26,30 +26,31 @@ class NoisyPlant(HybridSystem):
     that the plant is the plain differential equation.
     """
 
+    by_name = True
     moving: tuple[Signal, ...] = ()
     plain_outputs: tuple[Signal, ...] = ()
 
-    def measured(self, x: Array) -> tuple[Array, ...]:
+    def measured(self, x: Any) -> tuple[Array, ...]:
         """What is measured without noise, one scalar a measurement.
 
         Args:
-            x: state, shape (n,) or (n, members).
+            x: states by name.
         """
         raise NotImplementedError
 
-    def measured_under(self, x: Array, p: Any) -> tuple[Array, ...]:
+    def measured_under(self, x: Any, p: Any) -> tuple[Array, ...]:
         """What is measured without noise, for a plant whose measurement depends on parameters.
 
         Args:
-            x: state, shape (n,) or (n, members). p: parameters.
+            x: states by name. p: parameters.
         """
         return self.measured(x)
 
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """Values of `plain_outputs` by name.
 
         Args:
-            x: state, shape (n,) or (n, members). p: parameters.
+            x: states by name. p: parameters.
         """
         raise NotImplementedError
 
@@ -89,19 +90,37 @@ class NoisyPlant(HybridSystem):
         )
         self.events = (PeriodicEvent("sampling", "sample_period", noises=noises, description="A sample is taken"),)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Disturb the states, then measure, shape (n + q,) or (n + q, members)."""
-        n = len(self.moving)
-        moved = vector(*(x[i] + p.process_noise[i] * u.process_normal[i] for i in range(n)))
-        seen = (
-            y + p.measurement_noise[j] * u.measurement_normal[j] for j, y in enumerate(self.measured_under(moved, p))
-        )
-        return vector(*(moved[i] for i in range(n)), *seen)
+    def named(self, values: Array) -> Any:
+        """Named tuple of the moving states alone.
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        Args:
+            values: shape (n,) or (n, ...).
+        """
+        return self._flowing_places.named(values)
+
+    def rates(self, values: Array, p: Any, u: Any = None) -> Array:
+        """Derivatives of the moving states, of the shape of `values`: the plant as a model.
+
+        Args:
+            values: moving states, shape (n,) or (n, ...). p: parameters of the equations. u: inputs that they need.
+        """
+        return vector(*self.flow(0.0, self.named(values), u, p).values())
+
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Disturb the states, then measure."""
+        moved = {
+            s.name: getattr(x, s.name) + p.process_noise[i] * u.process_normal[i] for i, s in enumerate(self.moving)
+        }
+        seen = self.measured_under(x._replace(**moved), p)
+        held = {
+            f"held_{s.name}": y + p.measurement_noise[j] * u.measurement_normal[j]
+            for j, (s, y) in enumerate(zip(self.outputs[len(self.plain_outputs) :], seen, strict=True))
+        }
+        return moved | held
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The plain outputs and the held measurements."""
-        n = len(self.moving)
-        held = {s.name: x[n + j] for j, s in enumerate(self.outputs[len(self.plain_outputs) :])}
+        held = {s.name: getattr(x, f"held_{s.name}") for s in self.outputs[len(self.plain_outputs) :]}
         return self.plain(x, p) | held
 
 

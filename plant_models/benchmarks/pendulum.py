@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
@@ -26,6 +26,7 @@ class Pendulum(HybridSystem):
     name = "pendulum"
     description = "Damped pendulum driven by a torque"
     source = "ours, in the normal form of Bouchama 2024, (1.10)"
+    by_name = True
     internal_step = 5e-3
     states = (
         state("pendulum_angle", "rad", 1.0, "Angle from the lower rest"),
@@ -47,10 +48,11 @@ class Pendulum(HybridSystem):
     }
     default_preset = "swinging"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of angle and rate, shape (2,)."""
-        return vector(x[1], -p.stiffness * np.sin(x[0]) - p.damping * x[1] + u.torque)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of angle and rate."""
+        turning = -p.stiffness * np.sin(x.pendulum_angle) - p.damping * x.pendulum_rate + u.torque
+        return {"pendulum_angle": x.pendulum_rate, "pendulum_rate": turning}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Angle [rad] and rate [rad/s]."""
-        return {"angle": x[0], "rate": x[1]}
+        return {"angle": x.pendulum_angle, "rate": x.pendulum_rate}

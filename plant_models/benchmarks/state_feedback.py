@@ -16,7 +16,6 @@ from plant_models.hybrid import (
     memory,
     output_signal,
     parameter,
-    vector,
 )
 from plant_models.hybrid.system import Array
 
@@ -82,6 +81,7 @@ class StateFeedback(HybridSystem):
     name = "state_feedback"
     description = "Linear-quadratic regulator of a pendulum on a cart"
     source = "Allaoui 2024, section IV.2, names it; weights and gains are ours"
+    by_name = True
     internal_step = 1e-2  # nothing flows between samples
     states = (memory("held_force", "N", 0.0, "Force on the cart, held"),)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"plant": tuple(REGULATED)}
@@ -99,13 +99,13 @@ class StateFeedback(HybridSystem):
         self.events = (PeriodicEvent("sampling", "sample_period", description="The state is read"),)
         super().__init__(plant=plant)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The new force, shape (1,) or (1, members)."""
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The new force."""
         told = [getattr(u, s.name) for s in self.inputs]
         wanted = -sum(p.gain[i] * value for i, value in enumerate(told))
         limited = np.minimum(np.maximum(wanted, -p.force_limit), p.force_limit)
-        return vector(np.where(p.force_limit > 0.0, limited, wanted))
+        return {"held_force": np.where(p.force_limit > 0.0, limited, wanted)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The held force."""
-        return {"force": x[0]}
+        return {"force": x.held_force}

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 Reading = Literal["minus", "as_published", "product"]
@@ -27,6 +27,7 @@ class TanhSystem(HybridSystem):
     name = "tanh_system"
     description = "Second-order plant with tanh(x1) x2"
     source = "Hann 2014, (3.110)"
+    by_name = True
     internal_step = 5e-3
     states = (state("first", "1", 5.0, "State x1"), state("second", "1/s", 3.0, "State x2, derivative of x1"))
     outputs = (output_signal("x1", "1", "State x1"), output_signal("x2", "1/s", "State x2"))
@@ -45,21 +46,22 @@ class TanhSystem(HybridSystem):
         self.reading = reading
         super().__init__(reading=reading)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both states, shape (2,)."""
-        return vector(x[1], -p.stiffness * x[0] + p.tanh_gain * tanh_term(x, self.reading))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of both states."""
+        braked = p.tanh_gain * tanh_term(x.first, x.second, self.reading)
+        return {"first": x.second, "second": -p.stiffness * x.first + braked}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Both states."""
-        return {"x1": x[0], "x2": x[1]}
+        return {"x1": x.first, "x2": x.second}
 
 
-def tanh_term(x: Array, reading: Reading) -> Array:
+def tanh_term(first: Array, second: Array, reading: Reading) -> Array:
     """The term with tanh, of one of the readings, without its factor.
 
     Args:
-        x: shape (2,). reading: see `TanhSystem`.
+        first, second: states x1 [1] and x2 [1/s]. reading: see `TanhSystem`.
     """
     if reading == "product":
-        return np.tanh(x[0] * x[1])
-    return (-1.0 if reading == "minus" else 1.0) * np.tanh(x[0]) * x[1]
+        return np.tanh(first * second)
+    return (-1.0 if reading == "minus" else 1.0) * np.tanh(first) * second

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.benchmarks.noisy_plant import NoisyPlant
-from plant_models.hybrid import output_signal, parameter, state, vector
+from plant_models.hybrid import output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
@@ -48,16 +48,16 @@ class ThreeStateCascade(NoisyPlant):
         )
         super().__init__()
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the three states, shape (3,) or (3, members)."""
-        e = p.nonlinearity
-        first = x[1] - e * x[0] * np.abs(x[1]) ** (1.0 / 3.0)
-        return vector(first, x[2] + e * x[1] * x[2], p.ramp + 0.0 * x[2])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the three states."""
+        e, second, third = p.nonlinearity, x.state_2, x.state_3
+        first = second - e * x.state_1 * np.abs(second) ** (1.0 / 3.0)
+        return {"state_1": first, "state_2": third + e * second * third, "state_3": p.ramp}
 
-    def measured(self, x: Array) -> tuple[Array, ...]:
+    def measured(self, x: Any) -> tuple[Array, ...]:
         """The first state."""
-        return (x[0],)
+        return (x.state_1,)
 
-    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+    def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """The states."""
-        return {"x1": x[0], "x2": x[1], "x3": x[2]}
+        return {"x1": x.state_1, "x2": x.state_2, "x3": x.state_3}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 DRIVE = 10.0  # size of the printed drive sin t
@@ -28,6 +28,7 @@ class TimeVaryingOscillator(HybridSystem):
     name = "time_varying_oscillator"
     description = "Time-varying oscillator with two unknown constants"
     source = "Hann 2014, (4.64)"
+    by_name = True
     internal_step = 1e-3
     states = (state("state_1", "1", 20.0, "First state"), state("state_2", "1", -40.0, "Second state"))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
@@ -45,12 +46,12 @@ class TimeVaryingOscillator(HybridSystem):
     presets: Mapping[str, Mapping[str, Any]] = {"as_published": {}, "lasting": {"fading": 0.0, "phase": -0.5 * np.pi}}
     default_preset = "as_published"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both states, shape (2,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of both states."""
         first, second = np.sin(p.pulsation * t), np.cos(p.pulsation * t + p.phase) / (1.0 + p.fading * t * t)
         driven = (2.0 + np.tanh(t)) * (DRIVE * np.sin(t) + u.drive)
-        return vector(x[1] + first * p.rho1, -x[0] + second * p.rho2 + driven)
+        return {"state_1": x.state_2 + first * p.rho1, "state_2": -x.state_1 + second * p.rho2 + driven}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The states."""
-        return {"x1": x[0], "x2": x[1]}
+        return {"x1": x.state_1, "x2": x.state_2}

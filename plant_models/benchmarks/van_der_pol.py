@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 LARGEST, LARGEST_SHIFT = 10.0, 1.0
@@ -27,6 +27,7 @@ class VanDerPol(HybridSystem):
     name = "van_der_pol"
     description = "Van der Pol oscillator with three parameters that may change"
     source = "Omar 2012, (2.5.1)"
+    by_name = True
     internal_step = 5e-3
     states = (
         state("oscillation", "1", 1.0, "State x1, which is measured"),
@@ -55,12 +56,13 @@ class VanDerPol(HybridSystem):
     }
     default_preset = "nominal"
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both states, shape (2,)."""
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of both states."""
         p1, p2 = np.clip(p.p1 + u.p1_change, 0.0, LARGEST), np.clip(p.p2 + u.p2_change, 0.0, LARGEST)
-        shifted = x[0] + np.clip(p.p3 + u.p3_change, -LARGEST_SHIFT, LARGEST_SHIFT)
-        return vector(p1 * x[1], -p.stiffness * x[0] + p2 * (1.0 - shifted * shifted) * x[1])
+        shifted = x.oscillation + np.clip(p.p3 + u.p3_change, -LARGEST_SHIFT, LARGEST_SHIFT)
+        damped = p2 * (1.0 - shifted * shifted) * x.oscillation_rate
+        return {"oscillation": p1 * x.oscillation_rate, "oscillation_rate": -p.stiffness * x.oscillation + damped}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Both states."""
-        return {"measured": x[0], "x2": x[1]}
+        return {"measured": x.oscillation, "x2": x.oscillation_rate}

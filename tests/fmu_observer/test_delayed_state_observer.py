@@ -82,9 +82,9 @@ def test_eigenvalues_of_the_arm_at_rest(gravity: str, expected: complex) -> None
     model = find_model(ARM + ("_as_printed" if gravity == "motor_speed" else ""))
     values = np.linalg.eigvals(np.asarray(model.jacobian(np.zeros(4), np.zeros(1)), dtype=float))
     assert values[np.argmax(values.imag)] == pytest.approx(expected, abs=6e-3)  # two digits printed
-    x, u, p = np.array([0.3, -0.2, 1.1, 0.7]), plant.unpack_inputs(np.array([0.4])), plant.unpack_parameters(np.ones(2))
-    drive = 0.1 * np.sin(2.0) + 0.4
-    np.testing.assert_allclose(plant.flow(2.0, x, u, p), model.flow(x, np.array([drive])), rtol=1e-13)
+    x, drive = np.array([0.3, -0.2, 1.1, 0.7]), 0.1 * np.sin(2.0) + 0.4
+    moved = plant.state_derivative(2.0, x, np.array([0.4]), np.ones(2))
+    np.testing.assert_allclose(moved, model.flow(x, np.array([drive])), rtol=1e-13)
 
 
 def test_the_lipschitz_constants_of_the_specification() -> None:

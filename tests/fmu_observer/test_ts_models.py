@@ -23,8 +23,7 @@ numbers = st.floats(-1.0, 1.0)
 
 def plant_flow(plant: HybridSystem, x: np.ndarray, drive: float) -> np.ndarray:
     """Derivatives at time zero, where the printed drives vanish, so that `drive` is all of u."""
-    p = plant.unpack_parameters(plant.start_parameters())
-    return np.asarray(plant.flow(0.0, x, plant.unpack_inputs(np.array([drive])), p))
+    return np.asarray(plant.state_derivative(0.0, x, np.array([drive]), plant.start_parameters()))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Pendulums on a cart against the printed closed forms, their energy, and the gains of python-control."""
 
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import control
@@ -9,11 +10,13 @@ import pytest
 from plant_models.benchmarks import CartDoublePendulum, CartPendulum, StateFeedback
 from plant_models.benchmarks.cart_double_pendulum import (
     SECTION_IV_2_2_3,
-    double_pendulum_flow,
+    accelerations,
     mass_matrix,
     right_hand_side,
 )
-from plant_models.benchmarks.cart_pendulum import TABLE_4_1, cart_pendulum_flow
+from plant_models.benchmarks.cart_pendulum import TABLE_4_1
+from plant_models.benchmarks.cart_pendulum import accelerations as accelerations_of_one
+from plant_models.benchmarks.noisy_plant import NoisyPlant
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 
@@ -51,7 +54,8 @@ def printed_4_7(x: np.ndarray, u: float) -> list[float]:
 
 
 def test_the_single_pendulum_is_the_printed_closed_form() -> None:
-    ours = np.array([cart_pendulum_flow(x[:4], u, TABLE_4_1) for x, u in zip(STATES, FORCES, strict=True)])
+    found = [accelerations_of_one(*x[1:4], u, TABLE_4_1) for x, u in zip(STATES, FORCES, strict=True)]
+    ours = np.array([(x[1], cart, x[3], angular) for x, (cart, angular) in zip(STATES, found, strict=True)])
     printed = np.array([printed_4_7(x, u) for x, u in zip(STATES, FORCES, strict=True)])
     assert np.abs(ours - printed).max() < 1e-12 * np.abs(printed).max()  # rounding of some twenty terms
 
@@ -64,8 +68,8 @@ class Solved(NamedTuple):
 
 
 def linear_system(x: np.ndarray, u: float) -> Solved:
-    a11, a12, a13, a22, a23, a33 = mass_matrix(x, SECTION_IV_2_2_3)
-    right = right_hand_side(x, u, SECTION_IV_2_2_3)
+    a11, a12, a13, a22, a23, a33 = mass_matrix(x[2::2], SECTION_IV_2_2_3)
+    right = right_hand_side(x[2::2], x[3::2], u, SECTION_IV_2_2_3)
     return Solved(np.array([[a11, a12, a13], [a12, a22, a23], [a13, a23, a33]]), np.array(right))
 
 
@@ -90,7 +94,7 @@ def test_the_double_pendulum_solves_its_linear_system_and_the_repaired_closed_fo
     worst_printed = 0.0
     for x, u in zip(STATES, FORCES, strict=True):
         A, b = linear_system(x, u)
-        ours = double_pendulum_flow(x, u, SECTION_IV_2_2_3)[[1, 3, 5]]
+        ours = np.array(accelerations(x[2::2], x[3::2], u, SECTION_IV_2_2_3))
         scale = np.abs(ours).max()
         assert np.abs(ours - np.linalg.solve(A, b)).max() < 1e-10 * scale
         assert np.abs(ours - closed_form(A, b, printed=False)).max() < 1e-10 * scale
@@ -128,18 +132,23 @@ def test_a_heavy_second_rod_of_the_double_pendulum_alone_is_a_single_pendulum() 
 
 
 @pytest.mark.parametrize(
-    ("plant", "flow", "constants", "weights"),
+    ("plant", "constants", "weights"),
     [
-        ("cart_pendulum", cart_pendulum_flow, TABLE_4_1, [1, 1, 10, 1]),
-        ("cart_double_pendulum", double_pendulum_flow, SECTION_IV_2_2_3, [10, 1, 100, 1, 100, 1]),
+        (CartPendulum(), TABLE_4_1, [1, 1, 10, 1]),
+        (CartDoublePendulum(), SECTION_IV_2_2_3, [10, 1, 100, 1, 100, 1]),
     ],
+    ids=lambda value: getattr(value, "name", ""),
 )
-def test_the_gains_are_those_of_python_control(plant: str, flow: Any, constants: Any, weights: list[int]) -> None:
+def test_the_gains_are_those_of_python_control(plant: NoisyPlant, constants: Any, weights: list[int]) -> None:
     n = len(weights)
-    slope = exact_jacobian(lambda z, _: flow(z[:n], z[n], constants), n + 1, 1)(np.zeros(n + 1), np.zeros(1))
+
+    def flow(z: Any, _: Any) -> Any:
+        return plant.rates(z[:n], constants, SimpleNamespace(force=z[n]))
+
+    slope = exact_jacobian(flow, n + 1, 1)(np.zeros(n + 1), np.zeros(1))
     A, B = np.eye(n) + 1e-3 * slope[:, :n], 1e-3 * slope[:, n:]
     gain, _, poles = control.dlqr(A, B, np.diag(weights), np.array([[0.1]]))
-    np.testing.assert_allclose(StateFeedback(plant).start_parameters()[:n], gain[0], rtol=1e-6)
+    np.testing.assert_allclose(StateFeedback(plant.name).start_parameters()[:n], gain[0], rtol=1e-6)
     assert np.abs(poles).max() < 1.0
 
 
@@ -165,7 +174,8 @@ def test_a_limit_bounds_the_force_and_other_words_are_refused() -> None:
     system = StateFeedback()
     p = system.unpack_parameters(system.start_parameters())
     u = system.unpack_inputs(np.array([1.0, 0.0, 0.0, 0.0]))
-    assert float(system.jump("sampling", 0.0, np.zeros(1), u, p)[0]) == pytest.approx(-p.gain[0])
-    assert float(system.jump("sampling", 0.0, np.zeros(1), u, p._replace(force_limit=1.0))[0]) == pytest.approx(1.0)
+    for limited, force in ((p, -p.gain[0]), (p._replace(force_limit=1.0), 1.0)):
+        after = system.jump("sampling", 0.0, system.unpack_states(np.zeros(1)), u, limited)
+        assert float(after["held_force"]) == pytest.approx(force)
     with pytest.raises(ValueError, match="choose one of: cart_pendulum"):
         StateFeedback("crane")

@@ -40,7 +40,7 @@ class Own(Pendulum):
     name = "own_pendulum"
 
     def flow(self, t, x, u, p):
-        return CLIMB * super().flow(t, x, u, p)
+        return {name: CLIMB * rate for name, rate in super().flow(t, x, u, p).items()}
 """
 
 

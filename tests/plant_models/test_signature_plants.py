@@ -19,7 +19,7 @@ def solved(
     p = plant.unpack_parameters(plant.start_parameters())._replace(**values)
     x0 = plant.start_state()[: len(plant.moving)] if start is None else start
     found = scipy.integrate.solve_ivp(
-        lambda t, x: plant.flow(t, x, None, p),
+        lambda _t, x: plant.rates(x, p),
         (0.0, times[-1]),
         x0,
         t_eval=times,
@@ -46,7 +46,7 @@ def test_the_culture_has_the_numbers_of_the_specification_and_stops_where_glycer
         plant, x = EcoliCulture(kind), np.array([0.05, 2.0, 0.01])  # type: ignore[arg-type]
         p = plant.unpack_parameters(plant.start_parameters())
         for _ in range(400):  # 8 h in steps of 72 s; an adaptive solver is long at the end of the glycerol
-            x = rk4_step(lambda t, z, plant=plant, p=p: plant.flow(t, z, None, p), 0.0, 72.0, x)
+            x = rk4_step(lambda _t, z, plant=plant, p=p: plant.rates(z, p), 0.0, 72.0, x)
         late[kind] = x[1]
     rest = -0.06 * 0.21 / (0.75 * 0.49 + 0.21)  # where shrinking gives back what maintenance takes: dS = 0
     assert late["as_published"] == pytest.approx(rest, rel=1e-3)
@@ -56,7 +56,7 @@ def test_the_culture_has_the_numbers_of_the_specification_and_stops_where_glycer
 def test_light_changes_little_with_glycerol() -> None:
     plant = EcoliCulture()
     p = plant.unpack_parameters(plant.start_parameters())
-    light = [plant.measured_under(np.array([0.5, S, 0.15]), p)[1] for S in (1.5 - 1e-4, 1.5 + 1e-4)]
+    light = [plant.measured_under(plant.named(np.array([0.5, S, 0.15])), p)[1] for S in (1.5 - 1e-4, 1.5 + 1e-4)]
     scale = float(p.light_yield * p.growth_rate * p.inducer / (p.inducer + p.half_induction) * 0.5 * 0.15)
     assert (light[1] - light[0]) / 2e-4 / scale == pytest.approx(0.02465, abs=5e-6)  # digits given
 
@@ -68,10 +68,8 @@ def test_the_limit_cycle_of_the_oscillator_fits_the_printed_set() -> None:
         assert np.abs(x[1]).max() == pytest.approx(amplitudes[1], abs=0.02)  # digits given, and a grid of 10 ms
         if braking < 1.0:
             assert np.abs(x[0]).max() == pytest.approx(amplitudes[0], abs=0.01)
-    assert {v: float(BrakedOscillator(v).measured(np.array([0.5, 2.0]))[0]) for v in ("speed", "root")} == {  # type: ignore[arg-type]
-        "speed": 2.0,
-        "root": 0.5,
-    }
+    now = BrakedOscillator().named(np.array([0.5, 2.0]))
+    assert {v: float(BrakedOscillator(v).measured(now)[0]) for v in ("speed", "root")} == {"speed": 2.0, "root": 0.5}  # type: ignore[arg-type]
 
 
 def test_the_last_state_of_the_cascade_is_a_ramp_and_the_others_follow() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -12,14 +13,15 @@ import numpy as np
 from scipy import stats
 
 from fmu_observer.observers.discrete import ExtendedKalmanFilter, UnscentedKalmanFilter
-from plant_models.benchmarks import StateFeedback
-from plant_models.benchmarks.cart_double_pendulum import SECTION_IV_2_2_3, double_pendulum_flow
-from plant_models.benchmarks.cart_pendulum import TABLE_4_1, cart_pendulum_flow
+from plant_models.benchmarks import CartDoublePendulum, CartPendulum, StateFeedback
+from plant_models.benchmarks.cart_double_pendulum import SECTION_IV_2_2_3
+from plant_models.benchmarks.cart_pendulum import TABLE_4_1
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names
 
+ONE, TWO = CartPendulum(), CartDoublePendulum()
 FLOWS: dict[str, Callable[..., np.ndarray]] = {
-    "cart_pendulum": lambda x, u: cart_pendulum_flow(x, u, TABLE_4_1),
-    "cart_double_pendulum": lambda x, u: double_pendulum_flow(x, u, SECTION_IV_2_2_3),
+    "cart_pendulum": lambda x, u: ONE.rates(x, TABLE_4_1, SimpleNamespace(force=u)),
+    "cart_double_pendulum": lambda x, u: TWO.rates(x, SECTION_IV_2_2_3, SimpleNamespace(force=u)),
 }
 FILTERS = {"EKF": ExtendedKalmanFilter, "UKF": UnscentedKalmanFilter}
 

@@ -93,7 +93,9 @@ class CascadeSignature(SignatureObserver):
             states: shape (3, ...).
         """
         model = self._model(*self._constants, self._period)
-        window = np.stack([self.plant.measured(x)[0] for x in self.moved(states, self.window - 1, model)])
+        window = np.stack(
+            [self.plant.measured(self.plant.named(x))[0] for x in self.moved(states, self.window - 1, model)]
+        )
         return np.stack(self.points(window, ORDER, EPS[self.scaling]))
 
     def requirements(self, p: Any) -> dict[str, Array]:

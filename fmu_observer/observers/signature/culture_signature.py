@@ -121,7 +121,7 @@ class CultureSignature(SignatureObserver):
     def table_errors(self, p: Any) -> dict[str, Array]:
         """How far glycerol and enzyme end beside the nominal run where they follow the model's slopes over biomass."""
         places = np.stack([p.nominal_biomass, p.nominal_glycerol, p.nominal_enzyme])
-        rates = self.plant.flow(0.0, places, None, self.model_parameters((), p))
+        rates = self.plant.rates(places, self.model_parameters((), p))
         grown = p.nominal_biomass[1:] - p.nominal_biomass[:-1]
         offs = []
         for i in (1, 2):
@@ -149,7 +149,7 @@ class CultureSignature(SignatureObserver):
             X_, S_, P_, wide, narrow = (given[len(fields) + i] for i in range(5))
             start = in_tube(X_, S_ + wide * row[0][1], P_ + narrow * row[0][2])
             now = np.where(begins > 0.5, start, self.moved(carry[0], 1, values)[-1])
-            return (now,), (np.stack([self.plant.measured_under(now, values)[1]]),)
+            return (now,), (np.stack([self.plant.measured_under(self.plant.named(now), values)[1]]),)
 
         def read(_carry: Any, row: Any, shared: Any) -> Any:
             return (), (self.properties(row[0], shared[0][-2]),)
@@ -232,7 +232,7 @@ class CultureSignature(SignatureObserver):
 
     def _light(self, start: np.ndarray, last: int, p: Any) -> np.ndarray:
         """Light of windows that begin at these states, the oldest first."""
-        return np.stack([self.plant.measured_under(x, p)[1] for x in self.moved(start, last, p)])
+        return np.stack([self.plant.measured_under(self.plant.named(x), p)[1] for x in self.moved(start, last, p)])
 
     def adopted(self, now: Array, u: Any) -> Array:
         """With the biomass as it is measured."""
@@ -282,5 +282,5 @@ def nominal_run(start: Sequence[float] = (0.05, 2.0, 0.01), hours: float = HOURS
     per, step = 4, hours * HOUR / (4 * (NOMINAL - 1))
     states = [np.array(start)]
     for _ in range(per * (NOMINAL - 1)):
-        states.append(rk4_step(lambda t, x: plant.flow(t, x, None, p), 0.0, step, states[-1]))
+        states.append(rk4_step(lambda _t, x: plant.rates(x, p), 0.0, step, states[-1]))
     return np.array(states[::per]).T

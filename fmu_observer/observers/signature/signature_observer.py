@@ -164,9 +164,7 @@ class SignatureObserver(HybridSystem):
         """
         states = [start]
         for _ in range(steps):
-            states.append(
-                rk4_step(lambda t, x: self.plant.flow(t, x, None, model), 0.0, model.sample_period, states[-1])
-            )
+            states.append(rk4_step(lambda _t, x: self.plant.rates(x, model), 0.0, model.sample_period, states[-1]))
         return states
 
     def brought(self, start: Array, steps: int, model: Any) -> Array:
