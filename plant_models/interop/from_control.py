@@ -53,6 +53,8 @@ class ControlSystem(HybridSystem):
         sample_period: [s], 0 for a continuous system. method: of integration. internal_step: [s].
     """
 
+    by_name = True
+
     def __init__(
         self,
         update: Function,
@@ -77,6 +79,7 @@ class ControlSystem(HybridSystem):
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
         self.method, self.internal_step = method, internal_step
         self.states, self.parameters = tuple(states), tuple(parameters.values())
+        self._own = [s.name for s in states]
         if self._sampled:
             held = [memory(f"held_{s.name}", s.unit, 0.0, f"{s.name} since the last instant") for s in outputs]
             self.states = (*states, *held)
@@ -84,31 +87,35 @@ class ControlSystem(HybridSystem):
             self.events = (SAMPLING,)
         super().__init__()
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of a continuous system, shape (nc,)."""
-        if self._sampled or not self.states:
-            return super().flow(t, x, u, p)
-        return _flat(self._update(t, x, self._inputs(u), self._params(p)))
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of a continuous system."""
+        return {} if self._sampled or not self.states else self._moved("flow()", t, x, u, p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """One step of a discrete system: its next state, and the outputs held from now on."""
-        before, inputs, params = x[: len(self.states) - len(self.outputs)], self._inputs(u), self._params(p)
-        after, outputs = _flat(self._update(t, before, inputs, params)), _flat(self._read(t, before, inputs, params))
-        parts = [part for part in (after, outputs) if part.shape[0]]
-        return np.hstack(parts) if x.ndim == 1 else np.vstack(parts)
+        held = {f"held_{name}": value for name, value in self._told(t, x, u, p).items()}
+        return self._moved("jump('sampling')", t, x, u, p) | held
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Outputs, of a discrete system those of the last instant."""
-        count = len(self.outputs)
-        values = (
-            x[len(self.states) - count :]
-            if self._sampled
-            else _flat(self._read(t, x, self._inputs(u), self._params(p)))
-        )
-        return {signal.name: values[i] for i, signal in enumerate(self.outputs)}
+        if self._sampled:
+            return {s.name: getattr(x, f"held_{s.name}") for s in self.outputs}
+        return self._told(t, x, u, p)
 
-    def _inputs(self, u: Any) -> Array:
-        return vector(*(getattr(u, s.name) for s in self.inputs)) if self.inputs else np.zeros(0)
+    def _moved(self, what: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives, or the next states."""
+        values = self._checked(what, self._called(self._update, t, x, u, p), len(self._own))
+        return dict(zip(self._own, values, strict=True))
+
+    def _told(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Outputs now."""
+        values = self._called(self._read, t, x, u, p)
+        return {s.name: values[i] for i, s in enumerate(self.outputs)}
+
+    def _called(self, function: Function, t: Array, x: Any, u: Any, p: Any) -> Array:
+        """What an equation gives for states and inputs as vectors, shape (n,)."""
+        state, inputs = _together(x, self._own), _together(u, [s.name for s in self.inputs])
+        return _flat(function(t, state, inputs, self._params(p)))
 
     def _params(self, p: Any) -> dict[str, Any]:
         return self._constants | {key: getattr(p, field) for key, field in self._parameter_fields.items()}
@@ -293,6 +300,11 @@ def _can_be_traced(system: HybridSystem) -> bool:
     except TracingError:
         return False
     return True
+
+
+def _together(values: Any, names: Sequence[str]) -> Array:
+    """Scalars of these names as a vector, shape (n,)."""
+    return vector(*(getattr(values, name) for name in names)) if names else np.zeros(0)
 
 
 def _flat(values: Any) -> Array:
