@@ -30,6 +30,7 @@ from plant_models.railway.traction.sampled_currents import (
 from plant_models.railway.traction.transforms import to_stator
 
 Noise = Literal["none", "sampled"]
+State = tuple[Array, Array, Array, Array]
 MOVING = ("rotor_current_d", "rotor_current_q", "shaft_speed", "electrical_angle")
 
 
@@ -90,15 +91,10 @@ class SynchronousMotor(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A sample: noise enters the state, the currents are measured."""
-        return self.disturbed(moving(x), x.sampled, u, p)
+        return self._disturbed(moving(x), x.sampled, u, p)
 
-    def disturbed(self, state: tuple[Array, Array, Array, Array], sampled: Array, u: Any, p: Any) -> dict[str, Array]:
-        """State with the noise of a sample, which the first one has not, and the currents measured then.
-
-        Args:
-            state: currents along d and q [A], speed [rad/s], angle [rad]. sampled: 1 after the first sample. u: inputs
-                with the noises. p: parameters.
-        """
+    def _disturbed(self, state: State, sampled: Array, u: Any, p: Any) -> dict[str, Array]:
+        """State with the noise of a sample, which the first one has not, and the currents measured then."""
         first, second, third, fourth = (
             value + sampled * noise for value, noise in zip(state, process_noise(u, p), strict=True)
         )
@@ -125,10 +121,6 @@ class SynchronousMotor(HybridSystem):
         return within_bounds(self.parameters, p)
 
 
-def moving(x: Any) -> tuple[Array, Array, Array, Array]:
-    """Currents along d and q [A], speed [rad/s] and angle [rad] of a motor.
-
-    Args:
-        x: states by name.
-    """
+def moving(x: Any) -> State:
+    """Currents along d and q [A], speed [rad/s] and angle [rad] of a motor with these states."""
     return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle

@@ -60,4 +60,4 @@ class SynchronousMotorEuler(SynchronousMotor):
         """State and measured currents after a period; at the start they are measured only."""
         voltages = rotor_voltages(self.frame, u, x.electrical_angle)
         moved = euler_step(moving(x), *voltages, u.load_torque, x.sampled * p.sample_period, p)
-        return self.disturbed(moved, x.sampled, u, p)
+        return self._disturbed(moved, x.sampled, u, p)
