@@ -137,7 +137,7 @@ class CartDoublePendulum(NoisyPlant):
             "upper_rate": upper,
         }
 
-    def measured(self, x: Any) -> tuple[Array, ...]:
+    def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
         """Position and both angles: (4.18)."""
         return x.cart_position, x.lower_angle, x.upper_angle
 

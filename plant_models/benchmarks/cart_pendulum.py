@@ -99,7 +99,7 @@ class CartPendulum(NoisyPlant):
             "pendulum_rate": angular,
         }
 
-    def measured(self, x: Any) -> tuple[Array, ...]:
+    def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
         """Position and angle: (4.8)."""
         return x.cart_position, x.pendulum_angle
 

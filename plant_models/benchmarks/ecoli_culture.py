@@ -97,14 +97,14 @@ class EcoliCulture(NoisyPlant):
             "enzyme_state": made - decay * P,
         }
 
-    def measured_under(self, x: Any, p: Any) -> tuple[Array, ...]:
+    def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
         """Biomass and light, (4.7.4)."""
         X, growing = x.biomass_state, self._growth(x.glycerol_state, p)[0]
         return X, p.light_yield * growing * _induction(p) * X * x.enzyme_state
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """States and light."""
-        biomass, light = self.measured_under(x, p)
+        biomass, light = self.measured(x, p)
         return {"biomass": biomass, "glycerol": x.glycerol_state, "enzyme": x.enzyme_state, "light": light}
 
     def _growth(self, S: Array, p: Any) -> tuple[Array, Array]:

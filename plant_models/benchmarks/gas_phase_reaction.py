@@ -54,7 +54,7 @@ class GasPhaseReaction(NoisyPlant):
         reaction = p.rate * x.state_1 * x.state_1
         return {"state_1": -2.0 * reaction, "state_2": reaction}
 
-    def measured(self, x: Any) -> tuple[Array, ...]:
+    def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
         """The total pressure."""
         return (x.state_1 + x.state_2,)
 

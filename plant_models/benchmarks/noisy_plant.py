@@ -30,21 +30,13 @@ class NoisyPlant(HybridSystem):
     moving: tuple[Signal, ...] = ()
     plain_outputs: tuple[Signal, ...] = ()
 
-    def measured(self, x: Any) -> tuple[Array, ...]:
+    def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
         """What is measured without noise, one scalar a measurement.
-
-        Args:
-            x: states by name.
-        """
-        raise NotImplementedError
-
-    def measured_under(self, x: Any, p: Any) -> tuple[Array, ...]:
-        """What is measured without noise, for a plant whose measurement depends on parameters.
 
         Args:
             x: states by name. p: parameters.
         """
-        return self.measured(x)
+        raise NotImplementedError
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
         """Values of `plain_outputs` by name.
@@ -111,7 +103,7 @@ class NoisyPlant(HybridSystem):
         moved = {
             s.name: getattr(x, s.name) + p.process_noise[i] * u.process_normal[i] for i, s in enumerate(self.moving)
         }
-        seen = self.measured_under(x._replace(**moved), p)
+        seen = self.measured(x._replace(**moved), p)
         held = {
             f"held_{s.name}": y + p.measurement_noise[j] * u.measurement_normal[j]
             for j, (s, y) in enumerate(zip(self.outputs[len(self.plain_outputs) :], seen, strict=True))

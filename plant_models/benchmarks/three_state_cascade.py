@@ -54,7 +54,7 @@ class ThreeStateCascade(NoisyPlant):
         first = second - e * x.state_1 * np.abs(second) ** (1.0 / 3.0)
         return {"state_1": first, "state_2": third + e * second * third, "state_3": p.ramp}
 
-    def measured(self, x: Any) -> tuple[Array, ...]:
+    def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
         """The first state."""
         return (x.state_1,)
 

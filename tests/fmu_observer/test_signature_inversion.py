@@ -178,9 +178,7 @@ def test_the_culture_is_told_by_literal_scaling_only() -> None:
         observer = CultureSignature(3, scaling)  # type: ignore[arg-type]
         p = parameters(observer)
         states = np.array([[0.5] * 4, [1.86, 1.06, 1.46, 1.46], [0.15, 0.15, 0.19, 0.11]])
-        light = np.stack(
-            [observer.plant.measured_under(observer.plant.named(x), p)[1] for x in observer.moved(states, 7, p)]
-        )
+        light = np.stack([observer.plant.measured(observer.plant.named(x), p)[1] for x in observer.moved(states, 7, p)])
         found = observer.properties(light, 1e-3)
         a, b = found[:, 0] - found[:, 1], found[:, 2] - found[:, 3]
         sines.append(abs(a[0] * b[1] - a[1] * b[0]) / np.linalg.norm(a) / np.linalg.norm(b))
@@ -191,7 +189,7 @@ def test_glycerol_and_enzyme_come_back_from_a_clean_window() -> None:
     observer = CultureSignature(look_up="cell")
     p = parameters(observer)
     state = np.array([0.5, 1.6, 0.13])
-    measured = [observer.plant.measured_under(observer.plant.named(x), p) for x in observer.moved(state, 7, p)]
+    measured = [observer.plant.measured(observer.plant.named(x), p) for x in observer.moved(state, 7, p)]
     past = [np.array([m[i] for m in measured]) for i in range(2)]
     told = observer.inverted(past, observer.start_state(), p)
     np.testing.assert_allclose(told.state, state, rtol=0.06)  # a 3 x 3 network is bent between its nodes
@@ -228,7 +226,7 @@ def test_a_table_follows_its_parameters_and_tells_a_node_from_its_window() -> No
     assert np.abs(grid - observer.tabulated()["table"]).max() > 1e-6
     p = parameters(observer, braking=0.3)._replace(table=grid, sharpness=1e4)
     node = np.array([observer.nodes[0][4], observer.nodes[1][5]])
-    window = np.stack([observer.plant.measured(observer.plant.named(x))[0] for x in observer.moved(node, 2, p)])
+    window = np.stack([observer.plant.measured(observer.plant.named(x), p)[0] for x in observer.moved(node, 2, p)])
     np.testing.assert_allclose(observer.inverted([window], observer.start_state(), p).state, node, atol=1e-6)
 
 
@@ -246,7 +244,7 @@ def test_a_third_state_beyond_the_tables_of_the_cascade_is_told() -> None:
             model = observer.model_parameters((), p)
             window = np.stack(
                 [
-                    observer.plant.measured(observer.plant.named(s))[0]
+                    observer.plant.measured(observer.plant.named(s), model)[0]
                     for s in observer.moved(x, observer.window - 1, model)
                 ]
             )

@@ -124,9 +124,7 @@ def angle(observer: CultureSignature, eps: float) -> float:
     """Sine of the angle in which glycerol and enzyme move the two properties at X = 0.5."""
     p = observer.unpack_parameters(observer.start_parameters())
     states = np.array([[0.5] * 4, [1.86, 1.06, 1.46, 1.46], [0.15, 0.15, 0.19, 0.11]])
-    light = np.stack(
-        [observer.plant.measured_under(observer.plant.named(x), p)[1] for x in observer.moved(states, 7, p)]
-    )
+    light = np.stack([observer.plant.measured(observer.plant.named(x), p)[1] for x in observer.moved(states, 7, p)])
     found = observer.properties(light, eps)
     a, b = found[:, 0] - found[:, 1], found[:, 2] - found[:, 3]
     return float(abs(a[0] * b[1] - a[1] * b[0]) / np.linalg.norm(a) / np.linalg.norm(b))

@@ -94,7 +94,7 @@ class CascadeSignature(SignatureObserver):
         """
         model = self._model(*self._constants, self._period)
         window = np.stack(
-            [self.plant.measured(self.plant.named(x))[0] for x in self.moved(states, self.window - 1, model)]
+            [self.plant.measured(self.plant.named(x), model)[0] for x in self.moved(states, self.window - 1, model)]
         )
         return np.stack(self.points(window, ORDER, EPS[self.scaling]))
 

@@ -149,7 +149,7 @@ class CultureSignature(SignatureObserver):
             X_, S_, P_, wide, narrow = (given[len(fields) + i] for i in range(5))
             start = in_tube(X_, S_ + wide * row[0][1], P_ + narrow * row[0][2])
             now = np.where(begins > 0.5, start, self.moved(carry[0], 1, values)[-1])
-            return (now,), (np.stack([self.plant.measured_under(self.plant.named(now), values)[1]]),)
+            return (now,), (np.stack([self.plant.measured(self.plant.named(now), values)[1]]),)
 
         def read(_carry: Any, row: Any, shared: Any) -> Any:
             return (), (self.properties(row[0], shared[0][-2]),)
@@ -232,7 +232,7 @@ class CultureSignature(SignatureObserver):
 
     def _light(self, start: np.ndarray, last: int, p: Any) -> np.ndarray:
         """Light of windows that begin at these states, the oldest first."""
-        return np.stack([self.plant.measured_under(self.plant.named(x), p)[1] for x in self.moved(start, last, p)])
+        return np.stack([self.plant.measured(self.plant.named(x), p)[1] for x in self.moved(start, last, p)])
 
     def adopted(self, now: Array, u: Any) -> Array:
         """With the biomass as it is measured."""

@@ -112,7 +112,7 @@ class OscillatorSignature(SignatureObserver):
     def _points_of(self, states: np.ndarray, p: Any) -> tuple[Array, Array]:
         """Both coordinates of the signatures of windows that begin with these states, shape (...) each."""
         window = np.stack(
-            [self.plant.measured(self.plant.named(x))[0] for x in self.moved(states, ORDER + POINTS - 1, p)]
+            [self.plant.measured(self.plant.named(x), p)[0] for x in self.moved(states, ORDER + POINTS - 1, p)]
         )
         points = self.points(window, ORDER, p.regularisation)
         return points[0][0], points[1][0]

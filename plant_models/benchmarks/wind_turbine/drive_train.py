@@ -62,8 +62,9 @@ class DriveTrain(NamedTuple):
             rotor_torque, generator_torque: of the wind on the rotor, and of the generator against it [N.m].
         """
         torques = (rotor_torque / self.rotor_inertia, -generator_torque / self.generator_inertia, 0.0)
+        rotor, generator, torsion = x
         rows = zip(self.matrix(), torques, strict=True)
-        return tuple(row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + torque for row, torque in rows)
+        return tuple(row[0] * rotor + row[1] * generator + row[2] * torsion + torque for row, torque in rows)
 
     def hurwitz(self) -> tuple[Array, Array, Array]:
         """Hurwitz determinants of the characteristic polynomial; the drive train is stable where all are positive.
