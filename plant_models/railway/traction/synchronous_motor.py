@@ -87,11 +87,11 @@ class SynchronousMotor(HybridSystem):
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of currents, speed and angle."""
         voltages = rotor_voltages(self.frame, u, x.electrical_angle)
-        return dict(zip(MOVING, motor_rates(moving(x), *voltages, u.load_torque, p), strict=True))
+        return dict(zip(MOVING, motor_rates(self._moving(x), *voltages, u.load_torque, p), strict=True))
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A sample: noise enters the state, the currents are measured."""
-        return self._disturbed(moving(x), x.sampled, u, p)
+        return self._disturbed(self._moving(x), x.sampled, u, p)
 
     def _disturbed(self, state: State, sampled: Array, u: Any, p: Any) -> dict[str, Array]:
         """State with the noise of a sample, which the first one has not, and the currents measured then."""
@@ -104,7 +104,7 @@ class SynchronousMotor(HybridSystem):
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """State, torque and the measured currents."""
-        current_d, current_q, speed, angle = moving(x)
+        current_d, current_q, speed, angle = self._moving(x)
         now = (current_d, current_q) if self.frame == "rotor" else to_stator(current_d, current_q, angle)
         held = [getattr(x, f"held_current_{axis}") for axis in AXES[self.frame]] if self.sampled else now
         return {
@@ -116,11 +116,11 @@ class SynchronousMotor(HybridSystem):
             **{f"measured_current_{axis}": value for axis, value in zip(AXES[self.frame], held, strict=True)},
         }
 
+    @staticmethod
+    def _moving(x: Any) -> State:
+        """Currents along d and q [A], speed [rad/s] and angle [rad]."""
+        return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle
+
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
-
-
-def moving(x: Any) -> State:
-    """Currents along d and q [A], speed [rad/s] and angle [rad] of a motor with these states."""
-    return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle

@@ -9,7 +9,7 @@ from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import FRAMES, Frame, euler_step, rotor_voltages
 from plant_models.railway.traction.sampled_currents import PUBLISHED_NOISE, sampling_event
-from plant_models.railway.traction.synchronous_motor import SynchronousMotor, moving
+from plant_models.railway.traction.synchronous_motor import SynchronousMotor
 
 
 class SynchronousMotorEuler(SynchronousMotor):
@@ -59,5 +59,5 @@ class SynchronousMotorEuler(SynchronousMotor):
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """State and measured currents after a period; at the start they are measured only."""
         voltages = rotor_voltages(self.frame, u, x.electrical_angle)
-        moved = euler_step(moving(x), *voltages, u.load_torque, x.sampled * p.sample_period, p)
+        moved = euler_step(self._moving(x), *voltages, u.load_torque, x.sampled * p.sample_period, p)
         return self._disturbed(moved, x.sampled, u, p)
