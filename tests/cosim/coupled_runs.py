@@ -94,9 +94,6 @@ class IdealCdo(HighGainTrainObserver):
     def adhesion(self, x: Any, u: Any, p: Any) -> Any:
         return u.effort
 
-    def first_stage_flow(self, x: Any, u: Any, p: Any) -> tuple[Any, ...]:
-        return ()
-
 
 class Listener(HybridSystem):
     """Keeps what it is told: the last position, when, how often; between balises it integrates its input."""

@@ -23,7 +23,7 @@ def test_a_frozen_premise_keeps_the_odometer_of_the_last_balise() -> None:
 def test_live_and_estimated_premises_follow_their_source(premise: str, expected: float) -> None:
     observer = TakagiSugenoCdo(premise=premise)  # type: ignore[arg-type]
     x, u, p = (
-        np.array([0.0, 20.0, 0.0, 0.0]),
+        observer.unpack_states(observer.start_state())._replace(estimated_speed=20.0),
         observer.unpack_inputs(np.array([0.0, 30.0, 0.0, 0.0])),
         observer.start_parameters(),
     )

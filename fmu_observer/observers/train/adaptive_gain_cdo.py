@@ -19,14 +19,13 @@ from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainT
 from fmu_observer.observers.train.train_observer import TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES
-from plant_models.hybrid import PeriodicEvent, Signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import PeriodicEvent, Signal, memory, output_signal, parameter
 from plant_models.hybrid.system import Array
 
 FirstStage = Literal["effort", "differentiator", "multirate"]
 SpeedSource = Literal["odometer", "estimated"]
 SpacingSource = Literal["expected", "learnt"]
 
-FIRST = 3  # the first-stage states stand behind position, speed and innovation
 ADVISED_RATIO, ADVISED_SHARES = 2.0, (3.0, 1.5)  # what `advise` tries: ratio, and theta_min times the longest gap
 SHORTEST_LEARNT = 0.25  # of the expected spacing: nearer to the last one a balise teaches no spacing
 
@@ -39,29 +38,29 @@ class EffortStage:
     events: tuple[PeriodicEvent, ...] = ()
     stability_parameters: tuple[str, ...] = ()
 
-    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """The effort [N].
 
         Args:
-            z: states of the stage. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
         return u.effort
 
-    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """No states.
 
         Args:
-            z: states of the stage. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
-        return ()
+        return {}
 
-    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+    def sampled(self, x: Any, u: Any) -> dict[str, Array]:
         """No states.
 
         Args:
-            z: states of the stage. u: inputs, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
         """
-        return ()
+        return {}
 
 
 STAGES = {"effort": EffortStage, **WHEEL_STAGES}
@@ -168,33 +167,30 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             ),
         )
 
-    def theta_in_force(self, x: Array, p: Any) -> Array:
+    def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain since the last balise [1/s]."""
-        return x[self.continuous_count]
+        return x.theta
 
-    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """Adhesion force of the first stage [N]."""
-        return self.stage.adhesion(self._wheel(x), u, p)
+        return self.stage.adhesion(x, u, p)
 
-    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the first stage."""
-        return self.stage.flow(self._wheel(x), u, p)
+        return self.stage.flow(x, u, p)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate with slip and indicator, and the gain in force."""
         return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """At a balise innovation and gain are set anew; an odometer sample goes to the first stage."""
         if event != "balise":
-            parts = [x[i] for i in range(self.own_count)]
-            parts[FIRST : FIRST + len(self.stage.states)] = self.stage.sampled(self._wheel(x), u)
-            return vector(*parts)
-        speed = np.abs(u.odometer if self.gain_speed == "odometer" else x[1])
+            return self.stage.sampled(x, u)
+        speed = np.abs(u.odometer if self.gain_speed == "odometer" else x.estimated_speed)
         spacing, learnt = self._spacing(x, u, p)
         theta = np.clip(p.ratio * speed / spacing, p.theta_min, np.maximum(p.theta_max, p.theta_min))  # as certified
-        kept = [x[i] for i in range(FIRST, self.continuous_count)]
-        return vector(x[0], x[1], x[0] - u.balise_position, *kept, theta, *learnt)
+        return super().update(event, t, x, u, p) | {"theta": theta} | learnt
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """The ratio and theta_min of a few that are certified; where none is, a constant theta."""
@@ -235,20 +231,17 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         note = f"wheel stage at its odometer period of {float(p.odometer_period):g} s: spectral radius {radius:.4f}"
         return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(note,))
 
-    def _spacing(self, x: Array, u: Any, p: Any) -> tuple[Array, tuple[Array, ...]]:
+    def _spacing(self, x: Any, u: Any, p: Any) -> tuple[Array, dict[str, Array]]:
         """Spacing d to expect [m], and the memory of balises after this one."""
         if self.spacing == "expected":
-            return p.expected_spacing, ()
-        last, before = x[self.continuous_count + 1], x[self.continuous_count + 2]
-        distance = np.abs(u.balise_position - last)
+            return p.expected_spacing, {}
+        before, distance = x.learnt_spacing, np.abs(u.balise_position - x.last_balise)
         usable = np.where(distance >= SHORTEST_LEARNT * p.expected_spacing, 1.0, 0.0) * np.where(
             before >= 0.0, 1.0, 0.0
         )
         learnt = np.where(usable > 0.0, distance, np.maximum(before, 0.0))
-        return np.where(learnt > 0.0, learnt, p.expected_spacing), (u.balise_position + 0.0 * last, learnt)
-
-    def _wheel(self, x: Array) -> Array:
-        return x[FIRST : FIRST + len(self.stage.states)]
+        spacing = np.where(learnt > 0.0, learnt, p.expected_spacing)
+        return spacing, {"last_balise": u.balise_position, "learnt_spacing": learnt}
 
 
 def _error_model(adaptation: GainAdaptation) -> str:

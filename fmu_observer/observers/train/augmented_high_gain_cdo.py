@@ -10,12 +10,12 @@ import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError
 from fmu_observer.design.augmented_gains import augmented_matrix
-from fmu_observer.observers.train.augmented_observer import FIRST, ORDER, WAYS_OF_FIXES, AugmentedTrainObserver, Fixes
+from fmu_observer.observers.train.augmented_observer import ORDER, WAYS_OF_FIXES, AugmentedTrainObserver, Fixes
 from fmu_observer.observers.train.high_gain import correction
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, MultirateStage
-from plant_models.hybrid import parameter, vector
+from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 
 FirstStage = Literal["multirate", "differentiator"]
@@ -81,13 +81,13 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         self.own_events = self.stage.events
         super().__init__(fixes=fixes, first_stage=first_stage)
 
-    def traction(self, x: Array, u: Any, p: Any) -> Array:
+    def traction(self, x: Any, u: Any, p: Any) -> Array:
         """Adhesion force of the first stage [N]."""
-        return self.stage.adhesion(self._wheel(x), u, p)
+        return self.stage.adhesion(x, u, p)
 
-    def drag(self, x: Array, u: Any, p: Any) -> Array:
+    def drag(self, x: Any, u: Any, p: Any) -> Array:
         """``b v + c v|v|`` [N]."""
-        return rolling_drag(x[1], p)
+        return rolling_drag(x.estimated_speed, p)
 
     def gains_of(self, sensor: str, p: Any) -> tuple[tuple[Array, ...], Array]:
         """``theta^i K_i`` and ``theta K_1``."""
@@ -98,15 +98,13 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         """Shift matrices with the smallest and the largest drag slope up to `TOP_SPEED`."""
         return tuple(augmented_matrix(float(slope)) for slope in drag_slope_range(p, 0.0, TOP_SPEED))
 
-    def own_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def own_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the first stage."""
-        return self.stage.flow(self._wheel(x), u, p)
+        return self.stage.flow(x, u, p)
 
-    def own_jump(self, event: str, x: Array, u: Any, p: Any) -> Array:
+    def own_jump(self, event: str, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """An odometer sample."""
-        parts = [x[i] for i in range(self.own_count)]
-        parts[FIRST : FIRST + len(self.stage.states)] = self.stage.sampled(self._wheel(x), u)
-        return vector(*parts)
+        return self.stage.sampled(x, u)
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the second stage, and for sampled odometers the exact check of the first at its constant
@@ -120,6 +118,3 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         radius = wheel.spectral_radius(float(p.odometer_period))
         note = f"wheel stage at its odometer period of {float(p.odometer_period):g} s: spectral radius {radius:.4f}"
         return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(*certificate.notes, note))
-
-    def _wheel(self, x: Array) -> Array:
-        return x[FIRST : FIRST + len(self.stage.states)]

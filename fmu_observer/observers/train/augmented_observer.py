@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error, with_switching_noted
+from fmu_observer.models.model import named_as
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import (
@@ -25,14 +26,11 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4  # position, speed, unknown acceleration, its rate
-INNOVATION = ORDER  # index of the decaying innovation, behind them
-FIRST = ORDER + 1  # first index of what a subclass adds
 BALISE_LAST, FIX_LAST = 1.0, 2.0
 SENSORS = ("balise", "gps")
 POSITION_OF = {"balise": "balise_position", "gps": "gps_position", "fix": "fix_position"}  # event to input
@@ -120,7 +118,7 @@ class AugmentedTrainObserver(TrainObserver):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def traction(self, x: Array, u: Any, p: Any) -> Array:
+    def traction(self, x: Any, u: Any, p: Any) -> Array:
         """Force between wheels and rails [N]."""
 
     @abstractmethod
@@ -128,61 +126,66 @@ class AugmentedTrainObserver(TrainObserver):
         """Gains ``g_1 ... g_4`` of a sensor [1/s^i] and the decay rate of its innovation [1/s]."""
 
     @abstractmethod
-    def drag(self, x: Array, u: Any, p: Any) -> Array:
+    def drag(self, x: Any, u: Any, p: Any) -> Array:
         """Speed-dependent resistance [N]."""
 
     @abstractmethod
     def error_drifts(self, p: Any) -> tuple[np.ndarray, ...]:
         """Error matrices between samples at the corners of what is uncertain, each of shape (4, 4)."""
 
-    def own_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """Derivatives of the states that the subclass adds."""
-        return ()
+    def own_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the states that the subclass adds, by name."""
+        return {}
 
-    def continuous_correction(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def continuous_correction(self, x: Any, u: Any, p: Any) -> tuple[Array, ...]:
         """Correction by continuous measurements, to be subtracted from the four derivatives."""
         return (0.0,) * ORDER
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the four augmented states, the innovation, and what the subclass adds."""
         gains, decay = self._in_force(x, p)
         traction = np.maximum(self.traction(x, u, p), 0.0)  # a negative one is a brake: see friction
-        acceleration = (traction - self.drag(x, u, p)) / p.mass + x[2]
-        continuous = self.continuous_correction(x, u, p)
-        model = (x[1], acceleration, x[3], 0.0 * x[3])
-        corrected = [model[i] - gains[i] * x[INNOVATION] - continuous[i] for i in range(ORDER)]
-        corrected[2:] = held_disturbance(stands(x[1]), corrected[2], corrected[3], x[3], decay)
-        return (*corrected, -decay * x[INNOVATION], *self.own_flow(x, u, p))
+        acceleration = (traction - self.drag(x, u, p)) / p.mass + x.unknown_acceleration
+        continuous, innovation = self.continuous_correction(x, u, p), x.position_innovation
+        model = (x.estimated_speed, acceleration, x.unknown_jerk, 0.0)
+        corrected = [model[i] - gains[i] * innovation - continuous[i] for i in range(ORDER)]
+        standing = stands(x.estimated_speed)
+        corrected[2:] = held_disturbance(standing, corrected[2], corrected[3], x.unknown_jerk, decay)
+        return (
+            named_as(self.estimator_states[:ORDER], corrected)
+            | {"position_innovation": -decay * innovation}
+            | self.own_flow(x, u, p)
+        )
 
-    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+    def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, speed, adhesion force and innovation."""
-        return Estimate(x[0], x[1], self.traction(x, u, p), x[INNOVATION])
+        return Estimate(x.estimated_position, x.estimated_speed, self.traction(x, u, p), x.position_innovation)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, with the coupler force and the unknown acceleration."""
-        force = -p.mass * (x[2] + GRAVITY * u.gradient)
-        return super().output(t, x, u, p) | {"coupler_force": force, "disturbance": x[2]}
+        force = -p.mass * (x.unknown_acceleration + GRAVITY * u.gradient)
+        return super().output(t, x, u, p) | {"coupler_force": force, "disturbance": x.unknown_acceleration}
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A balise or a fix sets the innovation anew and puts its gains in force; the estimates stay continuous."""
         if event not in POSITION_OF:
             return self.own_jump(event, x, u, p)
-        sensor = "balise" if event == "balise" else "gps"
+        sensor, last = ("balise", BALISE_LAST) if event == "balise" else ("gps", FIX_LAST)
         measured = getattr(u, POSITION_OF[event])
         used = self.gains_of(sensor, p)[0][0] > 0.0
-        parts = [x[i] for i in range(self.own_count)]
-        parts[INNOVATION] = np.where(used, x[0] - measured, x[INNOVATION])
-        parts[-1] = np.where(used, BALISE_LAST if sensor == "balise" else FIX_LAST, x[self.own_count - 1])
-        return vector(*parts)
+        return {
+            "position_innovation": np.where(used, x.estimated_position - measured, x.position_innovation),
+            "last_sensor": np.where(used, last, x.last_sensor),
+        }
 
     def listens(self, p: Any) -> Array:
         """Whether balises have gains."""
         return np.where(self.gains_of("balise", p)[0][0] > 0.0, 1.0, 0.0)
 
-    def own_jump(self, event: str, x: Array, u: Any, p: Any) -> Array:
-        """State after an event that the subclass adds."""
+    def own_jump(self, event: str, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What an event changes that the subclass adds."""
         raise NotImplementedError(f"{type(self).__name__} has no jump for event {event!r}.")
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
@@ -218,8 +221,8 @@ class AugmentedTrainObserver(TrainObserver):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _in_force(self, x: Array, p: Any) -> tuple[tuple[Array, ...], Array]:
-        fix = x[self.own_count - 1] == FIX_LAST
+    def _in_force(self, x: Any, p: Any) -> tuple[tuple[Array, ...], Array]:
+        fix = x.last_sensor == FIX_LAST
         (by_balise, slow), (by_fix, fast) = (self.gains_of(sensor, p) for sensor in SENSORS)
         gains = tuple(np.where(fix, b, a) for a, b in zip(by_balise, by_fix, strict=True))
         return gains, np.where(fix, fast, slow)

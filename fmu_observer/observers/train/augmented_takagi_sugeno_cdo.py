@@ -83,19 +83,19 @@ class AugmentedTakagiSugenoCdo(AugmentedTrainObserver):
     def __init__(self, fixes: Fixes = "event") -> None:
         super().__init__(fixes=fixes)
 
-    def traction(self, x: Array, u: Any, p: Any) -> Array:
+    def traction(self, x: Any, u: Any, p: Any) -> Array:
         """The applied effort [N]."""
         return u.effort
 
-    def drag(self, x: Array, u: Any, p: Any) -> Array:
+    def drag(self, x: Any, u: Any, p: Any) -> Array:
         """``(b + c v_i) v`` [N], blended over the vertices by the odometer."""
         span = p.premise_max - p.premise_min  # at equal vertices any weight is right
         h = np.clip((p.premise_max - u.odometer) / np.where(span == 0.0, 1.0, span), 0.0, 1.0)
-        return (p.davis_b + p.davis_c * (h * p.premise_min + (1.0 - h) * p.premise_max)) * x[1]
+        return (p.davis_b + p.davis_c * (h * p.premise_min + (1.0 - h) * p.premise_max)) * x.estimated_speed
 
-    def continuous_correction(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def continuous_correction(self, x: Any, u: Any, p: Any) -> tuple[Array, ...]:
         """``K_2 (v - y)``."""
-        return tuple(p.odometer_gain[i] * (x[1] - u.odometer) for i in range(ORDER))
+        return tuple(p.odometer_gain[i] * (x.estimated_speed - u.odometer) for i in range(ORDER))
 
     def gains_of(self, sensor: str, p: Any) -> tuple[tuple[Array, ...], Array]:
         """The parameters of the sensor."""

@@ -22,14 +22,14 @@ class ContinuousDiscreteObserver(HeldOdometerObserver):
     name = "continuous_discrete_observer"
     description = "Continuous-discrete observer (CDO): held odometer reading, gain by the estimate, error bound"
 
-    def scheduling_speed(self, x: Array) -> Array:
+    def scheduling_speed(self, x: Any) -> Array:
         """The estimated speed [m/s]."""
-        return x[1]
+        return x.estimated_speed
 
-    def largest_gain_level(self, x: Array, p: Any) -> Array:
+    def largest_gain_level(self, x: Any, p: Any) -> Array:
         """Largest level at speeds from 0 to `speed_max` [1/s]."""
         return gain_level(p, 0.0, p.speed_max)
 
-    def largest_gain_norm(self, x: Array, p: Any) -> Array:
+    def largest_gain_norm(self, x: Any, p: Any) -> Array:
         """Largest norm at speeds from 0 to `speed_max` [1/s]."""
         return gain_norm(p, 0.0, p.speed_max)

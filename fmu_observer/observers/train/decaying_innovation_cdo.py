@@ -18,7 +18,7 @@ from fmu_observer.observers.train.high_gain import correction
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_observer import POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range
-from plant_models.hybrid import Signal, memory, scalar_names, vector
+from plant_models.hybrid import Signal, memory, scalar_names
 from plant_models.hybrid.system import Array
 
 TRIAL_SPEED, TRIAL_ERROR = 20.0, 5.0  # [m/s], [m] of the start; a tenth of it in m/s
@@ -56,26 +56,21 @@ class DecayingInnovationCdo(HighGainTrainObserver):
         """Theta, the shape of the gain, rate and exponent of the decay."""
         return (*super().gain_parameters(), *decay_parameters(10.0, 0.5))
 
-    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """The effort [N]."""
         return u.effort
 
-    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """No first stage."""
-        return ()
-
-    def acting_innovation(self, x: Array, p: Any) -> Array:
+    def acting_innovation(self, x: Any, p: Any) -> Array:
         """What is left of the innovation of the last balise [m]."""
-        return innovation_left(x[2], p.decay_rate, p.decay_exponent) * x[self.continuous_count]
+        return innovation_left(x.elapsed, p.decay_rate, p.decay_exponent) * x.balise_innovation
 
-    def innovation_flow(self, x: Array, p: Any) -> Array:
+    def innovation_flow(self, x: Any, p: Any) -> Array:
         """Time goes on, 1 s/s."""
-        return 1.0 + 0.0 * x[2]
+        return 1.0
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """At a balise the innovation is set anew; position and speed stay continuous."""
-        slip = [x[i] for i in range(3, self.continuous_count)]
-        return vector(x[0], x[1], 0.0 * x[2], *slip, x[0] - u.balise_position)
+        return super().update(event, t, x, u, p) | {ELAPSED.name: 0.0}
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """The largest theta that is certified with a decay that fits it."""

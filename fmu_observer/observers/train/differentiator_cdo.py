@@ -9,7 +9,6 @@ from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserve
 from fmu_observer.observers.train.wheel_stage import DifferentiatorStage
 from plant_models.hybrid.system import Array
 
-FIRST, END = 3, 8  # the first-stage states stand behind position, speed and innovation
 STAGE = DifferentiatorStage()
 
 
@@ -40,10 +39,10 @@ class DifferentiatorCdo(HighGainTrainObserver):
     presets: Mapping[str, Mapping[str, Any]] = {"as_published": {"theta": 8.0, "high_gain": (2.0, 1.0), "n_axles": 1.0}}
     default_preset = "as_published"
 
-    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """``F_ad = effort - (J / r) Z1`` [N], (3.22)."""
-        return STAGE.adhesion(x[FIRST:END], u, p)
+        return STAGE.adhesion(x, u, p)
 
-    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
-        return STAGE.flow(x[FIRST:END], u, p)
+        return STAGE.flow(x, u, p)

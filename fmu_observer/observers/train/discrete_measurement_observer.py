@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fmu_observer.observers.train.held_odometer_error import gain_level, gain_norm
-from fmu_observer.observers.train.held_odometer_observer import HELD_SPEED, HeldOdometerObserver
+from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver
 from plant_models.hybrid.system import Array
 
 
@@ -23,14 +23,14 @@ class DiscreteMeasurementObserver(HeldOdometerObserver):
     name = "discrete_measurement_observer"
     description = "Discrete-measurement observer (DMO): held odometer reading, error bound between samples"
 
-    def scheduling_speed(self, x: Array) -> Array:
+    def scheduling_speed(self, x: Any) -> Array:
         """The reading [m/s]."""
-        return x[HELD_SPEED]
+        return x.held_speed
 
-    def largest_gain_level(self, x: Array, p: Any) -> Array:
+    def largest_gain_level(self, x: Any, p: Any) -> Array:
         """Level of the gain in use [1/s]."""
-        return gain_level(p, x[HELD_SPEED])
+        return gain_level(p, x.held_speed)
 
-    def largest_gain_norm(self, x: Array, p: Any) -> Array:
+    def largest_gain_norm(self, x: Any, p: Any) -> Array:
         """Norm of the gain in use [1/s]."""
-        return gain_norm(p, x[HELD_SPEED])
+        return gain_norm(p, x.held_speed)

@@ -8,8 +8,9 @@ import numpy as np
 
 from fmu_observer.certificates import Certificate, TwoRateError, certify_two_rate_error
 from fmu_observer.design.uio_design import uio_matrices
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.train.train_observer import POSITION, Estimate, TrainObserver
-from plant_models.hybrid import PeriodicEvent, memory, parameter, state, vector
+from plant_models.hybrid import PeriodicEvent, memory, parameter, state
 from plant_models.hybrid.system import Array
 
 # Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes
@@ -17,7 +18,6 @@ from plant_models.hybrid.system import Array
 ODOMETER_GAIN = (0.0, 0.41889, 0.0, 1.13024, 0.0, 1.52461)
 BALISE_GAIN = (0.94689, 0.0, 1.17481, 0.0, 0.7288, 0.0)
 ORDER = 6
-LAST_INNOVATION = ORDER + 1  # behind the six states and the filtered slip
 
 
 class DiscreteUio(TrainObserver):
@@ -59,25 +59,30 @@ class DiscreteUio(TrainObserver):
     estimator_events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
     stability_parameters = ("linearisation_speed", "odometer_period", "odometer_gain", "balise_gain")
 
-    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """``A x + B u``, with the Davis constant turned off smoothly below slip_floor."""
-        at_rest = np.clip(x[1] / p.slip_floor, -1.0, 1.0)
-        acceleration = (u.effort - p.davis_a * at_rest) / p.mass - _drag_slope(p) * x[1] + x[3]
-        return x[1] + x[2], acceleration, x[4], x[5], 0.0 * x[4], 0.0 * x[5]
+        speed = x.odometer_speed
+        at_rest = np.clip(speed / p.slip_floor, -1.0, 1.0)
+        acceleration = (u.effort - p.davis_a * at_rest) / p.mass - _drag_slope(p) * speed + x.disturbance
+        rates = (speed + x.slip_speed, acceleration, x.slip_speed_rate, x.disturbance_rate, 0.0, 0.0)
+        return named_as(self.estimator_states, rates)
 
-    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+    def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, ``v = y + d1``, adhesion force from the wheelset, and the innovation of the last balise."""
-        wheel_acceleration = self.estimator_flow(0.0, x, u, p)[1]
+        wheel_acceleration = self.estimator_flow(0.0, x, u, p)["odometer_speed"]
         adhesion = u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius**2 * wheel_acceleration
-        return Estimate(x[0], x[1] + x[2], adhesion, x[LAST_INNOVATION])
+        return Estimate(x.estimated_position, x.odometer_speed + x.slip_speed, adhesion, x.last_innovation)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Correction by a balise or by an odometer sample."""
         if event == "balise":
-            gain, innovation, last = p.balise_gain, x[0] - u.balise_position, x[0] - u.balise_position
-        else:
-            gain, innovation, last = p.odometer_gain, x[1] - u.odometer, x[LAST_INNOVATION]
-        return vector(*(x[i] - gain[i] * innovation for i in range(ORDER)), x[ORDER], last)
+            innovation = x.estimated_position - u.balise_position
+            return self._corrected(x, p.balise_gain, innovation) | {"last_innovation": innovation}
+        return self._corrected(x, p.odometer_gain, x.odometer_speed - u.odometer)
+
+    def _corrected(self, x: Any, gain: Array, innovation: Array) -> dict[str, Array]:
+        estimate = stacked_of(x, self.estimator_states)
+        return named_as(self.estimator_states, (estimate[i] - gain[i] * innovation for i in range(ORDER)))
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate over the products of per-sample updates with and without a balise."""

@@ -50,18 +50,18 @@ class DynamicGainCdo(HighGainTrainObserver):
             parameter("theta_rate", "1", RATE, "Rate of theta over its distance from the limit", min=0.0),
         )
 
-    def theta_in_force(self, x: Array, p: Any) -> Array:
+    def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain now [1/s]."""
-        return x[3]
+        return x.theta
 
-    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """The effort [N]."""
         return u.effort
 
-    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The gain settles."""
-        return (p.theta_rate * x[3] * (p.theta_limit - x[3]),)
+        return {"theta": p.theta_rate * x.theta * (p.theta_limit - x.theta)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, and the gain in force."""
         return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}

@@ -36,15 +36,11 @@ from fmu_observer.observers.train.held_odometer_presets import DRAG_SLOPES, HELD
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
-from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
 Missing = Literal["predicted", "held"]
-
-# own states: estimates and bounds, filtered slip, memory
-LEVEL, POSITION_BOUND = 4, 5
-HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, PREDICTING, LAST_INNOVATION, LAST_D, LAST_RATE = range(7, 15)
 
 REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
 PROOF = (
@@ -174,120 +170,127 @@ class HeldOdometerObserver(TrainObserver):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def scheduling_speed(self, x: Array) -> Array:
+    def scheduling_speed(self, x: Any) -> Array:
         """Speed z that the first gain is scheduled with [m/s]."""
 
     @abstractmethod
-    def largest_gain_level(self, x: Array, p: Any) -> Array:
+    def largest_gain_level(self, x: Any, p: Any) -> Array:
         """Level of the gain K in the norm of `lyapunov_matrix`, at most [1/s]."""
 
     @abstractmethod
-    def largest_gain_norm(self, x: Array, p: Any) -> Array:
+    def largest_gain_norm(self, x: Any, p: Any) -> Array:
         """Euclidean norm of the gain K, at most [1/s]."""
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the estimates, of the carried level, and of the position bound."""
-        speed, predicting = x[1], x[PREDICTING] > 0.0
-        residual = np.where(predicting, 0.0, x[HELD_SPEED] - speed)
+        speed, rate, predicting = x.estimated_speed, x.estimated_disturbance_rate, x.predicting > 0.0
+        residual = np.where(predicting, 0.0, x.held_speed - speed)
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
-        free = (traction - rolling_drag(speed, p)) / p.mass - x[2] + self._braking(x)  # what brakes: see friction
+        free = (traction - rolling_drag(speed, p)) / p.mass - x.estimated_disturbance
+        free = free + self._braking(x)  # what brakes: see friction
         acceleration = free + first_gain(self.scheduling_speed(x), p) * residual
         told = self.error_bound(t, x, p)
         # Without a reading it is the error itself that K is missing: (A) e = (A - K C) e + K C e.
         driving = np.where(predicting, told, self._since_reading(t, x, p))
         reading = self.largest_gain_level(x, p) * driving
-        decay = np.where(predicting, x[3] / p.rate_decay_time, 0.0)
+        decay = np.where(predicting, rate / p.rate_decay_time, 0.0)
         # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
         holding = np.maximum(self.friction(t, x, u, p)[0] - acceleration, 0.0)
         # At standstill d and d' leave their equations, too: the carried bound is not told there, nor carried on.
-        standing = stands(speed, x[HELD_SPEED], x[HELD_ERROR])
-        drifts = x[3] + p.gain[1] * residual, p.gain[2] * residual - decay
+        standing = stands(speed, x.held_speed, x.held_error)
+        drifts = rate + p.gain[1] * residual, p.gain[2] * residual - decay
         P = p.lyapunov_matrix
         own = np.sqrt(P[0]) * np.where(speed > 0.0, 0.0, holding) + np.sqrt(P[5]) * np.abs(decay)
-        return (
-            speed,
-            acceleration,
-            *held_disturbance(standing, *drifts, x[3], 1.0 / p.rate_decay_time),
-            reading + unknown_level(p) + own - p.bound_decay * x[LEVEL],
-            told,
-        )
+        drift, rate_drift = held_disturbance(standing, *drifts, rate, 1.0 / p.rate_decay_time)
+        return {
+            "estimated_position": speed,
+            "estimated_speed": acceleration,
+            "estimated_disturbance": drift,
+            "estimated_disturbance_rate": rate_drift,
+            "bound_level": reading + unknown_level(p) + own - p.bound_decay * x.bound_level,
+            "integrated_bound": told,
+        }
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Davis constant, brake, and a disturbance that brakes [m/s2], shape (1,)."""
         return super().friction(t, x, u, p) + self._braking(x)
 
-    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+    def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, speed, the effort in place of the adhesion force, and the innovation of the last balise."""
-        return Estimate(x[0], x[1], u.effort, x[LAST_INNOVATION])
+        return Estimate(x.estimated_position, x.estimated_speed, u.effort, x.last_innovation)
 
-    def own_bound(self, x: Array, p: Any) -> Array:
+    def own_bound(self, x: Any, p: Any) -> Array:
         """The bound of the position error [m]."""
-        return x[POSITION_BOUND]
+        return x.integrated_bound
 
-    def carried_bound(self, x: Array, p: Any) -> Array:
+    def carried_bound(self, x: Any, p: Any) -> Array:
         """The level as a bound of the speed error [m/s]."""
-        return first_component(p.lyapunov_matrix) * x[LEVEL]
+        return first_component(p.lyapunov_matrix) * x.bound_level
 
-    def error_bound(self, t: Array, x: Array, p: Any) -> Array:
+    def error_bound(self, t: Array, x: Any, p: Any) -> Array:
         """The lesser of the carried bound, where the train surely moves, and of the bound by the reading [m/s]."""
-        by_reading = np.abs(x[HELD_SPEED] - x[1]) + self._since_reading(t, x, p)
+        by_reading = np.abs(x.held_speed - x.estimated_speed) + self._since_reading(t, x, p)
         return np.where(self._moves(t, x, p) > 0.0, np.minimum(self.carried_bound(x, p), by_reading), by_reading)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate with its slip, disturbance, residual and bounds."""
         age, norm = self._age(t, x), self.largest_gain_norm(x, p)
         printed = improved_dmo_bound(
             age, p.published_sample_error, p.published_beta, p.published_decay, norm, p.acceleration_max
         )
         return super().output(t, x, u, p) | {
-            "disturbance": x[2],
-            "residual": x[HELD_SPEED] - x[1],
+            "disturbance": x.estimated_disturbance,
+            "residual": x.held_speed - x.estimated_speed,
             "error_bound": self.error_bound(t, x, p),
             "carried_bound": self.carried_bound(x, p),
             "error_as_printed": printed,
-            "position_bound": x[POSITION_BOUND],
+            "position_bound": x.integrated_bound,
             "sample_age": age,
         }
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A balise sets the position; a sample of the odometer that is no fault is held from now on."""
         if event == "balise":
-            kept = (x[i] for i in range(1, POSITION_BOUND))
-            rest = (x[i] for i in range(POSITION_BOUND + 1, LAST_INNOVATION))
-            accuracy = known_accuracy(u.balise_location_accuracy)
-            return vector(u.balise_position, *kept, accuracy, *rest, x[0] - u.balise_position, x[LAST_D], x[LAST_RATE])
-        first = 1.0 - x[STARTED]
+            return {
+                "estimated_position": u.balise_position,
+                "integrated_bound": known_accuracy(u.balise_location_accuracy),
+                "last_innovation": x.estimated_position - u.balise_position,
+            }
+        return self._sampled(t, x, u, p)
+
+    def _sampled(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What a sample of the odometer changes."""
+        first, speed = 1.0 - x.sampled_once, x.estimated_speed
+        d_now, rate_now = x.estimated_disturbance, x.estimated_disturbance_rate
         usable = np.where(u.odometer_fault > 0.5, 0.0, 1.0)
         taken = np.maximum(usable, first)
         # Without any reading the estimate stands for it, wrong by as much as is stated for the start.
-        reading = np.where(usable > 0.0, u.odometer, x[1])
+        reading = np.where(usable > 0.0, u.odometer, speed)
         wrong = np.where(usable > 0.0, p.odometer_error, p.start_speed_error)
-        box = (np.abs(x[2]) + p.disturbance_max, np.abs(x[3]) + p.disturbance_rate_max)
-        assumed = level_of_box(p.lyapunov_matrix, np.abs(reading - x[1]) + wrong, *box)
+        box = (np.abs(d_now) + p.disturbance_max, np.abs(rate_now) + p.disturbance_rate_max)
+        assumed = level_of_box(p.lyapunov_matrix, np.abs(reading - speed) + wrong, *box)
         carries = (1.0 - first) * self._moves(t, x, p)
-        known = np.where(carries > 0.0, np.minimum(x[LEVEL], assumed), assumed)
-        held = (reading, t, wrong, 1.0)
-        predicts = (1.0 - usable) if self.missing == "predicted" else 0.0 * usable
-        begins = predicts * x[STARTED] * (1.0 - x[PREDICTING])
-        d = np.where(begins > 0.0, np.clip(x[LAST_D], -p.disturbance_max, p.disturbance_max), x[2])
-        rate = np.where(begins > 0.0, np.clip(x[LAST_RATE], -p.disturbance_rate_max, p.disturbance_rate_max), x[3])
-        moved = level(p.lyapunov_matrix, 0.0, d - x[2], rate - x[3])
-        return vector(
-            x[0],
-            x[1],
-            d,
-            rate,
-            np.where(taken > 0.0, known, x[LEVEL] + moved),
-            np.where(first > 0.0, p.start_position_error, x[POSITION_BOUND]),
-            x[POSITION_BOUND + 1],
-            *(np.where(taken > 0.0, new, x[HELD_SPEED + i]) for i, new in enumerate(held)),
-            predicts,
-            x[LAST_INNOVATION],
-            np.where(usable > 0.0, d, x[LAST_D]),
-            np.where(usable > 0.0, rate, x[LAST_RATE]),
-        )
+        known = np.where(carries > 0.0, np.minimum(x.bound_level, assumed), assumed)
+        held = {"held_speed": reading, "held_time": t, "held_error": wrong, "sampled_once": 1.0}
+        predicts = (1.0 - usable) if self.missing == "predicted" else 0.0
+        begins = predicts * x.sampled_once * (1.0 - x.predicting)
+        last = np.clip(x.last_disturbance, -p.disturbance_max, p.disturbance_max)
+        last_rate = np.clip(x.last_disturbance_rate, -p.disturbance_rate_max, p.disturbance_rate_max)
+        d = np.where(begins > 0.0, last, d_now)
+        rate = np.where(begins > 0.0, last_rate, rate_now)
+        moved = level(p.lyapunov_matrix, 0.0, d - d_now, rate - rate_now)
+        return {
+            "estimated_disturbance": d,
+            "estimated_disturbance_rate": rate,
+            "bound_level": np.where(taken > 0.0, known, x.bound_level + moved),
+            "integrated_bound": np.where(first > 0.0, p.start_position_error, x.integrated_bound),
+            **{name: np.where(taken > 0.0, new, getattr(x, name)) for name, new in held.items()},
+            "predicting": predicts,
+            "last_disturbance": np.where(usable > 0.0, d, x.last_disturbance),
+            "last_disturbance_rate": np.where(usable > 0.0, rate, x.last_disturbance_rate),
+        }
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Bounds of the numbers that the bounds rest on, and the proof of the decay at both ends of the drag slopes."""
@@ -347,18 +350,18 @@ class HeldOdometerObserver(TrainObserver):
     # -- internals --------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def _braking(x: Array) -> Array:
+    def _braking(x: Any) -> Array:
         """The disturbance as far as it is dry friction [m/s2]: not where the wheel turns backwards, which it drives."""
-        return np.where(x[HELD_SPEED] < -x[HELD_ERROR], 0.0, np.maximum(x[2], 0.0))
+        return np.where(x.held_speed < -x.held_error, 0.0, np.maximum(x.estimated_disturbance, 0.0))
 
     @staticmethod
-    def _age(t: Array, x: Array) -> Array:
-        return np.maximum(t - x[HELD_TIME], 0.0)
+    def _age(t: Array, x: Any) -> Array:
+        return np.maximum(t - x.held_time, 0.0)
 
-    def _since_reading(self, t: Array, x: Array, p: Any) -> Array:
+    def _since_reading(self, t: Array, x: Any, p: Any) -> Array:
         """By how much the speed may differ from the held reading [m/s]."""
-        return x[HELD_ERROR] + p.acceleration_max * self._age(t, x)
+        return x.held_error + p.acceleration_max * self._age(t, x)
 
-    def _moves(self, t: Array, x: Array, p: Any) -> Array:
+    def _moves(self, t: Array, x: Any, p: Any) -> Array:
         """1 where the train cannot have stopped since the held reading."""
-        return np.where(x[HELD_SPEED] > p.bound_min_speed + self._since_reading(t, x, p), 1.0, 0.0)
+        return np.where(x.held_speed > p.bound_min_speed + self._since_reading(t, x, p), 1.0, 0.0)

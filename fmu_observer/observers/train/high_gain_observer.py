@@ -16,7 +16,7 @@ from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
-from plant_models.hybrid import Signal, parameter, vector
+from plant_models.hybrid import Signal, parameter
 from plant_models.hybrid.system import Array
 
 TOP_SPEED = 50.0  # [m/s], the range of speeds over which stability is certified
@@ -54,25 +54,25 @@ class HighGainTrainObserver(TrainObserver):
             parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2),
         )
 
-    def theta_in_force(self, x: Array, p: Any) -> Array:
+    def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain at balises [1/s]."""
         return getattr(p, self.theta_name)
 
     @abstractmethod
-    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """Adhesion force [N] from the first stage."""
 
-    @abstractmethod
-    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """Derivatives of the first-stage states."""
+    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the first-stage states by name."""
+        return {}
 
-    def acting_innovation(self, x: Array, p: Any) -> Array:
+    def acting_innovation(self, x: Any, p: Any) -> Array:
         """The innovation of the last balise as it acts now [m]."""
-        return x[2]
+        return x.balise_innovation
 
-    def innovation_flow(self, x: Array, p: Any) -> Array:
+    def innovation_flow(self, x: Any, p: Any) -> Array:
         """Derivative of the innovation state."""
-        return innovation_decay(self.theta_in_force(x, p), p.high_gain, x[2])
+        return innovation_decay(self.theta_in_force(x, p), p.high_gain, x.balise_innovation)
 
     def vertex_error(self, drift: Sequence[Sequence[float]], p: Any) -> GapError:
         """Error equations of position and speed between two balises, for one drag slope in `drift`, shape (2, 2)."""
@@ -83,24 +83,26 @@ class HighGainTrainObserver(TrainObserver):
         """Error equations at the smallest and the largest drag slope of the speed range."""
         return tuple(self.vertex_error([[0.0, 1.0], [0.0, -s]], p) for s in drag_slope_range(p, 0.0, TOP_SPEED))
 
-    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of position, speed, innovation and first stage."""
-        theta = self.theta_in_force(x, p)
-        speed = x[1]
+        theta, speed = self.theta_in_force(x, p), x.estimated_speed
         on_position, on_speed = correction(theta, p.high_gain, self.acting_innovation(x, p))
         traction = np.maximum(self.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
         acceleration = (traction - rolling_drag(speed, p)) / p.mass
-        moved = self.innovation_flow(x, p)
-        return (speed - on_position, acceleration - on_speed, moved, *self.first_stage_flow(x, u, p))
+        return {
+            POSITION.name: speed - on_position,
+            SPEED.name: acceleration - on_speed,
+            self.innovation_state.name: self.innovation_flow(x, p),
+        } | self.first_stage_flow(x, u, p)
 
-    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+    def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, speed, adhesion force and innovation."""
-        return Estimate(x[0], x[1], self.adhesion(x, u, p), self.acting_innovation(x, p))
+        adhesion, innovation = self.adhesion(x, u, p), self.acting_innovation(x, p)
+        return Estimate(x.estimated_position, x.estimated_speed, adhesion, innovation)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """At a balise the innovation is set anew; position and speed stay continuous."""
-        rest = [x[i] for i in range(3, self.own_count)]
-        return vector(x[0], x[1], x[0] - u.balise_position, *rest)
+        return {BALISE_INNOVATION.name: x.estimated_position - u.balise_position}
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """The largest theta that is certified.

@@ -10,10 +10,8 @@ from fmu_observer.certificates import Certificate, SampledError
 from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from fmu_observer.observers.train.wheel_stage import MultirateStage
-from plant_models.hybrid import vector
 from plant_models.hybrid.system import Array
 
-FIRST, END = 3, 6  # the first-stage states stand behind position, speed and balise innovation
 STAGE = MultirateStage()
 
 
@@ -48,21 +46,17 @@ class MultirateCdo(HighGainTrainObserver):
     }
     default_preset = "repaired"
 
-    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """``F_ad = -(J / r^2) x2`` [N]."""
-        return STAGE.adhesion(x[FIRST:END], u, p)
+        return STAGE.adhesion(x, u, p)
 
-    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The wheel observer: ``r w``, its deceleration by adhesion, and the decaying innovation."""
-        return STAGE.flow(x[FIRST:END], u, p)
+        return STAGE.flow(x, u, p)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A balise or an odometer sample sets its innovation anew."""
-        if event == "balise":
-            return super().update(event, t, x, u, p)
-        parts = [x[i] for i in range(self.own_count)]
-        parts[FIRST:END] = STAGE.sampled(x[FIRST:END], u)
-        return vector(*parts)
+        return super().update(event, t, x, u, p) if event == "balise" else STAGE.sampled(x, u)
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the balise stage, and the exact check of the wheel stage at its constant period."""

@@ -7,7 +7,7 @@ from typing import Any
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import WARN
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import input_signal, memory, output_signal, vector
+from plant_models.hybrid import input_signal, memory, output_signal
 from plant_models.hybrid.system import Array
 
 
@@ -22,6 +22,7 @@ class OdometerReset(GatedObserver):
     name = "odometer_reset"
     description = "Integrated odometer, reset at balises"
     source = "Aguiar Cota 2019, section 3.3.2"
+    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     gate_start = WARN
     weighing = "position"
@@ -34,18 +35,19 @@ class OdometerReset(GatedObserver):
     )
     events = (BALISE,)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The odometer's speed, shape (1,)."""
-        return vector(u.odometer + 0.0 * x[0])
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The odometer's speed."""
+        return {POSITION.name: u.odometer}
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The position is that of the balise."""
-        return vector(u.balise_position + 0.0 * x[0], x[0] - u.balise_position)
+        told = u.balise_position
+        return {POSITION.name: told, "last_innovation": x.estimated_position - told}
 
     def odometer_of(self, u: Any) -> Array:
         """The odometer [m/s]."""
         return u.odometer
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and innovation."""
-        return {"position": x[0], "speed": u.odometer, "innovation": x[1]}
+        return {"position": x.estimated_position, "speed": u.odometer, "innovation": x.last_innovation}

@@ -11,12 +11,10 @@ from fmu_observer.certificates import Certificate, SampledError, certify_sampled
 from fmu_observer.design.certified_gains import balise_family, certified_gains
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
-from plant_models.hybrid import memory, parameter, vector
+from plant_models.hybrid import memory, parameter
 from plant_models.hybrid.system import Array
 
 Premise = Literal["frozen", "live", "estimated"]
-
-WEIGHT = 4  # index of the frozen weight: behind position, speed, innovation and filtered slip
 
 PRINTED_GAINS = {  # (3.48), one value a vertex: lowest speed, highest speed
     "balise_gain_position": (9.9036, 9.9036),
@@ -103,15 +101,15 @@ class TakagiSugenoCdo(TrainObserver):
             )
         super().__init__(premise=premise)
 
-    def vertex_weight(self, x: Array, u: Any, p: Any) -> Array:
+    def vertex_weight(self, x: Any, u: Any, p: Any) -> Array:
         """Weight h_1 of the first vertex in use [1]."""
         if self.premise == "frozen":
-            return x[WEIGHT]
-        return self._weight_at(u.odometer if self.premise == "live" else x[1], p)
+            return x.vertex_weight
+        return self._weight_at(u.odometer if self.premise == "live" else x.estimated_speed, p)
 
-    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of position, speed and innovation."""
-        speed, innovation = x[1], x[2]
+        speed, innovation = x.estimated_speed, x.balise_innovation
         h = self.vertex_weight(x, u, p)
         vertex_speed = _blend(h, (p.premise_min, p.premise_max))
         odometer_error = speed - u.odometer
@@ -121,16 +119,20 @@ class TakagiSugenoCdo(TrainObserver):
         on_speed = _blend(h, p.balise_gain_speed) * innovation + _blend(h, p.odometer_gain_speed) * odometer_error
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
         acceleration = (traction - (p.davis_b + p.davis_c * vertex_speed) * speed) / p.mass
-        return speed - on_position, acceleration - on_speed, -p.innovation_decay * innovation
+        return {
+            POSITION.name: speed - on_position,
+            SPEED.name: acceleration - on_speed,
+            BALISE_INNOVATION.name: -p.innovation_decay * innovation,
+        }
 
-    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+    def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, speed, the effort in place of the adhesion force, and innovation."""
-        return Estimate(x[0], x[1], u.effort, x[2])
+        return Estimate(x.estimated_position, x.estimated_speed, u.effort, x.balise_innovation)
 
-    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """At a balise the innovation is set anew, and the weight is frozen at the odometer reading of that moment."""
-        weight = (self._weight_at(u.odometer, p),) if self.premise == "frozen" else ()
-        return vector(x[0], x[1], x[0] - u.balise_position, x[3], *weight)
+        weight = {"vertex_weight": self._weight_at(u.odometer, p)} if self.premise == "frozen" else {}
+        return {BALISE_INNOVATION.name: x.estimated_position - u.balise_position} | weight
 
     def premise_range(self, p: Any) -> tuple[str, float, float]:
         """Input or output that the weights depend on, and the speeds of the vertices [m/s], between which they are

@@ -64,7 +64,8 @@ class TrainObserver(GatedObserver, GapCertified):
     1. A subclass sets `estimator_states` (continuous), `estimator_memory`, `estimator_parameters` and
        `estimator_events`; the state is laid out as estimator states, filtered slip, memory, and the memory of the gate
        (`GatedObserver`).
-    2. It writes `estimator_flow` (derivatives of the estimator states), `estimate`, `update` and `error_certificate`.
+    2. It writes `estimator_flow` (derivatives of the estimator states by name), `estimate`, `update` and
+       `error_certificate`.
     3. `certify` answers whether the very gains in use are stable for balise gaps up to a given length.
     4. Where the speed is a state, the Davis constant and a negative adhesion force (a brake) are dry friction: they
        stop the observed train and hold it, and never push it backwards. For a speed above zero that is the thesis's
@@ -75,6 +76,7 @@ class TrainObserver(GatedObserver, GapCertified):
         options: of the observer, see its `option_choices`.
     """
 
+    by_name = True
     estimator_states: tuple[Signal, ...] = ()
     estimator_memory: tuple[Signal, ...] = ()
     estimator_parameters: tuple[Signal, ...] = ()
@@ -114,25 +116,25 @@ class TrainObserver(GatedObserver, GapCertified):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """Derivatives of the estimator states, one scalar each, in their order."""
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the estimator states by name."""
 
     @abstractmethod
-    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+    def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, speed, adhesion force and innovation."""
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of the estimator states and of the filtered slip, shape (nc,)."""
-        filtered = x[self.continuous_count - 1]
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the estimator states and of the filtered slip."""
         slip = odometer_slip(u.odometer, self.estimate(x, u, p).speed, p.slip_floor)
-        return vector(*self.estimator_flow(t, x, u, p), slip_filter_derivative(filtered, slip, p.slip_filter_time))
+        filtered = slip_filter_derivative(x.filtered_slip, slip, p.slip_filter_time)
+        return self.estimator_flow(t, x, u, p) | {FILTERED_SLIP.name: filtered}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate with its slip and indicator."""
         estimate = self.estimate(x, u, p)
-        filtered = x[self.continuous_count - 1]
+        filtered = x.filtered_slip
         return estimate._asdict() | {
             "rolls_back": rolls_back(u.odometer),
             "slip": odometer_slip(u.odometer, estimate.speed, p.slip_floor),
@@ -143,7 +145,7 @@ class TrainObserver(GatedObserver, GapCertified):
         """The odometer [m/s]."""
         return u.odometer
 
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Davis constant and brake as dry friction on the speed, ``(a + max(-F_ad, 0)) / M`` [m/s2], shape
         (len(frictions),).
         """

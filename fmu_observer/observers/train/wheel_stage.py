@@ -1,13 +1,14 @@
 """First stages of the cascades: the adhesion force from the applied effort and the odometer. They know the wheelset
 only.
 
-A stage reads its own slice ``z`` of an observer's state, so that any second stage can stand on it.
+A stage reads its own states of an observer's, so that any second stage can stand on it.
 """
 
 from __future__ import annotations
 
 from typing import Any, Protocol
 
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
 from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
 from plant_models.hybrid import PeriodicEvent, Signal, parameter, state
@@ -17,8 +18,8 @@ from plant_models.hybrid.system import Array
 class WheelStage(Protocol):
     """What a second stage needs of a first one.
 
-    1. `states` are laid out next to each other in the observer's state; their slice is ``z``.
-    2. `flow` returns one derivative for each, `sampled` their values after an odometer sample.
+    1. `states` are some of the observer's, which it is handed as ``x``.
+    2. `flow` returns the derivative of each by name, `sampled` what an odometer sample changes.
     3. `events` are the odometer samples it needs, if any.
     """
 
@@ -27,25 +28,25 @@ class WheelStage(Protocol):
     events: tuple[PeriodicEvent, ...]
     stability_parameters: tuple[str, ...]
 
-    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """Adhesion force [N].
 
         Args:
-            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
 
-    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the stage's states.
 
         Args:
-            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
 
-    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
-        """The stage's states after an odometer sample.
+    def sampled(self, x: Any, u: Any) -> dict[str, Array]:
+        """The states that an odometer sample changes.
 
         Args:
-            u: inputs, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
         """
 
 
@@ -67,33 +68,31 @@ class DifferentiatorStage:
     events: tuple[PeriodicEvent, ...] = ()
     stability_parameters: tuple[str, ...] = ()
 
-    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """``F_ad = effort - (J / r) Z1`` [N], (3.22).
 
         Args:
-            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
-        return u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius * z[4]
+        return u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius * x.wheel_acceleration
 
-    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The filtering differentiator of the wheel rate ``y / r``, (3.18).
 
         Args:
-            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
-        filters, rates = [z[0], z[1], z[2]], [z[3], z[4]]
-        dw, dz = filtering_differentiator_flow(
-            filters, rates, u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius
-        )
-        return (*dw, *dz)
+        z = stacked_of(x, self.states)
+        dw, dz = filtering_differentiator_flow(z[:3], z[3:], u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius)
+        return named_as(self.states, (*dw, *dz))
 
-    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+    def sampled(self, x: Any, u: Any) -> dict[str, Array]:
         """Nothing is sampled.
 
         Args:
-            u: inputs, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
         """
-        return tuple(z[i] for i in range(5))
+        return {}
 
 
 class MultirateStage:
@@ -118,31 +117,36 @@ class MultirateStage:
     )
     stability_parameters: tuple[str, ...] = ("theta_1", "wheel_high_gain", "odometer_period")
 
-    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """``F_ad = -(J / r^2) z2`` [N].
 
         Args:
-            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
-        return -p.n_axles * p.wheel_inertia / p.wheel_radius**2 * z[1]
+        return -p.n_axles * p.wheel_inertia / p.wheel_radius**2 * x.adhesion_deceleration
 
-    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+    def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """``r w``, its deceleration by adhesion, and the decaying innovation.
 
         Args:
-            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
-        on_speed, on_adhesion = correction(p.theta_1, p.wheel_high_gain, z[2])
+        innovation = x.odometer_innovation
+        on_speed, on_adhesion = correction(p.theta_1, p.wheel_high_gain, innovation)
         driven = p.wheel_radius**2 / (p.n_axles * p.wheel_inertia) * u.effort
-        return z[1] + driven - on_speed, -on_adhesion, innovation_decay(p.theta_1, p.wheel_high_gain, z[2])
+        return {
+            "wheel_speed_estimate": x.adhesion_deceleration + driven - on_speed,
+            "adhesion_deceleration": -on_adhesion,
+            "odometer_innovation": innovation_decay(p.theta_1, p.wheel_high_gain, innovation),
+        }
 
-    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+    def sampled(self, x: Any, u: Any) -> dict[str, Array]:
         """The innovation is set anew.
 
         Args:
-            u: inputs, as in `HybridSystem.flow`.
+            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
         """
-        return z[0], z[1], z[0] - u.odometer
+        return {"odometer_innovation": x.wheel_speed_estimate - u.odometer}
 
 
 WHEEL_STAGES: dict[str, type[DifferentiatorStage] | type[MultirateStage]] = {

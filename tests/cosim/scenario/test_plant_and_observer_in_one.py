@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import fmu_observer
 import plant_models
 from cosim import Scenario
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 
 OBSERVER = TakagiSugenoCdo()
 
@@ -24,16 +23,17 @@ class Mass(HybridSystem):
     name = "mass"
     description = "A mass on a rail"
     source = "this test"
+    by_name = True
     states = (state("travelled", "m"), state("rolling", "m/s", 10.0))
     inputs = (input_signal("effort", "N"),)
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
     parameters = (parameter("weight", "kg", 80e3, min=1.0), parameter("drag", "N.s/m", 900.0, min=0.0))
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], (u.effort - p.drag * x[1]) / p.weight)
+        return {"travelled": x.rolling, "rolling": (u.effort - p.drag * x.rolling) / p.weight}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "speed": x[1]}
+        return {"position": x.travelled, "speed": x.rolling}
 
 
 class Together(HybridSystem):
@@ -42,6 +42,7 @@ class Together(HybridSystem):
     name = "together"
     description = "A mass and its observer"
     source = "this test"
+    by_name = True
     states = (*Mass.states, *OBSERVER.states)
     inputs = OBSERVER.inputs
     outputs = (*Mass.outputs, output_signal("own_position", "m"), output_signal("own_speed", "m/s"))
@@ -55,17 +56,17 @@ class Together(HybridSystem):
         super().__init__()
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return np.hstack([Mass.flow(self, t, x[:2], u, p), OBSERVER.flow(t, x[2:], u, p)])
+        return Mass.flow(self, t, x, u, p) | OBSERVER.flow(t, x, u, p)
 
     def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return OBSERVER.friction(t, x[2:], u, p)
+        return OBSERVER.friction(t, x, u, p)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        own = SimpleNamespace(**OBSERVER.output(t, x[2:], u, p))
-        return {"position": x[0], "speed": x[1], "own_position": own.position, "own_speed": own.speed}
+        own = OBSERVER.output(t, x, u, p)
+        return Mass.output(self, t, x, u, p) | {"own_position": own["position"], "own_speed": own["speed"]}
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return np.hstack([x[:2], OBSERVER.jump(event, t, x[2:], u, p)])
+        return OBSERVER.jump(event, t, x, u, p)
 
 
 @pytest.mark.parametrize("algorithm", ["auto", "jacobi"])
