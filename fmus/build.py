@@ -32,7 +32,7 @@ FACES = {2: {"fmi2.c", "fmi2_prefix.h"}, 3: {"fmi3.c"}}
 
 
 @dataclass(frozen=True)
-class Plan:
+class BuildPlan:
     """What an FMU will be made of; all that decides its content except the compilers.
 
     Args:
@@ -69,7 +69,7 @@ class Plan:
 
 def plan_fmu(
     system: HybridSystem, fmi_version: FmiVersion = 3, preset: str | None = None, protocol: EventProtocol | None = None
-) -> Plan:
+) -> BuildPlan:
     """Trace and describe a system.
 
     Args:
@@ -85,7 +85,7 @@ def plan_fmu(
     check_names(system)
     equations = trace_equations(system)
     description = describe(system, fmi_version, preset=preset, protocol=protocol, model_exchange=can_exchange(system))
-    return Plan(system, equations, description, fmi_version, preset)
+    return BuildPlan(system, equations, description, fmi_version, preset)
 
 
 def build_fmu(
@@ -135,7 +135,7 @@ def fmu_path(system: HybridSystem, target: Path | str) -> Path:
 
 
 @dataclass(frozen=True)
-class Draft:
+class BuildDraft:
     """An FMU of which all but the libraries is written.
 
     Only `compile` may be called in another thread: CasADi is at work everywhere else.
@@ -145,13 +145,13 @@ class Draft:
         sources: C files and headers by name.
     """
 
-    plan: Plan
+    plan: BuildPlan
     targets: Sequence[Target]
     description: bytes
     sources: dict[str, bytes]
 
     @classmethod
-    def of(cls, plan: Plan, targets: Sequence[Target]) -> Draft:
+    def of(cls, plan: BuildPlan, targets: Sequence[Target]) -> BuildDraft:
         """Generate the text of an FMU.
 
         Raises:
@@ -192,7 +192,7 @@ class Draft:
         return pack_fmu(content, path)
 
 
-def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progress | None = None) -> Path:
+def write_fmu(plan: BuildPlan, targets: Sequence[Target], path: Path, progress: Progress | None = None) -> Path:
     """Carry out a plan: generate, compile, pack.
 
     Args:
@@ -202,7 +202,7 @@ def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progr
         TextRefusedError: a name or a description holds a character that XML forbids.
         CompilationError: a compiler refused the sources.
     """
-    draft = Draft.of(plan, targets)
+    draft = BuildDraft.of(plan, targets)
     return draft.pack(draft.compile(progress), path)
 
 

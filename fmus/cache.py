@@ -25,7 +25,7 @@ from plant_models.hybrid import HybridSystem
 
 if TYPE_CHECKING:
     from fmu_observer.description import FmiVersion
-    from fmus.build import Draft
+    from fmus.build import BuildDraft
 
 LOG = logging.getLogger("fmus")
 _known: WeakKeyDictionary[HybridSystem, dict[str, str]] = WeakKeyDictionary()
@@ -66,13 +66,13 @@ class CacheEntry:
     """
 
     path: Path
-    draft: Draft | None = None
+    draft: BuildDraft | None = None
 
     def pack(self, libraries: dict[Platform, bytes]) -> None:
         """Write the file, and the seal by which it is known to be whole.
 
         Args:
-            libraries: what `Draft.compile` returned.
+            libraries: what `BuildDraft.compile` returned.
 
         Raises:
             OSError: it cannot be written.
@@ -106,14 +106,14 @@ def cache_entry(
         path = _place(system, known)
         if is_sealed(path):
             return CacheEntry(path)
-    from fmus.build import Draft, plan_fmu  # noqa: PLC0415 - CasADi only for those who trace
+    from fmus.build import BuildDraft, plan_fmu  # noqa: PLC0415 - CasADi only for those who trace
     from fmus.content_key import content_key  # noqa: PLC0415
 
     plan = plan_fmu(system, fmi_version, preset, protocol)
     content = content_key(plan, targets)
     _keep_content(system, key, repr(request), content)
     path = _place(system, content)
-    return CacheEntry(path, None if _is_whole(path) else Draft.of(plan, targets))
+    return CacheEntry(path, None if _is_whole(path) else BuildDraft.of(plan, targets))
 
 
 def _is_whole(path: Path) -> bool:

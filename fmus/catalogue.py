@@ -44,7 +44,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogueEntry:
     """What is known of a model.
 
     Args:
@@ -61,7 +61,7 @@ class Entry:
     options: tuple[Option, ...]
 
 
-def catalogue() -> dict[str, Entry]:
+def catalogue() -> dict[str, CatalogueEntry]:
     """All models by name: plants first, then observers."""
     shipped = [name for registry in (PLANTS, OBSERVERS) for name in registry if registry.room(name)]
     others = [(registry, name) for registry in (PLANTS, OBSERVERS) for name in registry if not registry.room(name)]
@@ -70,14 +70,14 @@ def catalogue() -> dict[str, Entry]:
     return {name: known[name] for registry in (PLANTS, OBSERVERS) for name in registry}
 
 
-def by_room(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
+def by_room(entries: Iterable[CatalogueEntry]) -> dict[str, list[CatalogueEntry]]:
     """Entries grouped by the room of the house a model lives in; what this program registered comes last, and after
     it what cannot be used.
 
     Args:
         entries: of the catalogue.
     """
-    rooms: dict[str, list[Entry]] = {}
+    rooms: dict[str, list[CatalogueEntry]] = {}
     for entry in entries:
         rooms.setdefault(entry.room, []).append(entry)
     return dict(sorted(rooms.items(), key=lambda item: (item[0] == UNUSABLE, item[0].startswith("Registered by"))))
@@ -90,18 +90,18 @@ def _read(names: Iterable[str]) -> list[dict[str, Any]]:
     return [recipe_entry(name) for name in names]
 
 
-def _entry_of_others(registry: Registry[Any], name: str) -> Entry:
+def _entry_of_others(registry: Registry[Any], name: str) -> CatalogueEntry:
     """An entry that does not ship; where its code fails, the reason is its description."""
     try:
         return _entry(_read([name])[0])
     except Exception as error:  # whatever the code of others raises
         reason = str(error) if isinstance(error, RegistryError) else f"{registry.origin(name)}: {explained(error)}"
-        return Entry(name, UNUSABLE, " ".join(reason.split()), "", (), None, ())
+        return CatalogueEntry(name, UNUSABLE, " ".join(reason.split()), "", (), None, ())
 
 
-def _entry(data: dict[str, Any]) -> Entry:
+def _entry(data: dict[str, Any]) -> CatalogueEntry:
     options = tuple(Option(**option) for option in data["options"])
-    return Entry(**data | {"presets": tuple(data["presets"]), "options": options})
+    return CatalogueEntry(**data | {"presets": tuple(data["presets"]), "options": options})
 
 
 def _key(names: list[str]) -> str:

@@ -11,11 +11,11 @@ from importlib.resources import files
 
 import casadi as ca
 
-from fmus.build import Plan, runtime_sources, standard_headers
+from fmus.build import BuildPlan, runtime_sources, standard_headers
 from fmus.toolchain.targets import Target
 
 
-def content_key(plan: Plan, targets: Sequence[Target]) -> str:
+def content_key(plan: BuildPlan, targets: Sequence[Target]) -> str:
     """Digest of all that decides the bytes of an FMU. The equations go in as CasADi's graph, of which the C follows.
 
     Args:

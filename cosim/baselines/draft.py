@@ -33,7 +33,7 @@ EVENT_DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Draft:
+class BaselineDraft:
     """A baseline before it is written.
 
     Args:
@@ -53,7 +53,7 @@ def make_draft(
     recipe: Recipe | None = None,
     signals: Iterable[str] | None = None,
     every: float | None = None,
-) -> Draft:
+) -> BaselineDraft:
     """A baseline of a result.
 
     Args:
@@ -90,7 +90,7 @@ def make_draft(
         versions=versions_of(result),
         version=VERSION,
     )
-    return Draft(header, table, events)
+    return BaselineDraft(header, table, events)
 
 
 def resolved(tolerances: Tolerances, names: Sequence[str]) -> Tolerances:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from cosim.baselines.baseline import Baseline, Header
 from cosim.baselines.data import header_data, header_from, is_newer
-from cosim.baselines.draft import Draft, make_draft, text_digest
+from cosim.baselines.draft import BaselineDraft, make_draft, text_digest
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.tables import parse_events, parse_table
 from cosim.comparison.tolerance import Tolerances
@@ -81,7 +81,7 @@ def write_baseline(
     return write_draft(make_draft(result, tolerances, recipe=recipe, signals=signals, every=every), path)
 
 
-def write_draft(draft: Draft, path: str | Path) -> Change:
+def write_draft(draft: BaselineDraft, path: str | Path) -> Change:
     """Write a draft, see `write_baseline`.
 
     Args:
@@ -95,7 +95,7 @@ def write_draft(draft: Draft, path: str | Path) -> Change:
     return change
 
 
-def draft_texts(draft: Draft, path: Path) -> dict[str, str]:
+def draft_texts(draft: BaselineDraft, path: Path) -> dict[str, str]:
     """What each file of a baseline at `path` is to hold.
 
     Args:
@@ -152,7 +152,7 @@ def demand_free(path: Path) -> None:
             )
 
 
-def change_by(draft: Draft, path: Path) -> Change:
+def change_by(draft: BaselineDraft, path: Path) -> Change:
     """What writing a draft would do. Other versions alone are no change: nothing else is to be seen in them.
 
     Args:

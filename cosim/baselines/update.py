@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cosim.baselines.baseline import Baseline
 from cosim.baselines.check import Regression, check
-from cosim.baselines.draft import Draft, make_draft
+from cosim.baselines.draft import BaselineDraft, make_draft
 from cosim.baselines.files import Change, change_by, draft_texts, read_baseline, summary_of
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.tables import parse_events, parse_table
@@ -74,7 +74,7 @@ def plan_update(
         if before is not None and _may_stay(before, former, draft):
             header = former.header
             kept = replace(draft.header, rows=header.rows, events=header.events, digest=header.digest)
-            draft = Draft(kept, _text(path, ".csv"), _text(path, ".events.csv"))
+            draft = BaselineDraft(kept, _text(path, ".csv"), _text(path, ".events.csv"))
     change = change_by(draft, path)
     texts = draft_texts(draft, path) if change != "unchanged" else {}
     return Update(change, texts, check(result, _as_baseline(draft, path)), before, notes)
@@ -89,7 +89,7 @@ def _former(path: Path) -> tuple[Baseline | None, list[str]]:
         return None, [f"The former one could not be read: {error}"]
 
 
-def _may_stay(before: Comparison, former: Baseline, draft: Draft) -> bool:
+def _may_stay(before: Comparison, former: Baseline, draft: BaselineDraft) -> bool:
     """Whether the former rows still tell what the new ones would."""
     same = all(getattr(former.header, key) == getattr(draft.header, key) for key in ("tolerances", "every", "span"))
     names = [info.name for info in former.header.signals] == [info.name for info in draft.header.signals]
@@ -108,7 +108,7 @@ def _sound_draft(
     recipe: Recipe | None,
     signals: Iterable[str] | None,
     every: float | None,
-) -> Draft:
+) -> BaselineDraft:
     """A draft that the result itself passes."""
     draft = make_draft(result, tolerances, recipe=recipe, signals=signals, every=every)
     found = check(result, _as_baseline(draft, path))
@@ -118,7 +118,7 @@ def _sound_draft(
     raise BaselineError(f"The run does not pass against its own baseline, so it cannot be kept as one: {worst}")
 
 
-def _as_baseline(draft: Draft, path: Path) -> Baseline:
+def _as_baseline(draft: BaselineDraft, path: Path) -> Baseline:
     """A draft as it will be read back."""
     header = draft.header
     table, events = parse_table(draft.table, header, path), parse_events(draft.events, header, path)

@@ -11,7 +11,7 @@ from cosim import ssp
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
 from fmu_observer import OBSERVERS
-from fmus.catalogue import Entry, by_room
+from fmus.catalogue import CatalogueEntry, by_room
 from fmus.catalogue import catalogue as models
 from fmus.text_table import text_table
 from plant_models import PLANTS
@@ -59,7 +59,7 @@ def execute(options: argparse.Namespace) -> int:
     return 0
 
 
-def _rooms(kind: str, entries: Mapping[str, Any], known: Mapping[str, Entry]) -> dict[str, list[str]]:
+def _rooms(kind: str, entries: Mapping[str, Any], known: Mapping[str, CatalogueEntry]) -> dict[str, list[str]]:
     """Names by the room they live in; scenarios live in none."""
     if kind == "scenarios":
         return {"": list(entries)}
@@ -67,7 +67,7 @@ def _rooms(kind: str, entries: Mapping[str, Any], known: Mapping[str, Entry]) ->
     return {room: [entry.name for entry in members] for room, members in by_room(chosen).items()}
 
 
-def _details(entry: Mapping[str, Any], model: Entry | None) -> list[str]:
+def _details(entry: Mapping[str, Any], model: CatalogueEntry | None) -> list[str]:
     """Source, presets and options of a model, a line each; of a scenario its source."""
     lines = [f"[{entry['source']}]"] if entry["source"] else []
     if model is None or "presets" not in entry:
@@ -99,7 +99,7 @@ def _execute_package(options: argparse.Namespace) -> int:
     return 0
 
 
-def catalogue(known: Mapping[str, Entry]) -> dict[str, dict[str, dict[str, Any]]]:
+def catalogue(known: Mapping[str, CatalogueEntry]) -> dict[str, dict[str, dict[str, Any]]]:
     """Everything that ships, as plain data.
 
     Args:
@@ -112,7 +112,7 @@ def catalogue(known: Mapping[str, Entry]) -> dict[str, dict[str, dict[str, Any]]
     return {"scenarios": scenarios, "models": _systems(PLANTS, known), "observers": _systems(OBSERVERS, known)}
 
 
-def _systems(registry: Iterable[str], known: Mapping[str, Entry]) -> dict[str, dict[str, Any]]:
+def _systems(registry: Iterable[str], known: Mapping[str, CatalogueEntry]) -> dict[str, dict[str, Any]]:
     return {
         name: {
             "description": " ".join(known[name].description.split()),

@@ -16,7 +16,7 @@ from cosim.comparison.packets import compare_packets
 from cosim.comparison.signal import Task, compare_signal
 from cosim.comparison.telegrams import compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
-from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
 from cosim.errors import ComparisonError
 from cosim.results.load import load_result
 from cosim.results.result import Result, SignalInfo
@@ -198,5 +198,5 @@ class _Pair:
     def _other_unit(self, name: str, one: str, two: str, why: str) -> SignalComparison:
         text = f"{name}: the result is in {two or '1'}, the reference in {one or '1'}; not compared: {why}"
         begin, end, nan = float(self.times[0][0]), float(self.times[0][-1]), float("nan")
-        finding = Finding("unit", begin, end, nan, nan, float("inf"), 0.0, text)
+        finding = ComparisonFinding("unit", begin, end, nan, nan, float("inf"), 0.0, text)
         return SignalComparison(name, one, "differs", self.tolerances.for_signal(name), findings=[finding])

@@ -47,7 +47,7 @@ Pair = tuple[Event, Event]
 
 
 @dataclass(frozen=True)
-class Limits:
+class EventLimits:
     """What two events may differ by: `time` [s], and `payload` by field in its unit."""
 
     time: float
@@ -72,7 +72,7 @@ def compare_events(
     return EventComparison(len(pairs), differences, shift)
 
 
-def event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float) -> Limits:
+def event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float) -> EventLimits:
     """What events may differ by from those of a reference of `length` [s].
 
     Args:
@@ -89,7 +89,7 @@ def event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float
         values = [v for v in all_values if isfinite(v)]
         spread = max(values) - min(values) if values else 0.0
         payload[name] = tolerance.value_for(spread or max(map(abs, values), default=0.0))
-    return Limits(tolerance.time_for(length), payload)
+    return EventLimits(tolerance.time_for(length), payload)
 
 
 def _match(
@@ -135,7 +135,7 @@ def _assign(one: list[Event], two: list[Event]) -> tuple[list[Pair], list[Event]
     return pairs, left, right
 
 
-def _differences(one: Event, two: Event, limits: Limits) -> list[EventDifference]:
+def _differences(one: Event, two: Event, limits: EventLimits) -> list[EventDifference]:
     times = [text for what in one.times if (text := _time_text(what, one.times[what], two.times[what], limits.time))]
     told = [name for name in one.payload if name in two.payload]
     contents = [text for name in told if (text := _payload_text(name, one, two, limits.payload[name]))]

@@ -7,14 +7,14 @@ import numpy as np
 from cosim.comparison.jumps import Jumps
 from cosim.comparison.points import Allowed, MatchedJumps, Points, outside_between
 from cosim.comparison.span import rounding
-from cosim.comparison.verdict import Finding, Kind
+from cosim.comparison.verdict import ComparisonFinding, Kind
 
 MOST_RUNS = (
     20  # runs of points outside the tube that are told one by one; more of them are joined over the gaps between
 )
 
 
-def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[Finding]:
+def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[ComparisonFinding]:
     """Runs of points outside the tube, each with its worst point.
 
     Args:
@@ -34,7 +34,7 @@ def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> li
     return found
 
 
-def number_findings(name: str, points: Points) -> list[Finding]:
+def number_findings(name: str, points: Points) -> list[ComparisonFinding]:
     """Runs of points where one side holds a number and the other none.
 
     Args:
@@ -47,11 +47,13 @@ def number_findings(name: str, points: Points) -> list[Finding]:
         values = float(points.reference[a]), float(points.result[a])
         size = float(np.count_nonzero(points.no_number[a:b]))
         text = f"{name}: {_when(begin, end)} {_kind_of_number(points, a)} ({size:.0f} points)"
-        found.append(Finding("nan", begin, end, *values, size, 0.0, text))
+        found.append(ComparisonFinding("nan", begin, end, *values, size, 0.0, text))
     return found
 
 
-def jump_findings(name: str, unit: str, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[Finding]:
+def jump_findings(
+    name: str, unit: str, points: Points, jumps: MatchedJumps, allowed: Allowed
+) -> list[ComparisonFinding]:
     """Jumps that are early or late, and jumps that one side has alone and that the values confirm.
 
     Args:
@@ -79,7 +81,7 @@ def with_unit(value: float, unit: str) -> str:
 
 def _value_finding(
     name: str, unit: str, points: Points, ends: tuple[int, int], worst: int, count: int, allowed: Allowed
-) -> Finding:
+) -> ComparisonFinding:
     begin, end, at = (float(points.time[row]) for row in (*ends, worst))
     error = float(points.error[worst])
     side = f"{with_unit(abs(error), unit)} too {'high' if error > 0.0 else 'low'}"
@@ -88,7 +90,7 @@ def _value_finding(
     if ends[1] > ends[0]:
         where = f"{count} points outside the tube, at worst {side} at {at:.9g} s {limit}"
     text = f"{name}: {_when(begin, end)} {where}"
-    return Finding(
+    return ComparisonFinding(
         "value",
         begin,
         end,
@@ -101,7 +103,7 @@ def _value_finding(
     )
 
 
-def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed) -> list[Finding]:
+def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
     size = np.abs(jumps.shift)
     slack = rounding(*jumps.reference.end[-1:], *jumps.reference.begin[:1], 0.0)
     found = []
@@ -117,11 +119,15 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
             text = f"{name}: {span} {b - a} jumps at other instants, at worst {amount} at {one:.9g} s"
         last = float(max(jumps.reference.end[b - 1], jumps.result.end[b - 1]))
         begin = float(min(jumps.reference.end[a], jumps.result.end[a]))
-        found.append(Finding("jump_time", begin, last, one, two, float(size[worst]), allowed.time, text, min(one, two)))
+        found.append(
+            ComparisonFinding("jump_time", begin, last, one, two, float(size[worst]), allowed.time, text, min(one, two))
+        )
     return found
 
 
-def _lone_findings(name: str, unit: str, kind: Kind, jumps: Jumps, points: Points, allowed: Allowed) -> list[Finding]:
+def _lone_findings(
+    name: str, unit: str, kind: Kind, jumps: Jumps, points: Points, allowed: Allowed
+) -> list[ComparisonFinding]:
     if not len(jumps):
         return []
     # One that is hardly larger than allowed may be a little smaller on the other side, and none there; one whose points
@@ -141,7 +147,7 @@ def _lone_findings(name: str, unit: str, kind: Kind, jumps: Jumps, points: Point
             text = f"{name}: {span} {b - a} jumps are {whose}, the largest {step}"
         values = (after, np.nan) if kind == "jump_missing" else (np.nan, after)
         begin, end, at = (float(jumps.end[row]) for row in (a, b - 1, worst))
-        found.append(Finding(kind, begin, end, *values, float(size[worst - a]), allowed.value, text, at))
+        found.append(ComparisonFinding(kind, begin, end, *values, float(size[worst - a]), allowed.value, text, at))
     return found
 
 

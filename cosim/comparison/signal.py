@@ -12,7 +12,7 @@ from cosim.comparison.points import Allowed, MatchedJumps, Points, compare_point
 from cosim.comparison.span import gap_findings, rounding, span_findings
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.tube import band_of
-from cosim.comparison.verdict import Curves, Finding, SignalComparison
+from cosim.comparison.verdict import ComparisonFinding, Curves, SignalComparison
 
 WORST = 5  # points that are kept
 WINDOW_STEPS, WINDOW_SHARE, WINDOW_TOLERANCES = 20.0, 0.01, 10.0  # how far off a jump is looked for
@@ -109,7 +109,7 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
     )
 
 
-def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[Finding]:
+def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
     found = span_findings(task.name, task.reference, task.result, allowed.time)
     found += number_findings(task.name, points)
     found += jump_findings(task.name, task.unit, points, jumps, allowed)
@@ -133,7 +133,9 @@ def _rms(points: Points, judged: np.ndarray) -> float:
     return largest * float(np.sqrt(np.sum(0.5 * (square[1:] + square[:-1]) * duration) / total))
 
 
-def _worst(points: Points, findings: list[Finding], at: int | None) -> list[tuple[float, float, float, float]]:
+def _worst(
+    points: Points, findings: list[ComparisonFinding], at: int | None
+) -> list[tuple[float, float, float, float]]:
     """The worst point of each run of points outside, or the worst of all where none is."""
     if at is None:
         return []

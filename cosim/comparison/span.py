@@ -6,12 +6,12 @@ import numpy as np
 
 from cosim.comparison.curve import Curve
 from cosim.comparison.tube import band_of
-from cosim.comparison.verdict import Finding, Kind
+from cosim.comparison.verdict import ComparisonFinding, Kind
 
 GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
 
 
-def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[Finding]:
+def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
     """Starts and ends that are further apart than the allowed time [s].
 
     Args:
@@ -33,12 +33,16 @@ def span_findings(name: str, reference: Curve, result: Curve, allowed: float) ->
                 f"{'later' if two > one else 'earlier'}"
             )
             found.append(
-                Finding(late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text)
+                ComparisonFinding(
+                    late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text
+                )
             )
     return found
 
 
-def gap_findings(name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float) -> list[Finding]:
+def gap_findings(
+    name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float
+) -> list[ComparisonFinding]:
     """Intervals in which one side has no rows where the other has many that are not on the straight line over the
     gap.
 
@@ -59,7 +63,9 @@ def gap_findings(name: str, reference: Curve, result: Curve, allowed: float, all
             off = float(np.max(np.maximum(values - band.high, band.low - values)))
             if off > allowed:
                 text = f"{name}: the {who} has no rows from {begin:.9g} to {end:.9g} s, the other has {b - a} there"
-                found.append(Finding("gap", begin, end, np.nan, np.nan, end - begin, GAP_STEPS * lacking.step, text))
+                found.append(
+                    ComparisonFinding("gap", begin, end, np.nan, np.nan, end - begin, GAP_STEPS * lacking.step, text)
+                )
     return found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cosim.comparison.events import Event, Limits, compare_events, event_limits
+from cosim.comparison.events import Event, EventLimits, compare_events, event_limits
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.verdict import EventComparison
 from cosim.results.result import BaliseRecord, Result
@@ -37,7 +37,7 @@ def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, l
     return compare_events(ours, theirs, tolerance, length)
 
 
-def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, length: float) -> Limits:
+def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, length: float) -> EventLimits:
     """What telegrams may differ by from those of a reference of `length` [s].
 
     Args:

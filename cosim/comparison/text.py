@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import isnan
 
-from cosim.comparison.verdict import Comparison, EventComparison, Finding, SignalComparison
+from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
 from fmus.text_table import text_table
 
 HEAD = ("signal", "unit", "max error", "at [s]", "allowed", "shift [s]", "outside", "verdict")
@@ -57,7 +57,7 @@ def _shared(comparison: Comparison) -> dict[str, int]:
     return {text: count for text, count in counts.items() if count == len(both) > 1}
 
 
-def _own(signal: SignalComparison, shared: Mapping[str, int]) -> list[Finding]:
+def _own(signal: SignalComparison, shared: Mapping[str, int]) -> list[ComparisonFinding]:
     return [finding for finding in signal.findings if finding.text.removeprefix(signal.name + ": ") not in shared]
 
 

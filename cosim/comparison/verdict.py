@@ -33,7 +33,7 @@ result.
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ComparisonFinding:
     """One way in which a signal differs.
 
     Args:
@@ -112,7 +112,7 @@ class SignalComparison:
     rms_error: float = float("nan")
     share_outside: float = 0.0
     worst: Sequence[tuple[float, float, float, float]] = ()
-    findings: Sequence[Finding] = ()
+    findings: Sequence[ComparisonFinding] = ()
     nearest: Sequence[str] = ()
     curves: Curves | None = None
 

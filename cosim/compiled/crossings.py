@@ -15,7 +15,7 @@ from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.localiser import ACCELERATION_LIMIT
 from cosim.balises.rollback import RollbackLocaliser
 from cosim.balises.service import BaliseService
-from cosim.compiled.journal import Call
+from cosim.compiled.journal import StepperCall
 from cosim.compiled.notifying import CompiledDelivery
 from cosim.compiled.program import CPassed, Program
 from cosim.coupling.plan import Plan
@@ -120,9 +120,9 @@ class Crossings:
             head.accuracies = keep(np.array([balise.location_accuracy for balise in layout.balises]))
         if self._possible:
             for name, call in (
-                ("save_state", Call.SAVE),
-                ("restore_state", Call.RESTORE),
-                ("release_state", Call.RELEASE),
+                ("save_state", StepperCall.SAVE),
+                ("restore_state", StepperCall.RESTORE),
+                ("release_state", StepperCall.RELEASE),
             ):
                 setattr(head, name, program.function(watch.component, str(call.function(watch.component.fmi_version))))
         head.odometer = -1 if self.service.odometer is None else self.service.odometer

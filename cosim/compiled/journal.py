@@ -21,7 +21,7 @@ CALLS_OF_EVENT = 12
 FMI2, FMI3 = 2, 3
 
 
-class Call(IntEnum):
+class StepperCall(IntEnum):
     """Functions in a journal."""
 
     SET = 0
@@ -43,23 +43,23 @@ class Call(IntEnum):
         Args:
             version: of FMI.
         """
-        if self in (Call.SET, Call.GET):
+        if self in (StepperCall.SET, StepperCall.GET):
             return None
-        if self is Call.STEP:
+        if self is StepperCall.STEP:
             return f"fmi{version}DoStep"
         return NAMES[self] if version == FMI3 else NAMES[self].replace("fmi3", "fmi2").replace("FMUState", "FMUstate")
 
 
 NAMES = {
-    Call.ENTER_EVENT: "fmi3EnterEventMode",
-    Call.SET_CLOCK: "fmi3SetClock",
-    Call.SET_REALS: "fmi3SetFloat64",
-    Call.UPDATE: "fmi3UpdateDiscreteStates",
-    Call.ENTER_STEP: "fmi3EnterStepMode",
-    Call.COUNT: "fmi3GetInt32",
-    Call.SAVE: "fmi3GetFMUState",
-    Call.RESTORE: "fmi3SetFMUState",
-    Call.RELEASE: "fmi3FreeFMUState",
+    StepperCall.ENTER_EVENT: "fmi3EnterEventMode",
+    StepperCall.SET_CLOCK: "fmi3SetClock",
+    StepperCall.SET_REALS: "fmi3SetFloat64",
+    StepperCall.UPDATE: "fmi3UpdateDiscreteStates",
+    StepperCall.ENTER_STEP: "fmi3EnterStepMode",
+    StepperCall.COUNT: "fmi3GetInt32",
+    StepperCall.SAVE: "fmi3GetFMUState",
+    StepperCall.RESTORE: "fmi3SetFMUState",
+    StepperCall.RELEASE: "fmi3FreeFMUState",
 }
 
 
@@ -76,7 +76,7 @@ class CNote(ctypes.Structure):
 
 
 class CJournal(ctypes.Structure):
-    """`Journal`."""
+    """`StepperJournal`."""
 
     _fields_ = (
         ("on", ctypes.c_int64),
@@ -87,7 +87,7 @@ class CJournal(ctypes.Structure):
     )
 
 
-class Journal:
+class StepperJournal:
     """Room for the calls of one step.
 
     Args:
@@ -100,24 +100,24 @@ class Journal:
         self._bytes = np.zeros(STEPS_AT_MOST * (values + 64), dtype=np.uint8)
         head.notes, head.bytes = ctypes.cast(self._notes, ctypes.POINTER(CNote)), self._bytes.ctypes.data
 
-    def read(self, versions: Sequence[int]) -> Iterator[tuple[int, Call, int, Answer]]:
+    def read(self, versions: Sequence[int]) -> Iterator[tuple[int, StepperCall, int, Answer]]:
         """Place of the slave, function, port, answer; in the order of the calls.
 
         Args:
             versions: of FMI, of each slave.
         """
         for note in self._notes[: self._head.count]:
-            yield note.slave, Call(note.call), note.port, self._answer(note, versions[note.slave])
+            yield note.slave, StepperCall(note.call), note.port, self._answer(note, versions[note.slave])
 
     def _answer(self, note: CNote, version: int) -> Answer:
-        call = Call(note.call)
-        if call is Call.STEP and version == FMI3:
+        call = StepperCall(note.call)
+        if call is StepperCall.STEP and version == FMI3:
             event, terminate, early = (bool(flag) for flag in note.flags[:3])
             return Answer(note.status, (event, terminate, early, note.number))
-        if call is Call.UPDATE:
+        if call is StepperCall.UPDATE:
             return Answer(note.status, (*(bool(flag) for flag in note.flags), note.number))
-        if call is Call.SAVE:
+        if call is StepperCall.SAVE:
             return Answer(note.status, (note.state,))
-        if call in (Call.GET, Call.COUNT):
+        if call in (StepperCall.GET, StepperCall.COUNT):
             return Answer(note.status, values=self._bytes[note.first : note.first + note.bytes].tobytes())
         return Answer(note.status)

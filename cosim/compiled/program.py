@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.compiled.journal import Call, CJournal, Journal
+from cosim.compiled.journal import CJournal, StepperCall, StepperJournal
 from cosim.compiled.recorded_returns import Answer
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
@@ -183,7 +183,7 @@ class Program:
         self.count_rows_at(None, 0)
         self._versions = [step.component.fmi_version for step in plan.steps]
         calls = [len(writes) + len(reads) + 1 for writes, reads in zip(self.writes, self.reads, strict=True)]
-        self.journal = Journal(
+        self.journal = StepperJournal(
             self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s))
         )
 
@@ -260,7 +260,9 @@ class Program:
         said: dict[int, dict[str, list[Answer]]] = {}
         for place, call, port, answer in self.journal.read(self._versions):
             name = call.function(self._versions[place])
-            name = {Call.SET: self.writes, Call.GET: self.reads}[call][place][port] if name is None else name
+            name = (
+                {StepperCall.SET: self.writes, StepperCall.GET: self.reads}[call][place][port] if name is None else name
+            )
             said.setdefault(place, {}).setdefault(name, []).append(answer)
         return said
 

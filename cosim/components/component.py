@@ -15,7 +15,7 @@ import numpy as np
 from fmpy.model_description import ModelDescription
 
 from cosim.components.derivatives import demand_derivatives, make_derivative_writer
-from cosim.components.described import Described
+from cosim.components.described import DescribedComponent
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
@@ -34,7 +34,7 @@ MISSED_VARIABLES = {MISSED_SAMPLES: MISSED_SAMPLES}
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 
 
-class Component(Described, Slave):
+class Component(DescribedComponent, Slave):
     """One stepped thing, from instantiation to the end.
 
     The life: `configure`, `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn,

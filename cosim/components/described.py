@@ -19,7 +19,7 @@ from fmus.fmi.units import Units
 from plant_models.hybrid.units import Unit, UnitError
 
 
-class Described(fmi.Described):
+class DescribedComponent(fmi.Described):
     """A component before anything of it runs. Elements of arrays are named ``x[1]``, ``m[2,3]``."""
 
     source: str

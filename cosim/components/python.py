@@ -14,7 +14,7 @@ import numpy as np
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 
 from cosim.components.fmi3 import FMI3Component
-from cosim.components.python_model import UNKNOWN_UNIT, Inputs, PythonModel, slices
+from cosim.components.python_model import UNKNOWN_UNIT, NamedInputs, PythonModel, slices
 from cosim.components.start_values import StartValue
 from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from plant_models.hybrid.signal import Signal
@@ -24,7 +24,7 @@ NO_TIME = float("nan")
 
 
 @dataclass
-class Counters:
+class EventCounters:
     """What became of the telegrams.
 
     Args:
@@ -45,7 +45,7 @@ class PythonSlave:
     def __init__(self, model: PythonModel) -> None:
         self.model = model
         self.component = self
-        self.counters = Counters()
+        self.counters = EventCounters()
         self._inputs, self._parameters = slices(model.inputs), slices(model.parameter_signals)
         fields = [name for name in model.telegram or () if name != "stamp"]
         telegram = [Signal(f"{EVENT}_{name}", UNKNOWN_UNIT, "input", "discrete") for name in fields]
@@ -101,7 +101,7 @@ class PythonSlave:
 
     def reset(self) -> None:
         """Back to before initialisation."""
-        self._made, self._time, self._told, self.counters = None, NO_TIME, False, Counters()
+        self._made, self._time, self._told, self.counters = None, NO_TIME, False, EventCounters()
 
     def enterInitializationMode(self, startTime: float = 0.0, stopTime: float | None = None, **_: Any) -> None:
         """Make the object with its parameters; its attributes are the first outputs.
@@ -133,7 +133,7 @@ class PythonSlave:
         Args:
             t: time [s]. h: length of the step [s].
         """
-        inputs = Inputs()
+        inputs = NamedInputs()
         for signal in self.model.inputs:
             values = self._values[self._inputs[signal.name]]
             inputs[signal.name] = float(values[0]) if signal.size is None else values.copy()

@@ -33,7 +33,7 @@ class PythonModelError(RuntimeError):
     """The object raised, or gave something that cannot be; the message names the call and the signal."""
 
 
-class Inputs(dict[str, Any]):
+class NamedInputs(dict[str, Any]):
     """Values of the inputs by name, ``inputs["odometer"]`` or ``inputs.odometer``: a number, or an array of shape (n,)
     for a vector.
     """
@@ -203,7 +203,7 @@ class PythonModel:
             setattr(copy, name, value)
         return copy
 
-    def step(self, made: Any, t: float, inputs: Inputs, dt: float) -> Any:
+    def step(self, made: Any, t: float, inputs: NamedInputs, dt: float) -> Any:
         """Call ``step(t, inputs, dt)``.
 
         Args:

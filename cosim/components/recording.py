@@ -148,7 +148,7 @@ class RecordingSlave:
 
 
 @dataclass(frozen=True)
-class Course:
+class ColumnCourse:
     """Some columns as functions of time, wherever the component stands; it ends with the last row.
 
     Args:
@@ -223,14 +223,14 @@ class RecordingComponent(FMI3Component):
         """
         return name in self.line_outputs or (sampled and name in self.held_outputs and not self.recording.of_run)
 
-    def course(self, names: Sequence[str]) -> Course:
+    def course(self, names: Sequence[str]) -> ColumnCourse:
         """How columns run within a step.
 
         Args:
             names: of the columns.
         """
         places = np.array([[s.name for s in self.recording.signals].index(name) for name in names], dtype=np.intp)
-        return Course(self.recording, places)
+        return ColumnCourse(self.recording, places)
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
         """As for `Described`; a column that was left out is refused with the reason.

@@ -18,7 +18,7 @@ from cosim.coupling.feedthrough import (
     undeclared,
     undeclared_outputs,
 )
-from cosim.coupling.ordering import Signal, in_order, satisfied
+from cosim.coupling.ordering import OrderedSignal, in_order, satisfied
 from cosim.coupling.strong import strong_groups, topological
 from cosim.errors import CouplingError
 
@@ -92,7 +92,7 @@ def execution_groups(
     levels = [_split(level, group_of, len(groups)) for level in _levels(components, connections, must)]
     loops: list[list[AlgebraicLoop]] = [[] for _ in groups]
     maybe: list[list[AlgebraicLoop]] = [[] for _ in groups]
-    signals: list[list[Signal[str]]] = [[] for _ in groups]
+    signals: list[list[OrderedSignal[str]]] = [[] for _ in groups]
     for loop in algebraic:
         loops[group_of[loop.components[0]]].append(loop)
     for loop in possible:
@@ -170,13 +170,13 @@ def _levels(components: Mapping[str, Component], connections: Sequence[Connectio
     return [hard | soft | must, hard | must, must]
 
 
-def _signals(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[Signal[str]]:
+def _signals(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[OrderedSignal[str]]:
     """What goes from component to component; an array is one signal."""
     targets: dict[tuple[str, str], set[str]] = {}
     for c in connections:
         targets.setdefault(c.source_variable, set()).add(c.target[0])
     return [
-        Signal(
+        OrderedSignal(
             name, frozenset(taking - {name}), components[name].variables[variable].variability in (None, "continuous")
         )
         for (name, variable), taking in targets.items()
@@ -194,7 +194,7 @@ class Inside:
 
     names: Sequence[str]
     levels: Sequence[set[Pair]]
-    signals: Sequence[Signal[str]]
+    signals: Sequence[OrderedSignal[str]]
     rank: Mapping[str, int]
 
     def blocks(self, ties: Sequence[Pair]) -> list[tuple[str, ...]]:
@@ -209,7 +209,7 @@ class Inside:
         head = {name: knot[0] for knot in knots for name in knot}
         outer = [{(head[a], head[b]) for a, b in level | after if head[a] != head[b]} for level in self.levels]
         joined = [
-            Signal(head[s.source], frozenset(head[n] for n in s.targets) - {head[s.source]}, s.flows)
+            OrderedSignal(head[s.source], frozenset(head[n] for n in s.targets) - {head[s.source]}, s.flows)
             for s in self.signals
         ]
         members = {knot[0]: knot for knot in knots}
@@ -240,7 +240,9 @@ class Inside:
         signals = [replace(s, targets=s.targets & own) for s in self.signals if s.source in own]
         return tuple(self._arranged(knot, levels, signals) if len(knot) > 1 else knot)
 
-    def _arranged(self, names: Sequence[str], levels: Sequence[set[Pair]], signals: Sequence[Signal[str]]) -> list[str]:
+    def _arranged(
+        self, names: Sequence[str], levels: Sequence[set[Pair]], signals: Sequence[OrderedSignal[str]]
+    ) -> list[str]:
         return in_order(names, satisfied(names, levels), signals, self.rank) if len(names) > 1 else list(names)
 
 

@@ -17,7 +17,7 @@ Pair = tuple[Node, Node]
 
 
 @dataclass(frozen=True)
-class Signal(Generic[Node]):
+class OrderedSignal(Generic[Node]):
     """What one node gives to others.
 
     Args:
@@ -53,7 +53,7 @@ def satisfied(nodes: Sequence[Node], levels: Sequence[Set[Pair[Node]]]) -> set[P
 
 
 def in_order(
-    nodes: Sequence[Node], edges: Set[Pair[Node]], signals: Iterable[Signal[Node]], rank: Mapping[Node, int]
+    nodes: Sequence[Node], edges: Set[Pair[Node]], signals: Iterable[OrderedSignal[Node]], rank: Mapping[Node, int]
 ) -> list[Node]:
     """The nodes in an order that satisfies the edges and holds few signals, found node by node.
 
@@ -78,7 +78,11 @@ class _Search(Generic[Node]):
     """The state of `in_order`. What a node costs only ever falls; the heap keeps what was, which is passed over."""
 
     def __init__(
-        self, nodes: Sequence[Node], edges: Set[Pair[Node]], signals: Sequence[Signal[Node]], rank: Mapping[Node, int]
+        self,
+        nodes: Sequence[Node],
+        edges: Set[Pair[Node]],
+        signals: Sequence[OrderedSignal[Node]],
+        rank: Mapping[Node, int],
     ) -> None:
         self._nodes, self._signals, self._rank = nodes, signals, rank
         self._place = {node: i for i, node in enumerate(nodes)}

@@ -19,7 +19,7 @@ from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.inputs import connected_inputs
 from cosim.coupling.instants import Signal
 from cosim.coupling.non_numeric import non_numeric_cells, non_numeric_inputs, with_non_numeric
-from cosim.coupling.planned import InputInterpolator, PlannedComponent
+from cosim.coupling.planned import PlannedComponent, PlannedInterpolator
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
 from fmus.fmi.types import NUMERIC_TYPES
@@ -78,7 +78,7 @@ class Plan:
     connections: Sequence[Connection] = ()
     clocks: Sequence[ClockConnection] = ()
     services: list[Service] = field(default_factory=list)
-    interpolators: list[InputInterpolator] = field(default_factory=list)
+    interpolators: list[PlannedInterpolator] = field(default_factory=list)
     held: Set[Signal] = frozenset()
     relays: list[Callable[[], None]] = field(default_factory=list)
     before_start: dict[str, float] = field(default_factory=dict)

@@ -13,7 +13,7 @@ from cosim.coupling.chain import Mover, Position, Preparer, Stage, plain_way
 from cosim.coupling.inputs import Inputs
 
 
-class InputInterpolator(Protocol):
+class PlannedInterpolator(Protocol):
     """Lets inputs follow a line during a step (`cosim.master.interpolation`)."""
 
     @property
@@ -82,7 +82,7 @@ class PlannedComponent:
     inputs: Inputs
     columns: slice
     continuous: np.ndarray
-    interpolator: InputInterpolator | None = field(default=None, init=False)
+    interpolator: PlannedInterpolator | None = field(default=None, init=False)
     substeps: int = field(default=1, init=False)
     stages: tuple[Stage, ...] = field(default=(), init=False)
     prepare: Preparer = field(init=False, repr=False)

@@ -15,7 +15,7 @@ from threading import RLock
 from time import perf_counter
 from typing import Any
 
-from cosim.diagnostics.call_text import Described
+from cosim.diagnostics.call_text import DescribedCall
 from cosim.diagnostics.messages import STATUSES
 from cosim.errors import OutputError
 
@@ -47,7 +47,7 @@ class CallLog:
             hint = "Choose another file."
             raise OutputError(f"The call log cannot be written to {path}: {error.strerror or error}. {hint}") from error
 
-    def call(self, time: float, component: str, described: Described, function: Callable[[], Any]) -> Any:
+    def call(self, time: float, component: str, described: DescribedCall, function: Callable[[], Any]) -> Any:
         """Make a call and log it.
 
         Args:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 from pydantic import Field, model_validator
 
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import Run
+from cosim.expectations.run import JudgedRun
 from cosim.table import Table
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Expectation(Table):
         return self
 
     @abstractmethod
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """Hold a run against it.
 
         Args:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import NotRecordedError, Run
+from cosim.expectations.run import JudgedRun, NotRecordedError
 
 if TYPE_CHECKING:
     from cosim.scenario.outcome import Outcome
@@ -22,11 +22,11 @@ def judge(table: ScenarioTable, outcome: Outcome) -> list[Judged]:
     Returns:
         What became of each expectation, in order; one that limits several things gives several entries.
     """
-    run = Run(outcome.result, outcome.spec, table.start, table.stop)
+    run = JudgedRun(outcome.result, outcome.spec, table.start, table.stop)
     return [judged for place, item in enumerate(table.expect, start=1) for judged in _judge(place, item, run)]
 
 
-def _judge(place: int, item: Any, run: Run) -> list[Judged]:
+def _judge(place: int, item: Any, run: JudgedRun) -> list[Judged]:
     try:
         parts = item.judge(run)
     except NotRecordedError as error:

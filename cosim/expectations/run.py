@@ -8,12 +8,12 @@ import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import given
-from cosim.expectations.window import Window, window_of
+from cosim.expectations.window import TimeWindow, window_of
 from cosim.results.result import Result
 
 
 @dataclass(frozen=True)
-class Run:
+class JudgedRun:
     """A run to be judged.
 
     Args:
@@ -25,7 +25,7 @@ class Run:
     start: float
     stop: float
 
-    def window(self, start: float | None, end: float | None, first: float | None = None) -> Window:
+    def window(self, start: float | None, end: float | None, first: float | None = None) -> TimeWindow:
         """The window of an expectation; where nothing is given it begins at `first`, or else with the run [s]."""
         return window_of(self.result, start, end, self.start if first is None else first, self.stop)
 

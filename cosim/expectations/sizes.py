@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.evaluation.metrics import error_size, instants
 from cosim.expectations.judged import Judged, at, given, with_unit
-from cosim.expectations.window import Window
+from cosim.expectations.window import TimeWindow
 
 
 def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -24,7 +24,7 @@ def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
         return np.asarray(values - reference)
 
 
-def judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: str) -> list[Judged]:
+def judge_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, unit: str) -> list[Judged]:
     """Largest size and root mean square of an error, as far as they are limited.
 
     Args:
@@ -54,7 +54,7 @@ def judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: s
 def bounded(
     name: str,
     base: dict[str, Any],
-    window: Window,
+    window: TimeWindow,
     time: np.ndarray,
     values: np.ndarray,
     low: float,
@@ -89,7 +89,7 @@ def bounded(
     )
 
 
-def _nothing_measured(window: Window, time: np.ndarray, values: np.ndarray, fewest: int) -> dict[str, Any] | None:
+def _nothing_measured(window: TimeWindow, time: np.ndarray, values: np.ndarray, fewest: int) -> dict[str, Any] | None:
     """What to say where there are fewer than `fewest` instants, or values that are no finite numbers; None where all is
     well.
     """

@@ -14,7 +14,7 @@ ROUNDING = 1e-9  # relative; times closer than this are the same
 
 
 @dataclass(frozen=True)
-class Window:
+class TimeWindow:
     """An interval of a run, both ends included.
 
     Args:
@@ -52,7 +52,7 @@ class Window:
         return self.start - slack <= instant <= self.end + slack
 
 
-def window_of(result: Result, start: float | None, end: float | None, first: float, last: float) -> Window:
+def window_of(result: Result, start: float | None, end: float | None, first: float, last: float) -> TimeWindow:
     """The window of an expectation.
 
     Args:
@@ -63,4 +63,4 @@ def window_of(result: Result, start: float | None, end: float | None, first: flo
     short = reached < until - ROUNDING * max(1.0, abs(until))
     broken = short and (end is not None or result.failure is not None)
     fewest = FEWEST_INSTANTS if end is None else 1
-    return Window(result, first if start is None else start, until, reached, broken, fewest)
+    return TimeWindow(result, first if start is None else start, until, reached, broken, fewest)

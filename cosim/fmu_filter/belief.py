@@ -27,7 +27,7 @@ LEAST = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Belief:
+class FmuBelief:
     """Estimate and covariance.
 
     Attributes:
@@ -73,16 +73,16 @@ class FmuFilter(ABC):
         self._sizes = np.array([model.nominal(name) for name in model.states])
         self._noisy = np.flatnonzero(np.diagonal(noises.inputs) > 0.0)
 
-    def begin(self, x: Array, P: Array) -> Belief:
+    def begin(self, x: Array, P: Array) -> FmuBelief:
         """The belief at the start.
 
         Args:
             x: estimate, shape (n,). P: covariance, shape (n, n).
         """
-        return Belief(x, P)
+        return FmuBelief(x, P)
 
     @abstractmethod
-    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+    def predict(self, belief: FmuBelief, t: float, h: float, u: Array) -> FmuBelief:
         """The belief a step later.
 
         Args:
@@ -90,7 +90,7 @@ class FmuFilter(ABC):
         """
 
     @abstractmethod
-    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+    def correct(self, belief: FmuBelief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> FmuBelief:
         """The belief after a measurement.
 
         Args:
@@ -98,7 +98,7 @@ class FmuFilter(ABC):
             seen: which outputs of the model were measured. y: their values, shape (k,). R: covariance, shape (k, k).
         """
 
-    def outputs(self, belief: Belief, t: float, u: Array) -> Array:
+    def outputs(self, belief: FmuBelief, t: float, u: Array) -> Array:
         """Outputs of the model at the estimate, shape (q,).
 
         Args:
@@ -106,14 +106,14 @@ class FmuFilter(ABC):
         """
         return self.model.outputs_at(t, belief.x.reshape(-1, 1), u)[:, 0]
 
-    def _steps(self, belief: Belief) -> Array:
+    def _steps(self, belief: FmuBelief) -> Array:
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         return np.asarray(np.maximum(SHARE * deviations, LEAST * np.maximum(np.abs(belief.x), self._sizes)))
 
-    def _corrected(self, belief: Belief, found: kalman.Corrected, innovation: Array) -> Belief:
+    def _corrected(self, belief: FmuBelief, found: kalman.Corrected, innovation: Array) -> FmuBelief:
         nis = float(kalman.normalised_square(innovation, found.innovation_covariance))
         counted = belief.count + 1
-        return Belief(found.estimate, found.covariance, nis, len(innovation), counted)
+        return FmuBelief(found.estimate, found.covariance, nis, len(innovation), counted)
 
     def _from_inputs(self, t: float, h: float, x: Array, u: Array) -> Array:
         """Covariance that the noises of the inputs add over a step, shape (n, n), by central differences."""
@@ -143,7 +143,7 @@ class ExtendedFilter(FmuFilter):
         super().__init__(model, noises)
         self._directional = model if isinstance(model, ExchangeModel) and right_slopes(model) else None
 
-    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+    def predict(self, belief: FmuBelief, t: float, h: float, u: Array) -> FmuBelief:
         """The belief a step later; arguments as for `FmuFilter`."""
         x, steps = belief.x, self._steps(belief)
         sloped = None if self._directional is None else self._directional.transition_with_slope(t, h, x, u)
@@ -157,9 +157,9 @@ class ExtendedFilter(FmuFilter):
         P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity)
         if len(self._noisy):
             P = P + self._from_inputs(t, h, x, u)
-        return Belief(ends[:, 0].copy(), P, belief.nis, belief.degrees, belief.count + 1)
+        return FmuBelief(ends[:, 0].copy(), P, belief.nis, belief.degrees, belief.count + 1)
 
-    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+    def correct(self, belief: FmuBelief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> FmuBelief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         x, steps = belief.x, self._steps(belief)
         chosen = list(seen)
@@ -184,7 +184,7 @@ class UnscentedFilter(FmuFilter):
         super().__init__(model, noises)
         self._weights = unscented.weights(len(model.states), alpha)
 
-    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+    def predict(self, belief: FmuBelief, t: float, h: float, u: Array) -> FmuBelief:
         """The belief a step later; arguments as for `FmuFilter`."""
         w = self._weights
         points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
@@ -193,9 +193,9 @@ class UnscentedFilter(FmuFilter):
         P = P + h * self.noises.intensity
         if len(self._noisy):
             P = P + self._from_inputs(t, h, belief.x, u)
-        return Belief(x, P, belief.nis, belief.degrees, belief.count + 1)
+        return FmuBelief(x, P, belief.nis, belief.degrees, belief.count + 1)
 
-    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+    def correct(self, belief: FmuBelief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> FmuBelief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         w, chosen = self._weights, list(seen)
         points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from cosim.components.loading import load_fmu
 from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
-from cosim.fmu_filter.journal import SAME, Journal
-from cosim.fmu_filter.many import EnsembleFilter, ParticleFilter
+from cosim.fmu_filter.journal import SAME, FilterJournal
+from cosim.fmu_filter.many import EnsembleFilter, FmuParticleFilter
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.opening import open_model, start_value
@@ -90,7 +90,7 @@ class FmuFilterModel:
         self._means = [self._words[name] for name in self._estimated]
         self._deviations = [f"{name}_std" for name in self._means]
         self._unchecked = not checked and table.kind != "particle"
-        self._journal: Journal | None = None
+        self._journal: FilterJournal | None = None
         self._next = self._missed = 0
         self._u = model.start_inputs.copy()
         if table.balise is None:
@@ -164,11 +164,11 @@ class FmuFilterModel:
 
     # -- internals ----------------------------------------------------------------------------------------------------
 
-    def _begun(self, t: float) -> Journal:
+    def _begun(self, t: float) -> FilterJournal:
         if self._journal is None:
             self._origin = t
             belief = self._engine.begin(self._start, self._P)
-            self._journal = Journal(self._engine, belief, t, self._made_of[1].horizon)
+            self._journal = FilterJournal(self._engine, belief, t, self._made_of[1].horizon)
             self._next = 1
         return self._journal
 
@@ -245,7 +245,7 @@ def _engine(table: FilterTable, model: SealedModel, noises: Noises) -> FmuFilter
         return EnsembleFilter(model, noises, table.members, seed)
     if table.kind == "particle":
         starts = {name: model.parameters[name] for name in table.start_deviation}
-        return ParticleFilter(model, noises, table.start_deviation, starts, table.members, seed)
+        return FmuParticleFilter(model, noises, table.start_deviation, starts, table.members, seed)
     return ExtendedFilter(model, noises)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.fmu_filter.belief import Belief, FmuFilter
+from cosim.fmu_filter.belief import FmuBelief, FmuFilter
 
 Array = NDArray[np.float64]
 SAME = 1e-9
@@ -18,7 +18,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class JournalEntry:
     """One thing that a filter did.
 
     Attributes:
@@ -27,7 +27,7 @@ class Entry:
         seen: outputs that were measured. y: their values, shape (k,). R: covariance, shape (k, k).
     """
 
-    before: Belief
+    before: FmuBelief
     t: float
     u: Array
     h: float = 0.0
@@ -36,17 +36,17 @@ class Entry:
     R: Array | None = None
 
 
-class Journal:
+class FilterJournal:
     """A filter with a memory of the last seconds.
 
     Args:
         engine: the filter. belief: at the start. t: start [s]. horizon: how long entries are kept [s].
     """
 
-    def __init__(self, engine: FmuFilter, belief: Belief, t: float, horizon: float) -> None:
+    def __init__(self, engine: FmuFilter, belief: FmuBelief, t: float, horizon: float) -> None:
         self._engine, self._horizon = engine, horizon
         self.belief, self.t = belief, t
-        self._entries: list[Entry] = []
+        self._entries: list[JournalEntry] = []
 
     def predict(self, h: float, u: Array) -> None:
         """Go on.
@@ -54,7 +54,7 @@ class Journal:
         Args:
             h: how far [s]. u: inputs, held, shape (m,).
         """
-        self._done(Entry(self.belief, self.t, u.copy(), h=h))
+        self._done(JournalEntry(self.belief, self.t, u.copy(), h=h))
         oldest = self.t - self._horizon - SAME
         while self._entries and self._entries[0].t + self._entries[0].h < oldest:
             self._entries.pop(0)
@@ -70,7 +70,7 @@ class Journal:
             Whether it was taken; one from before the horizon is not.
         """
         if stamp >= self.t - SAME:
-            self._done(Entry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
+            self._done(JournalEntry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
             return True
         place = next((i for i, e in enumerate(self._entries) if e.h > 0.0 and e.t <= stamp < e.t + e.h - SAME), None)
         if place is None:
@@ -80,16 +80,16 @@ class Journal:
         self.belief, self.t = split.before, split.t
         if stamp > split.t + SAME:
             self._do(replace(split, h=stamp - split.t))
-        self._do(Entry(self.belief, stamp, split.u, seen=tuple(seen), y=y.copy(), R=R))
+        self._do(JournalEntry(self.belief, stamp, split.u, seen=tuple(seen), y=y.copy(), R=R))
         self._do(replace(split, h=split.t + split.h - stamp))
         for entry in rest:
             self._do(entry)
         return True
 
-    def _do(self, entry: Entry) -> None:
+    def _do(self, entry: JournalEntry) -> None:
         self._done(replace(entry, before=self.belief, t=self.t))
 
-    def _done(self, entry: Entry) -> None:
+    def _done(self, entry: JournalEntry) -> None:
         """What an entry that begins here and now does."""
         self._entries.append(entry)
         if entry.y is None:
@@ -99,11 +99,11 @@ class Journal:
             assert entry.R is not None
             self.belief = self._engine.correct(self.belief, self.t, entry.u, entry.seen, entry.y, entry.R)
 
-    def state(self) -> tuple[Belief, float, tuple[Entry, ...]]:
+    def state(self) -> tuple[FmuBelief, float, tuple[JournalEntry, ...]]:
         """What to keep in order to return here."""
         return self.belief, self.t, tuple(self._entries)
 
-    def restore(self, state: tuple[Belief, float, tuple[Entry, ...]]) -> None:
+    def restore(self, state: tuple[FmuBelief, float, tuple[JournalEntry, ...]]) -> None:
         """Return.
 
         Args:

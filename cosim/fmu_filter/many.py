@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.fmu_filter.belief import Belief, FmuFilter, Noises
+from cosim.fmu_filter.belief import FmuBelief, FmuFilter, Noises
 from cosim.fmu_model.sealed import SealedModel
 from fmu_observer.filtering import ensemble, particles
 
@@ -31,13 +31,13 @@ class EnsembleFilter(FmuFilter):
         super().__init__(model, noises)
         self._count, self._seed = count, seed
 
-    def begin(self, x: Array, P: Array) -> Belief:
+    def begin(self, x: Array, P: Array) -> FmuBelief:
         """Members drawn about the estimate; arguments as for `FmuFilter`."""
         draws = self._draws(0, len(x))
         members = x[:, None] + ensemble.drawn(P, draws)
-        return self._summed(Belief(x, P, points=members))
+        return self._summed(FmuBelief(x, P, points=members))
 
-    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+    def predict(self, belief: FmuBelief, t: float, h: float, u: Array) -> FmuBelief:
         """The belief a step later; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
         draws = self._draws(2 * count, len(u))
@@ -46,7 +46,7 @@ class EnsembleFilter(FmuFilter):
         added = ensemble.drawn(h * self.noises.intensity, self._draws(2 * count + 1, len(belief.x)))
         return self._summed(replace(belief, points=moved + added, count=count))
 
-    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+    def correct(self, belief: FmuBelief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> FmuBelief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
         chosen = list(seen)
@@ -58,7 +58,7 @@ class EnsembleFilter(FmuFilter):
         """Standard normal numbers of one place in the run, whatever was done again in between."""
         return np.random.default_rng([self._seed, index]).standard_normal((rows, self._count))
 
-    def _summed(self, belief: Belief) -> Belief:
+    def _summed(self, belief: FmuBelief) -> FmuBelief:
         members = _points(belief)
         mean = ensemble.mean_of(members)
         apart = ensemble.deviations_of(members, mean)
@@ -83,7 +83,7 @@ class Saved:
         return self  # it never changes
 
 
-class ParticleFilter(FmuFilter):
+class FmuParticleFilter(FmuFilter):
     """Bootstrap particle filter over saved states: they are weighted and selected, never written.
 
     What is not known at the start are start values, what is not known later are inputs. It estimates outputs.
@@ -106,7 +106,7 @@ class ParticleFilter(FmuFilter):
         super().__init__(model, noises)
         self._spreads, self._starts, self._count, self._seed = dict(spreads), dict(starts), count, seed
 
-    def begin(self, x: Array, P: Array) -> Belief:
+    def begin(self, x: Array, P: Array) -> FmuBelief:
         """Instances started from drawn values; the arguments are not used."""
         model, states, columns = self.model, [], []
         draws = np.random.default_rng([self._seed, 0]).standard_normal((self._count, len(self._spreads)))
@@ -117,9 +117,9 @@ class ParticleFilter(FmuFilter):
             states.append(Saved(model.instance))
             columns.append(model.read()[1])
         weights = np.full(self._count, 1.0 / self._count)
-        return _weighed(Belief(x, P, points=np.array(columns).T, weights=weights, states=tuple(states)))
+        return _weighed(FmuBelief(x, P, points=np.array(columns).T, weights=weights, states=tuple(states)))
 
-    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+    def predict(self, belief: FmuBelief, t: float, h: float, u: Array) -> FmuBelief:
         """The belief a step later; arguments as for `FmuFilter`."""
         model, count = self.model, belief.count + 1
         draws = np.random.default_rng([self._seed, count]).standard_normal((len(u), self._count))
@@ -133,7 +133,7 @@ class ParticleFilter(FmuFilter):
             columns.append(model.read()[1])
         return _weighed(replace(belief, points=np.array(columns).T, states=tuple(states), count=count))
 
-    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+    def correct(self, belief: FmuBelief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> FmuBelief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         points, weights, chosen = _points(belief), belief.weights, list(seen)
         assert weights is not None
@@ -151,17 +151,17 @@ class ParticleFilter(FmuFilter):
             )
         )
 
-    def outputs(self, belief: Belief, t: float, u: Array) -> Array:
+    def outputs(self, belief: FmuBelief, t: float, u: Array) -> Array:
         """Mean outputs of the particles; arguments as for `FmuFilter`."""
         return belief.x
 
 
-def _weighed(belief: Belief) -> Belief:
+def _weighed(belief: FmuBelief) -> FmuBelief:
     assert belief.weights is not None
     found = particles.moments(_points(belief), belief.weights)
     return replace(belief, x=np.asarray(found.mean), P=np.asarray(found.covariance))
 
 
-def _points(belief: Belief) -> Array:
+def _points(belief: FmuBelief) -> Array:
     assert belief.points is not None
     return belief.points

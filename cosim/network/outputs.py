@@ -26,7 +26,7 @@ SENDER = "sender"
 
 
 @dataclass(frozen=True)
-class Reader:
+class PacketReader:
     """An input that leaves out what is missing: a reading that it has sampled is missing until the next one arrives.
 
     Args:
@@ -63,7 +63,7 @@ class NetworkOutputs(FMI3Component):
     """
 
     def __init__(
-        self, settings: NetworkSettings, components: Mapping[str, Component], readers: Sequence[Reader] = ()
+        self, settings: NetworkSettings, components: Mapping[str, Component], readers: Sequence[PacketReader] = ()
     ) -> None:
         self.settings, self.readers = settings, tuple(readers)
         self.sources = [_source(name, node.name, components) for node in settings.nodes for name in node.signals]
@@ -122,7 +122,7 @@ def _description(
     settings: NetworkSettings,
     sources: Sequence[tuple[str, str]],
     components: Mapping[str, Component],
-    readers: Sequence[Reader],
+    readers: Sequence[PacketReader],
 ) -> ModelDescription:
     variables: list[ModelVariable] = []
 

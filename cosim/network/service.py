@@ -20,7 +20,7 @@ from cosim.balises.telegram import Mailbox
 from cosim.coupling.chain import Mover, Position, Stage, around
 from cosim.coupling.plan import Plan
 from cosim.network.chance import Chance
-from cosim.network.outputs import Reader
+from cosim.network.outputs import PacketReader
 from cosim.network.settings import NetworkSettings
 from cosim.results.data import PacketRecord
 from fmus.fmi.standard import TIME_TOLERANCE
@@ -63,7 +63,7 @@ class Field:
 
 
 @dataclass
-class Listener:
+class PacketListener:
     """A component that is told of packets by an event of its own.
 
     Args:
@@ -78,7 +78,7 @@ class Listener:
 
 
 @dataclass(slots=True)
-class Entry:
+class SentPacket:
     """One packet in the log.
 
     Args:
@@ -106,9 +106,9 @@ class NetworkService:
         start: float,
         sources: np.ndarray,
         first: int,
-        listeners: Sequence[Listener],
+        listeners: Sequence[PacketListener],
         holders: Mapping[str, Sequence[str]],
-        readers: Sequence[Reader] = (),
+        readers: Sequence[PacketReader] = (),
     ) -> None:
         self.settings, self.sources, self.listeners = settings, sources, list(listeners)
         self.chance = Chance(settings, start)
@@ -129,7 +129,7 @@ class NetworkService:
             sorted({name for signal in node.signals for name in holders.get(signal, ())}) for node in settings.nodes
         ]
         self.mailbox: Mailbox[Packet] = Mailbox()
-        self.entries: list[Entry] = []
+        self.entries: list[SentPacket] = []
         self.number = 0
         self._start, self._begun = start, False
         self._next = self.chance.instant(0)
@@ -225,7 +225,7 @@ class NetworkService:
 
     def _post(self, packet: Packet) -> None:
         lost = packet.kind == "lost"
-        self.entries.append(Entry(replace(packet, delivered_at=nan) if lost else packet))
+        self.entries.append(SentPacket(replace(packet, delivered_at=nan) if lost else packet))
         if not lost or np.isin(self._own[packet.node], self._sampled).any():
             self.mailbox.post(replace(packet, kind="gap") if lost else packet)
 
@@ -270,7 +270,7 @@ class NetworkService:
                 self._plan.values[self._arriving][place] = received[reader.signal]
                 self._reads[place] = reader.next_sample(t, self._start)
 
-    def _letter(self, listener: Listener, packet: Packet) -> Letter:
+    def _letter(self, listener: PacketListener, packet: Packet) -> Letter:
         """What a listener is told: the values of the packet, and of other nodes what was last received."""
         values = self._plan.values[self._held].copy()
         values[self._own[packet.node]] = packet.values
@@ -318,7 +318,7 @@ class NetworkService:
             for entry in self.entries[first:until]
         ]
 
-    def _outcomes(self, entry: Entry) -> dict[str, str]:
+    def _outcomes(self, entry: SentPacket) -> dict[str, str]:
         node = entry.packet.node
         told = [*self._holding[node], *(one.component for one in self.listeners if node in one.nodes)]
         if entry.packet.kind == "lost":

@@ -25,7 +25,7 @@ OPTIONAL = {"odometer_fault"}
 
 
 @dataclass(frozen=True)
-class Candidate:
+class BenchmarkCandidate:
     """An observer to be judged.
 
     Args:
@@ -47,7 +47,9 @@ class Candidate:
         return str(self.table.observer or self.table.model or self.table.fmu)
 
 
-def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[Any] | None) -> tuple[list[Candidate], list[str]]:
+def find_candidates(
+    scenario: Scenario, sides: Sides, names: Sequence[Any] | None
+) -> tuple[list[BenchmarkCandidate], list[str]]:
     """The observers to be judged, and notes on what was assumed and left out.
 
     Args:
@@ -69,14 +71,14 @@ def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[Any] | Non
     return found, [*(f"{c.name}: {text}" for c in found for text in c.settings), *left_out]
 
 
-def _told_apart(candidates: Sequence[Candidate]) -> list[Candidate]:
+def _told_apart(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandidate]:
     """Candidates of which no two have one name: two instances of a class, say."""
     names = [candidate.name for candidate in candidates]
     earlier = [names[:place].count(name) for place, name in enumerate(names)]
     return [replace(c, name=f"{c.name}_{n + 1}") if n else c for c, n in zip(candidates, earlier, strict=True)]
 
 
-def _named(scenario: Scenario, sides: Sides, given: Any) -> Candidate:
+def _named(scenario: Scenario, sides: Sides, given: Any) -> BenchmarkCandidate:
     """An observer of the scenario, or one by the name of its model, or a class or an instance from a script."""
     if isinstance(given, str) and given in sides.observers:
         return _own(sides, given)
@@ -92,11 +94,11 @@ def _named(scenario: Scenario, sides: Sides, given: Any) -> Candidate:
     return _shipped(sides, name)
 
 
-def _own(sides: Sides, name: str) -> Candidate:
-    return Candidate(name, sides.table.components[name], sides.sources(name), "scenario")
+def _own(sides: Sides, name: str) -> BenchmarkCandidate:
+    return BenchmarkCandidate(name, sides.table.components[name], sides.sources(name), "scenario")
 
 
-def _shipped(sides: Sides, model: str) -> Candidate:
+def _shipped(sides: Sides, model: str) -> BenchmarkCandidate:
     """An observer with its own defaults and what the scenario says of the train."""
     said = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
     table = ComponentTable.model_validate({"observer": model, **said})
@@ -111,7 +113,7 @@ def _shipped(sides: Sides, model: str) -> Candidate:
     sources = {s.name: template[s.name] for s in system.inputs if s.name in template}
     unique = name if name not in sides.table.components else f"{name}_with_defaults"
     settings = (_assumed(system, facts),) if parameters & set(FACTS) else ()
-    return Candidate(unique, table, sources, "defaults", settings, _misfit(sides, system, sources))
+    return BenchmarkCandidate(unique, table, sources, "defaults", settings, _misfit(sides, system, sources))
 
 
 def _assumed(system: Any, facts: Mapping[str, tuple[float, str]]) -> str:

@@ -16,7 +16,7 @@ from cosim.evaluation.error_table import error_text
 from cosim.evaluation.numbers import cell
 from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.spec import ReportSpec
-from cosim.observer_benchmark.candidates import Candidate, find_candidates
+from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
 from cosim.observer_benchmark.observer_table import aligned, main_row
 from cosim.observer_benchmark.playback import Sides, find_sides, playback_scenario, recording_scenario
@@ -214,7 +214,7 @@ class _Judge:
         self.outcomes: dict[str, Outcome] = {}
         self._expected, self._seen = self._gaps()
 
-    def scores(self, candidates: Sequence[Candidate]) -> list[ObserverScore]:
+    def scores(self, candidates: Sequence[BenchmarkCandidate]) -> list[ObserverScore]:
         """The scores of all, or, where somebody interrupts, of those that are judged by then.
 
         Raises:
@@ -229,7 +229,7 @@ class _Judge:
                 raise
         return found
 
-    def score(self, candidate: Candidate, done: int) -> ObserverScore:
+    def score(self, candidate: BenchmarkCandidate, done: int) -> ObserverScore:
         """The score of one observer; one that fails has the reason in it."""
         labelled = {
             "label": candidate.table.label or candidate.name,
@@ -248,7 +248,7 @@ class _Judge:
         except CosimError as error:
             return ObserverScore(candidate.name, failure=f"cannot be coupled: {error}", **known)
 
-    def _run(self, candidate: Candidate, done: int, known: dict[str, Any]) -> ObserverScore:
+    def _run(self, candidate: BenchmarkCandidate, done: int, known: dict[str, Any]) -> ObserverScore:
         name = candidate.name
         scenario = playback_scenario(self.scenario, self.sides, self.folder, name, candidate.table, candidate.sources)
         costs = []
@@ -276,7 +276,7 @@ class _Judge:
         events = [e for e in read_layout(self.folder).records if table.start < e.stamp <= table.stop]
         return expected_gap(layout, table.balises, table.start), longest_gap(events, table.start)
 
-    def _certificate(self, candidate: Candidate) -> CertifiedGap | None:
+    def _certificate(self, candidate: BenchmarkCandidate) -> CertifiedGap | None:
         if self._expected is None or candidate.table.observer is None:
             return None
         try:

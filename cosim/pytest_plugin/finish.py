@@ -11,7 +11,7 @@ import pytest
 
 from cosim.errors import CosimError
 from cosim.pytest_plugin import options
-from cosim.pytest_plugin.records import Record, Records
+from cosim.pytest_plugin.records import Records, RegressionRecord
 
 TITLE = "fmu baselines"
 LINES = 6
@@ -77,7 +77,7 @@ def report(terminal: pytest.TerminalReporter, config: pytest.Config) -> None:
         _tell_update(terminal, records, config)
 
 
-def _tell(terminal: pytest.TerminalReporter, record: Record, config: pytest.Config) -> None:
+def _tell(terminal: pytest.TerminalReporter, record: RegressionRecord, config: pytest.Config) -> None:
     terminal.write_line(f"{record.test}: {_shown(Path(record.baseline), config)} {_verb(record)}")
     for line in record.lines[:LINES]:
         terminal.write_line(f"    {line}")
@@ -87,12 +87,12 @@ def _tell(terminal: pytest.TerminalReporter, record: Record, config: pytest.Conf
         terminal.write_line(f"    {kind}: {path}")
 
 
-def _verb(record: Record) -> str:
+def _verb(record: RegressionRecord) -> str:
     verbs = {"differs": "differs", "missing": "does not exist", "error": "could not be checked"}
     return verbs.get(record.status, record.status)
 
 
-def _tell_update(terminal: pytest.TerminalReporter, records: list[Record], config: pytest.Config) -> None:
+def _tell_update(terminal: pytest.TerminalReporter, records: list[RegressionRecord], config: pytest.Config) -> None:
     staged = [record for record in records if record.staged]
     for fault in config.stash.get(WRITTEN, []):
         terminal.write_line(f"error: {fault}", red=True)
@@ -109,7 +109,7 @@ def _tell_update(terminal: pytest.TerminalReporter, records: list[Record], confi
         terminal.write_line("Not used by this run: " + ", ".join(_shown(path, config) for path in unused))
 
 
-def _unused(records: list[Record], config: pytest.Config) -> list[Path]:
+def _unused(records: list[RegressionRecord], config: pytest.Config) -> list[Path]:
     """Baselines beside those in use that no test asked for; nothing where only some of the tests were chosen."""
     chosen = (
         config.getoption("keyword", "") or config.getoption("markexpr", "") or any("::" in str(a) for a in config.args)

@@ -15,7 +15,7 @@ import pytest
 from cosim.errors import CosimError
 from cosim.pytest_plugin import options
 from cosim.pytest_plugin.names import baseline_name
-from cosim.pytest_plugin.records import Record, Records, Status
+from cosim.pytest_plugin.records import Records, RegressionRecord, Status
 
 if TYPE_CHECKING:
     from cosim.baselines import Regression
@@ -167,7 +167,7 @@ class FmuRegression:
         files: Mapping[str, str] | None = None,
         staged: str = "",
     ) -> None:
-        record = Record(self._node.nodeid, str(path), status, list(lines), dict(files or {}), staged)
+        record = RegressionRecord(self._node.nodeid, str(path), status, list(lines), dict(files or {}), staged)
         Records.of(self._config).add(record)
 
     def _shown(self, path: Path) -> str:

@@ -20,7 +20,7 @@ Status = Literal["equal", "differs", "missing", "error", "new", "changed", "unch
 
 
 @dataclass(frozen=True)
-class Record:
+class RegressionRecord:
     """What a call found.
 
     Args:
@@ -77,7 +77,7 @@ class Records:
             self._own = tempfile.mkdtemp(prefix="fmu-baselines-")
         return Path(self._shared or self._own)
 
-    def add(self, record: Record) -> None:
+    def add(self, record: RegressionRecord) -> None:
         """Keep a record; it appears whole or not at all."""
         draft = self.folder / f"{uuid4().hex}.part"
         draft.write_text(json.dumps(asdict(record)), encoding="utf-8")
@@ -89,11 +89,13 @@ class Records:
         folder.mkdir()
         return folder
 
-    def all(self) -> list[Record]:
+    def all(self) -> list[RegressionRecord]:
         """Every record, by test and baseline."""
         if self._shared is None and not self._own:
             return []
-        found = [Record(**json.loads(path.read_text(encoding="utf-8"))) for path in self.folder.glob("*.json")]
+        found = [
+            RegressionRecord(**json.loads(path.read_text(encoding="utf-8"))) for path in self.folder.glob("*.json")
+        ]
         return sorted(found, key=lambda record: (record.test, record.baseline))
 
     def remove(self) -> None:

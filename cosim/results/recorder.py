@@ -27,7 +27,7 @@ BLOCK = 4e6  # rows gathered before each writing to the file [bytes]
 FIRST_ROWS = 16
 
 
-class Stream(Protocol):
+class RowStream(Protocol):
     """Where rows go that must outlive the program, see `cosim.results.stream`."""
 
     seconds: float
@@ -79,7 +79,7 @@ class Recorder:
         folder: str | Path | None = None,
         every: int = 1,
         switching: Sequence[int] = (),
-        stream: Stream | None = None,
+        stream: RowStream | None = None,
     ) -> None:
         self._dtype = table_dtype(["time", *(s.name for s in signals)])
         self._width = len(signals) + 1

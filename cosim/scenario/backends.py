@@ -21,7 +21,7 @@ from fmus.toolchain.platforms import Platform
 from plant_models.hybrid import HybridSystem, TracingError
 
 if TYPE_CHECKING:
-    from fmus.build import Draft
+    from fmus.build import BuildDraft
 
 NATIVE: Backend = "fmu3"
 IN_PYTHON: Backend = "block3"
@@ -192,6 +192,6 @@ class _Building:
         return faults
 
 
-def _timed(draft: Draft) -> tuple[dict[Platform, bytes], float]:
+def _timed(draft: BuildDraft) -> tuple[dict[Platform, bytes], float]:
     begin = perf_counter()
     return draft.compile(), perf_counter() - begin

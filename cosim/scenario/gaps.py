@@ -15,7 +15,7 @@ from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Link
 from cosim.network.intervals import longest_interval, sends_in_turn
-from cosim.network.service import Listener
+from cosim.network.service import PacketListener
 from cosim.network.settings import NetworkSettings
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.layouts import Layout
@@ -85,7 +85,7 @@ class Sources:
                 found[name] = balises if told and balises is not None else UNTOLD
         return found
 
-    def _of_packets(self, listener: Listener, table: ComponentTable, system: Any) -> ExpectedGap:
+    def _of_packets(self, listener: PacketListener, table: ComponentTable, system: Any) -> ExpectedGap:
         """Of an event that packets tell."""
         assert self.network is not None
         settings = self.network.settings
@@ -157,7 +157,7 @@ def _longest(gaps: Sequence[ExpectedGap]) -> ExpectedGap:
     return max(gaps, key=lambda gap: (inf, gap.distance is None) if gap.seconds is None else (gap.seconds, False))
 
 
-def _not_as_certified(listener: Listener, settings: NetworkSettings, system: Any) -> str:
+def _not_as_certified(listener: PacketListener, settings: NetworkSettings, system: Any) -> str:
     """Why packets are not what the certificate of their receiver is about; empty where they are."""
     event, numbers = listener.event, settings.node_of
     fields = {part.name: numbers[part.signal] for part in listener.fields}

@@ -16,8 +16,8 @@ from cosim.coupling.connection import Connection, Link, connect, event_connectio
 from cosim.coupling.plan import Plan
 from cosim.errors import ScenarioError, nearest
 from cosim.network.intervals import longest_interval
-from cosim.network.outputs import NAME, NetworkOutputs, Reader, arrived_name
-from cosim.network.service import Field, Listener, NetworkService, ages
+from cosim.network.outputs import NAME, NetworkOutputs, PacketReader, arrived_name
+from cosim.network.service import Field, NetworkService, PacketListener, ages
 from cosim.network.settings import NetworkSettings
 from cosim.results.data import PacketRecord
 from cosim.scenario.models import make_system, values_in_use
@@ -45,7 +45,7 @@ class Network:
 
     settings: NetworkSettings
     outputs: NetworkOutputs
-    listeners: list[Listener] = field(default_factory=list)
+    listeners: list[PacketListener] = field(default_factory=list)
     held: dict[str, list[str]] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     stale: list[str] = field(default_factory=list)
@@ -163,14 +163,14 @@ def connect_over(
     connections = connect(direct, components)
     number_of = {signal: i for i, signal in enumerate(network.settings.signals)}
     readers = [
-        Reader(".".join(c.target), number_of[".".join(c.source)], *sampled.get(c.target_variable, ()))
+        PacketReader(".".join(c.target), number_of[".".join(c.source)], *sampled.get(c.target_variable, ()))
         for c in connections
         if over.get(c.target_variable)
     ]
     network.outputs = NetworkOutputs(network.settings, components, readers)
     node_of = network.settings.node_of
     network.listeners += [
-        Listener(component, event, tuple(parts), frozenset(node_of[part.signal] for part in parts))
+        PacketListener(component, event, tuple(parts), frozenset(node_of[part.signal] for part in parts))
         for (component, event), parts in sorted(fields.items())
     ]
     routed = [

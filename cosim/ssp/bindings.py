@@ -13,7 +13,7 @@ from cosim.errors import nearest
 from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import Binding, ComponentElement, Element, Entry, Parameter, SystemElement
+from cosim.ssp.model import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.pipe import BOOLEANS, Pipe
 from cosim.ssp.values import LISTS
@@ -43,7 +43,7 @@ class Given:
     """
 
     parameter: Parameter
-    entry: Entry | None = None
+    entry: SsdEntry | None = None
 
     @property
     def node(self) -> Node:
@@ -160,7 +160,7 @@ class _Applying:
         return names
 
 
-def _targets(element: Element, path: Path, name: str) -> Iterator[Point]:
+def _targets(element: SsdElement, path: Path, name: str) -> Iterator[Point]:
     """What a hierarchical name can mean: a variable of a component, or connectors of systems and all that lies
     below.
     """

@@ -9,7 +9,7 @@ from typing import Any
 from cosim.scenario.package_names import split_variant
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.load import find_variant, load_structure
-from cosim.ssp.model import ComponentElement, DictionaryReference, Element, SystemElement
+from cosim.ssp.model import ComponentElement, DictionaryReference, SsdElement, SystemElement
 from cosim.ssp.package import Package, Unpacked
 from cosim.ssp.structure import read_structure
 
@@ -62,7 +62,7 @@ def text_of_package(data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _tree(element: Element, depth: int) -> Iterator[str]:
+def _tree(element: SsdElement, depth: int) -> Iterator[str]:
     kind = "system"
     if isinstance(element, ComponentElement):
         kind = element.member

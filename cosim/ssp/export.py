@@ -44,7 +44,7 @@ LOG = logging.getLogger("cosim")
 
 
 @dataclass(frozen=True)
-class Part:
+class ExportedPart:
     """A component on its way into a package.
 
     Args:
@@ -95,7 +95,7 @@ class _Exporter:
         self.table, self.name, self.folder, self.where, self.version = table, name, folder, where, version
         self.files: dict[str, bytes] = {}
         self.definitions = Definitions()
-        self.parts: dict[str, Part] = {}
+        self.parts: dict[str, ExportedPart] = {}
         self.seeds: dict[str, dict[str, int]] = {}
 
     def build(self) -> None:
@@ -166,7 +166,7 @@ class _Exporter:
         )
         return make_reader(balises, layout, interfaces, taken, newest)
 
-    def part(self, name: str, component: ComponentTable) -> Part:
+    def part(self, name: str, component: ComponentTable) -> ExportedPart:
         """A component with its FMU, which is built where it is a model of this package."""
         place = f"{self.where}: components.{name}"
         if component.recording is not None:
@@ -198,7 +198,7 @@ class _Exporter:
         member = next((m for m, known in self.files.items() if known == content), f"resources/{name}.fmu")
         self.files[member] = content
         foreign = system is not None and type(system).__module__.partition(".")[0] not in OWN_PACKAGES
-        return Part(component, fmu, member, interface, MADE_FROM if foreign else frozenset())
+        return ExportedPart(component, fmu, member, interface, MADE_FROM if foreign else frozenset())
 
     def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
@@ -212,7 +212,7 @@ class _Exporter:
             raise ScenarioError(f"{self.where}: {error}") from error
         return component.description
 
-    def add_component(self, parent: Node, name: str, part: Part, more: Mapping[str, Any]) -> None:
+    def add_component(self, parent: Node, name: str, part: ExportedPart, more: Mapping[str, Any]) -> None:
         """A component with its connectors, parameters and origin, and what else its annotation says."""
         node = child(parent, "ssd", "Component", name=name, type="application/x-fmu-sharedlibrary", source=part.member)
         variables = [v for v in part.interface.variables.values() if v.causality in ("input", "output")]
@@ -230,7 +230,7 @@ class _Exporter:
         )
         node.append(write_extras(own | {DIGEST: digest(part.fmu), **more}))
 
-    def parameter_file(self, name: str, part: Part) -> bytes | None:
+    def parameter_file(self, name: str, part: ExportedPart) -> bytes | None:
         """The parameter set of a component, or None where it has none."""
         late = {k: getattr(part.table, k) for k in sorted(part.table.model_fields_set & LATE_PARAMETERS)}
         given = {k: v for k, v in late.items() if k in part.interface.variables} | part.table.parameters

@@ -15,7 +15,7 @@ from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
 from cosim.ssp.document import fail
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import ComponentElement, Structure
+from cosim.ssp.model import ComponentElement, SsdStructure
 from cosim.ssp.nets import Chain, Nets, Path, flat_names
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
@@ -94,7 +94,7 @@ def find_variant(package: Package, variant: str) -> str:
     raise ScenarioError(f"{package.title} has no variant {variant!r}; {nearest(variant, known)}")
 
 
-def load_structure(structure: Structure, package: Package) -> Loaded:
+def load_structure(structure: SsdStructure, package: Package) -> Loaded:
     """The scenario of one system structure.
 
     Args:
@@ -139,7 +139,7 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: La
     return extras | ({"parameters": own} if own else {})
 
 
-def _takes_our_place(nets: Nets, path: Path, structure: Structure) -> bool:
+def _takes_our_place(nets: Nets, path: Path, structure: SsdStructure) -> bool:
     """Whether a component is a balise reader that was added for other tools; the balises of the structure's annotation
     do it.
     """
@@ -149,7 +149,7 @@ def _takes_our_place(nets: Nets, path: Path, structure: Structure) -> bool:
     return added and element.extras.get(DIGEST) == digest(element.fmu)
 
 
-def _experiment(structure: Structure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
+def _experiment(structure: SsdStructure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
     """Start, stop and step, as far as they are known: from the structure, from annotations, or else from the FMUs."""
     experiments = [interface.description.defaultExperiment for interface in nets.interfaces.values()]
     times = {

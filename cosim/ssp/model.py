@@ -42,7 +42,7 @@ class End:
 
 
 @dataclass(frozen=True)
-class Wire:
+class SsdConnection:
     """A connection as it is written: start and end say nothing about the direction.
 
     Args:
@@ -72,7 +72,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Entry:
+class SsdEntry:
     """An entry of a parameter mapping."""
 
     source: str
@@ -92,12 +92,12 @@ class Binding:
     """
 
     parameters: tuple[Parameter, ...]
-    mapping: tuple[Entry, ...] | None
+    mapping: tuple[SsdEntry, ...] | None
     node: Node = field(compare=False)
 
 
 @dataclass
-class Element:
+class SsdElement:
     """What all elements of a system have. Connectors by name; bindings in the order in which they apply."""
 
     name: str
@@ -107,7 +107,7 @@ class Element:
 
 
 @dataclass
-class ComponentElement(Element):
+class ComponentElement(SsdElement):
     """An FMU.
 
     Args:
@@ -120,23 +120,23 @@ class ComponentElement(Element):
 
 
 @dataclass
-class DictionaryReference(Element):
+class DictionaryReference(SsdElement):
     """A place where the signals of a dictionary can be reached. Args: `dictionary`: its name."""
 
     dictionary: str
 
 
 @dataclass
-class SystemElement(Element):
+class SystemElement(SsdElement):
     """A system: its elements by name, the connections between them, its signal dictionaries (entries by name)."""
 
-    elements: dict[str, Element]
-    wires: list[Wire]
+    elements: dict[str, SsdElement]
+    wires: list[SsdConnection]
     dictionaries: dict[str, dict[str, Connector]]
 
 
 @dataclass
-class Structure:
+class SsdStructure:
     """A whole system structure description.
 
     Args:

@@ -14,7 +14,15 @@ from cosim.ssp.common import NamedUnit, Step
 from cosim.ssp.document import Node, fail
 from cosim.ssp.interfaces import Interface, interface_of
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import ComponentElement, Connector, DictionaryReference, Element, End, SystemElement, Wire
+from cosim.ssp.model import (
+    ComponentElement,
+    Connector,
+    DictionaryReference,
+    End,
+    SsdConnection,
+    SsdElement,
+    SystemElement,
+)
 
 Path = tuple[str, ...]
 """Names of the elements from the root system downwards; the root itself is the empty path."""
@@ -122,7 +130,7 @@ class Nets:
 
     def __init__(self, root: SystemElement, lapses: Lapses) -> None:
         self.root = root
-        self.elements: dict[Path, Element] = dict(_walk(root, ()))
+        self.elements: dict[Path, SsdElement] = dict(_walk(root, ()))
         self.interfaces: dict[Path, Interface] = {
             p: interface_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
         }
@@ -191,7 +199,7 @@ class Nets:
         assert isinstance(element, SystemElement), "only systems hold elements"
         return element
 
-    def _directed(self, path: Path, system: SystemElement, wire: Wire) -> Hop:
+    def _directed(self, path: Path, system: SystemElement, wire: SsdConnection) -> Hop:
         start, end = (self._point(path, system, side, wire.node) for side in (wire.start, wire.end))
         forward, backward = self._allowed(path, start, end), self._allowed(path, end, start)
         if forward == backward:
@@ -202,7 +210,7 @@ class Nets:
         return Hop(source, target, wire.suppress, wire.step, wire.node)
 
     def _point(self, path: Path, system: SystemElement, end: End, node: Node) -> Point:
-        owner: Element = system
+        owner: SsdElement = system
         if end.element is not None:
             if end.element not in system.elements:
                 what = f"system {system.name!r} has no element {end.element!r}"
@@ -265,7 +273,7 @@ class Nets:
         return None
 
 
-def _walk(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
+def _walk(element: SsdElement, path: Path) -> Iterator[tuple[Path, SsdElement]]:
     yield path, element
     if isinstance(element, SystemElement):
         for name, child in element.elements.items():

@@ -15,12 +15,12 @@ from cosim.ssp.model import (
     ComponentElement,
     Connector,
     DictionaryReference,
-    Element,
     End,
-    Entry,
-    Structure,
+    SsdConnection,
+    SsdElement,
+    SsdEntry,
+    SsdStructure,
     SystemElement,
-    Wire,
 )
 from cosim.ssp.package import DEFAULT_VARIANT, Package
 from cosim.ssp.steps import read_step
@@ -33,7 +33,7 @@ DEEPEST = 64
 Kind = TypeVar("Kind")
 
 
-def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -> Structure:
+def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -> SsdStructure:
     """A system structure of a package.
 
     Args:
@@ -45,7 +45,7 @@ def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -
     root = _parsed(package, member, "ssd")
     experiment = find(root, "ssd:DefaultExperiment")
     start, stop = (None, None) if experiment is None else (experiment.get("startTime"), experiment.get("stopTime"))
-    return Structure(
+    return SsdStructure(
         name=root.get("name"),
         description=root.get("description", ""),
         version=root.get("version"),
@@ -67,7 +67,7 @@ class _Reader:
     def __init__(self, package: Package, member: str, root: Node, outer: tuple[str, ...]) -> None:
         self.package, self.member, self.root, self.outer = package, member, root, outer
         self.units = UnitTable(root, "ssd", package.lapses)
-        self.readers: dict[str, Callable[[Node], Element]] = {
+        self.readers: dict[str, Callable[[Node], SsdElement]] = {
             "Component": self.component,
             "System": self.system,
             "SignalDictionaryReference": self.reference,
@@ -75,7 +75,7 @@ class _Reader:
 
     def system(self, node: Node) -> SystemElement:
         """A system and all it holds."""
-        elements: dict[str, Element] = {}
+        elements: dict[str, SsdElement] = {}
         for child in find_all(node, "ssd:Elements/*"):
             element = self.readers[short(child.tag)](child)
             if element.name in elements:
@@ -91,7 +91,7 @@ class _Reader:
             dictionaries=self.dictionaries(node),
         )
 
-    def component(self, node: Node) -> Element:
+    def component(self, node: Node) -> SsdElement:
         """A component: an FMU, or a structure of its own."""
         kind, source = node.get("type", FMU).partition(";")[0].strip(), node.get("source")
         if kind not in (FMU, DEFINITION, PACKAGE):
@@ -137,7 +137,7 @@ class _Reader:
             found[name] = Connector(name, child.get("kind"), kind, len(find_all(child, "ssc:Dimension")), child)
         return found
 
-    def wire(self, node: Node) -> Wire:
+    def wire(self, node: Node) -> SsdConnection:
         """A connection."""
         start, end = (
             End(
@@ -147,7 +147,7 @@ class _Reader:
             )
             for side in ("start", "end")
         )
-        return Wire(start, end, flag(node, "suppressUnitConversion"), read_transformation(node), node)
+        return SsdConnection(start, end, flag(node, "suppressUnitConversion"), read_transformation(node), node)
 
     def element(self, node: Node, key: str) -> str | None:
         """The element that one end of a connection names; None for the system itself."""
@@ -188,7 +188,7 @@ class _Reader:
         parameters = read_parameter_set(
             self._part(node, "ssv", component, holder), node.get("prefix", ""), self.package.lapses
         )
-        mapping: tuple[Entry, ...] | None = None
+        mapping: tuple[SsdEntry, ...] | None = None
         mapped = find(node, "ssd:ParameterMapping")
         if mapped is not None:
             mapping = read_mapping(self._part(mapped, "ssm", component, mapped))

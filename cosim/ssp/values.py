@@ -5,7 +5,7 @@ from __future__ import annotations
 from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import Entry, Parameter
+from cosim.ssp.model import Parameter, SsdEntry
 
 LISTS = ("String", "Enumeration", "Binary")
 """Types whose values may hold spaces: an array of them is written as Value elements."""
@@ -30,7 +30,7 @@ def read_parameter_set(root: Node, prefix: str, lapses: Lapses) -> tuple[Paramet
     return tuple(parameters.values())
 
 
-def read_mapping(root: Node) -> tuple[Entry, ...]:
+def read_mapping(root: Node) -> tuple[SsdEntry, ...]:
     """The entries of a valid ParameterMapping.
 
     Args:
@@ -39,12 +39,14 @@ def read_mapping(root: Node) -> tuple[Entry, ...]:
     Raises:
         ScenarioError: two entries have one target.
     """
-    entries: dict[str, Entry] = {}
+    entries: dict[str, SsdEntry] = {}
     for node in find_all(root, "ssm:MappingEntry"):
         source, target = node.get("source"), node.get("target")
         if target in entries:
             fail(node, f"two parameters are mapped to {target!r}; map one.")
-        entries[target] = Entry(source, target, flag(node, "suppressUnitConversion"), read_transformation(node), node)
+        entries[target] = SsdEntry(
+            source, target, flag(node, "suppressUnitConversion"), read_transformation(node), node
+        )
     return tuple(entries.values())
 
 

@@ -38,7 +38,7 @@ SURE, LIKELY = 7, 4
 
 
 @dataclass(frozen=True)
-class Signal:
+class GuessedSignal:
     """A numeric scalar variable, or an element of an array, as the description has it.
 
     Args:
@@ -68,13 +68,15 @@ class Guess:
         signal: the signal. sureness: how sure this is. reason: why, for people. others: the next best, best first.
     """
 
-    signal: Signal
+    signal: GuessedSignal
     sureness: Sureness
     reason: str
     others: Sequence[str] = ()
 
 
-def guess(quantity: Quantity, signals: Sequence[Signal], taken: Sequence[str] = (), part: str = "") -> Guess | None:
+def guess(
+    quantity: Quantity, signals: Sequence[GuessedSignal], taken: Sequence[str] = (), part: str = ""
+) -> Guess | None:
     """The signal that is most likely a quantity; the first of equals.
 
     Args:
@@ -98,7 +100,7 @@ def guess(quantity: Quantity, signals: Sequence[Signal], taken: Sequence[str] = 
     return Guess(best, sureness, reason + (", as others are" if tied else ""), rivals)
 
 
-def fits(signal: Signal, unit: str) -> bool:
+def fits(signal: GuessedSignal, unit: str) -> bool:
     """Whether the unit of a signal can be converted to this one; rad counts, unlike in SI.
 
     Args:
@@ -115,7 +117,7 @@ def fits(signal: Signal, unit: str) -> bool:
     return signal.meaning.exponents[-1] == wanted.exponents[-1]
 
 
-def _rate(quantity: Quantity, signal: Signal) -> tuple[int, str]:
+def _rate(quantity: Quantity, signal: GuessedSignal) -> tuple[int, str]:
     """How much speaks for a signal, 0 and less is nothing; and what."""
     has_unit = any(fits(signal, unit) for unit in UNITS[quantity]) or (quantity == "slip" and signal.unit is None)
     if signal.meaning is not None and not has_unit:
@@ -159,7 +161,7 @@ def _described(quantity: Quantity, description: str) -> int:
     return SAID if words & WORDS[_key(quantity)] else 0
 
 
-def _denied(quantity: Quantity, signal: Signal) -> int:
+def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
     """What speaks against it: it is named as a reference, a limit, an error, or as another force."""
     name = set(words_of(signal.name))
     against = (FOREIGN | NOT_THIS.get(quantity, frozenset())) - WORDS[_key(quantity)]

@@ -15,7 +15,7 @@ from cosim.components.component import Component
 from cosim.components.description import read_description, runs_here
 from cosim.components.loading import describe_fmu
 from cosim.errors import FmuLoadError
-from cosim.starter.guess import Signal
+from cosim.starter.guess import GuessedSignal
 from fmus.fmi.elements import elements_of
 from fmus.fmi.types import NUMERIC_TYPES
 from plant_models.hybrid.units import UnitError
@@ -39,10 +39,10 @@ class Look:
 
     path: Path
     component: Component
-    inputs: Sequence[Signal]
-    outputs: Sequence[Signal]
-    parameters: Sequence[Signal]
-    hidden: Sequence[Signal]
+    inputs: Sequence[GuessedSignal]
+    outputs: Sequence[GuessedSignal]
+    parameters: Sequence[GuessedSignal]
+    hidden: Sequence[GuessedSignal]
     unread: Sequence[str]
     runs_here: bool
 
@@ -63,7 +63,7 @@ def look_into(path: Path) -> Look:
     """
     _demand_co_simulation(path, read_description(path, path.name))
     component = describe_fmu(path, NAME)
-    found: dict[str, list[Signal]] = {"input": [], "output": [], "parameter": [], "local": []}
+    found: dict[str, list[GuessedSignal]] = {"input": [], "output": [], "parameter": [], "local": []}
     unread: list[str] = []
     hidden = component.event_references()
     for variable in component.description.modelVariables:
@@ -89,7 +89,7 @@ def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
     )
 
 
-def _signals(component: Component, variable: ModelVariable) -> list[Signal]:
+def _signals(component: Component, variable: ModelVariable) -> list[GuessedSignal]:
     if variable.type not in NUMERIC_TYPES:
         return []
     elements = elements_of(variable) if variable.shape else [None]
@@ -103,7 +103,9 @@ def _signals(component: Component, variable: ModelVariable) -> list[Signal]:
     start = None if variable.shape else number(variable.start)
     names = [variable.name if element is None else element.name for element in elements]
     description = variable.description or ""
-    return [Signal(name, unit, meaning if unit else None, description, start, str(variable.type)) for name in names]
+    return [
+        GuessedSignal(name, unit, meaning if unit else None, description, start, str(variable.type)) for name in names
+    ]
 
 
 def number(text: Any) -> float | None:

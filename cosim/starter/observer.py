@@ -7,7 +7,7 @@ from typing import Any
 from cosim.starter.guess import Guess
 from cosim.starter.look import Look
 from cosim.starter.roles import ObserverRoles
-from cosim.starter.toml_lines import Link, guessed, one_line
+from cosim.starter.toml_lines import GuessedLink, guessed, one_line
 from cosim.starter.train import train_times
 
 
@@ -23,9 +23,9 @@ def observer_beside(look: Look, roles: ObserverRoles) -> dict[str, Any]:
     """
     stop, step, source = train_times(look)
     links = [
-        Link("driver.effort", ["plant.effort"]),
-        Link("plant.wheel_speed", ["odometer.wheel_speed"]),
-        Link("odometer.reading", ["driver.odometer"]),
+        GuessedLink("driver.effort", ["plant.effort"]),
+        GuessedLink("plant.wheel_speed", ["odometer.wheel_speed"]),
+        GuessedLink("odometer.reading", ["driver.odometer"]),
         *_told("driver.effort", roles.effort),
         *_told("odometer.reading", roles.odometer),
     ]
@@ -33,8 +33,8 @@ def observer_beside(look: Look, roles: ObserverRoles) -> dict[str, Any]:
     return {"title": title, "stop": stop, "step": step, "source": source, "links": links}
 
 
-def _told(source: str, found: Guess | None) -> list[Link]:
+def _told(source: str, found: Guess | None) -> list[GuessedLink]:
     if found is None:
         return []
     factor = None if found.signal.readable else 1.0
-    return [Link(source, [f"observer.{found.signal.name}"], guessed(found), factor)]
+    return [GuessedLink(source, [f"observer.{found.signal.name}"], guessed(found), factor)]

@@ -12,7 +12,7 @@ from typing import Any
 
 import tomli_w
 
-from cosim.starter.guess import Guess, Signal
+from cosim.starter.guess import Guess, GuessedSignal
 from fmus.text_table import text_table
 
 WIDTH = 118
@@ -76,7 +76,7 @@ def guessed(guess: Guess) -> str:
     return f"  # {mark}{guess.sureness}: {one_line(guess.reason)}{others}"
 
 
-def listing(title: str, signals: Sequence[Signal]) -> str:
+def listing(title: str, signals: Sequence[GuessedSignal]) -> str:
     """Variables with unit and description, as comment.
 
     Args:
@@ -90,7 +90,7 @@ def listing(title: str, signals: Sequence[Signal]) -> str:
 
 
 @dataclass(frozen=True)
-class Link:
+class GuessedLink:
     """A connection to be written.
 
     Args:

@@ -10,7 +10,7 @@ from cosim.scenario.tables import ComponentTable
 from cosim.starter.guess import Guess, fits
 from cosim.starter.look import Look, number
 from cosim.starter.roles import PlantRoles
-from cosim.starter.toml_lines import Link, guessed, one_line
+from cosim.starter.toml_lines import GuessedLink, guessed, one_line
 from fmus.fmi.capabilities import read_capabilities
 
 PLANT, OBSERVER = "plant", "observer"
@@ -95,13 +95,13 @@ def train_times(look: Look) -> tuple[float, float, str]:
 # --------------------------------------------------------------------------------------------------------
 
 
-def _links(roles: PlantRoles) -> list[Link]:
-    links: list[Link] = []
+def _links(roles: PlantRoles) -> list[GuessedLink]:
+    links: list[GuessedLink] = []
     if roles.effort is not None:
         links.append(_from_driver(roles.effort))
     elif roles.applied is not None:
         links.append(
-            Link(
+            GuessedLink(
                 f"{PLANT}.{roles.applied.signal.name}",
                 [f"{OBSERVER}.effort"],
                 guessed(roles.applied),
@@ -110,23 +110,23 @@ def _links(roles: PlantRoles) -> list[Link]:
         )
     links.append(_to_odometer(roles))
     readers = ["driver.odometer"] if roles.effort is not None else []
-    links.append(Link("odometer.reading", [*readers, f"{OBSERVER}.odometer"]))
+    links.append(GuessedLink("odometer.reading", [*readers, f"{OBSERVER}.odometer"]))
     if roles.effort is not None:
-        links.append(Link("driver.effort", [f"{OBSERVER}.effort"]))
+        links.append(GuessedLink("driver.effort", [f"{OBSERVER}.effort"]))
     return links
 
 
-def _from_driver(effort: Guess) -> Link:
+def _from_driver(effort: Guess) -> GuessedLink:
     remark = guessed(effort)
     if effort.signal.unit is None:
         remark += "; it declares no unit: N is assumed"
     factor = _factor(effort)
     if factor is not None:
         remark += f"; its unit {one_line(str(effort.signal.unit))} is not understood: write the factor from N to it"
-    return Link("driver.effort", [f"{PLANT}.{effort.signal.name}"], remark, factor)
+    return GuessedLink("driver.effort", [f"{PLANT}.{effort.signal.name}"], remark, factor)
 
 
-def _to_odometer(roles: PlantRoles) -> Link:
+def _to_odometer(roles: PlantRoles) -> GuessedLink:
     found = roles.wheel_speed or roles.speed
     assert found is not None
     signal, remark = found.signal, guessed(found)
@@ -135,13 +135,13 @@ def _to_odometer(roles: PlantRoles) -> Link:
     if fits(signal, "rad/s"):
         assert signal.meaning is not None
         remark += f"; times the wheel radius, {RADIUS} m: WRITE YOURS"
-        return Link(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, RADIUS * signal.meaning.factor)
+        return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, RADIUS * signal.meaning.factor)
     if signal.unit is None:
         remark += "; it declares no unit: m/s is assumed"
     factor = _factor(found)
     if factor is not None:
         remark += f"; its unit {one_line(str(signal.unit))} is not understood: write the factor to m/s"
-    return Link(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, factor)
+    return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, factor)
 
 
 def _factor(found: Guess) -> float | None:

@@ -17,7 +17,7 @@ from cosim.scenario.structure import describe_component
 from cosim.studies.measures import Measure, error_measures, own_measures
 from cosim.studies.sampling import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import run_folder, write_index, write_run
-from cosim.studies.sweep_journal import Journal
+from cosim.studies.sweep_journal import SweepJournal
 from cosim.studies.sweep_result import SweepResult, SweepRun
 from cosim.studies.workers import Died, Raised, attempt, in_processes
 
@@ -129,7 +129,7 @@ class Sweep:
         """
         if resume and directory is None:
             raise ScenarioError("A sweep is resumed from its folder: give directory=...")
-        journal = None if directory is None else Journal(Path(directory), self)
+        journal = None if directory is None else SweepJournal(Path(directory), self)
         done: dict[int, SweepRun] = {} if journal is None or not resume else journal.read()
         if journal is not None:
             journal.begin(done.values())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.components.described import Described
+from cosim.components.described import DescribedComponent
 from cosim.drawing.style import OBSERVER_LINES, axes_or_new, styled
 from cosim.errors import CosimError, OutputError, nearest
 from cosim.scenario.structure import describe_component
@@ -88,7 +88,9 @@ def setting_unit(result: SweepResult, name: str) -> str | None:
     if table is None:
         return SETTING_UNITS.get(name)
     try:
-        described: Described = describe_component(component, table, result.scenario.folder, result.scenario.where)
+        described: DescribedComponent = describe_component(
+            component, table, result.scenario.folder, result.scenario.where
+        )
         return described.unit_name(variable if variable in described.variables else f"{variable}[1]")
     except (CosimError, KeyError, UnitError):
         return None

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 JOURNAL = "runs.jsonl"
 
 
-class Journal:
+class SweepJournal:
     """The file ``runs.jsonl`` in the folder of a sweep.
 
     Args:

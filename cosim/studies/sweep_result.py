@@ -55,7 +55,7 @@ class SweepRun:
 
 
 @dataclass(frozen=True)
-class Column:
+class SweepColumn:
     """A column of a printed table.
 
     Args:
@@ -97,7 +97,7 @@ class SweepResult:
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
 
     @property
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[SweepColumn]:
         """The measures that printed tables show: those the scenario chooses under ``report.measures``, or all.
 
         Raises:
@@ -105,12 +105,13 @@ class SweepResult:
         """
         chosen = self.scenario.table().report.measures
         if not chosen or not self.measures:
-            return [Column(name, with_unit(name, self.unit(name))) for name in self.measures]
+            return [SweepColumn(name, with_unit(name, self.unit(name))) for name in self.measures]
         unknown = [column.measure for column in chosen if column.measure not in self.measures]
         if unknown:
             raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
         return [
-            Column(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor) for c in chosen
+            SweepColumn(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor)
+            for c in chosen
         ]
 
     def unit(self, measure: str) -> str | None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import ScenarioError
-from cosim.observer_benchmark.candidates import Candidate, find_candidates
+from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
 from cosim.observer_benchmark.playback import Sides, connection, find_sides, playback_scenario, recording_scenario
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
@@ -27,7 +27,7 @@ class Seeded:
     seed: int
     whole: Scenario
     sides: Sides | None = None
-    candidate: Candidate | None = None
+    candidate: BenchmarkCandidate | None = None
 
     def recording(self) -> Scenario | None:
         """What is to be recorded before candidates can be run; None where whole runs are made."""

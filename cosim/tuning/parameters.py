@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from math import isqrt, nan
 from typing import Any
 
-from cosim.components.described import Described
+from cosim.components.described import DescribedComponent
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.scenario.override import COMPONENT_KEYS, INNER, TABLES
 from cosim.scenario.structure import describe_component
@@ -178,7 +178,7 @@ def _of_table(scenario: Scenario, head: str, rest: str, given: str) -> float:
     return float(value)
 
 
-def _told(component: Described, variable: str, told: Any, given: str) -> Any:
+def _told(component: DescribedComponent, variable: str, told: Any, given: str) -> Any:
     elements = [n for n in component.variables if n.startswith(f"{variable}[")]
     if variable not in component.variables and not elements:
         settable = [v.name for v in component.variables.values() if v.causality in ("parameter", "input")]

@@ -15,7 +15,16 @@ import numpy as np
 from fmu_observer.block.events import TIME_TOLERANCE, Events
 from fmu_observer.block.state import BlockState, Shape, check_owner
 from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
-from fmu_observer.block.variables import BEFORE_TIME, COMPUTED, BlockError, Mode, Place, Role, StepDiscarded, Variables
+from fmu_observer.block.variables import (
+    BEFORE_TIME,
+    COMPUTED,
+    BlockError,
+    BlockVariables,
+    Mode,
+    Place,
+    Role,
+    StepDiscarded,
+)
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
 
@@ -25,7 +34,7 @@ STEP_TOLERANCE = 1e-6
 POLICY_NUMBERS = ", ".join(f"{i} ({name})" for i, name in enumerate(LATE_POLICIES, start=1))
 
 
-class Instance:
+class BlockInstance:
     """One running copy of a hybrid system behind an FMI interface.
 
     Args:
@@ -52,7 +61,7 @@ class Instance:
         self.system, self.preset = system, preset
         self.runtime = Runtime(system, name=name)
         self.events = Events(system, self.runtime, protocol)
-        self.variables = Variables(system, self.runtime, self.events, counts_events)
+        self.variables = BlockVariables(system, self.runtime, self.events, counts_events)
         self._timing = Timing(system)
         self.shape = Shape(token, len(self.runtime.memory), len(self.runtime.ticks), self.events.payloads)
         self.reset()

@@ -18,9 +18,9 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription
 
-from fmu_observer.block.instance import Instance
+from fmu_observer.block.instance import BlockInstance
 from fmu_observer.block.policy import Counters
-from fmu_observer.block.sensitivity import Sensitivity
+from fmu_observer.block.sensitivity import BlockSensitivity
 from fmu_observer.block.state import BlockState, deserialize, serialize
 from fmu_observer.block.variables import BlockError, Mode, Role, StepDiscarded
 from fmu_observer.description import describe
@@ -115,9 +115,9 @@ class FMIInterface:
         self.guid: str = self.model_description.instantiationToken
         self.instanceName = instance_name or system.name
         self.modelIdentifier = system.name
-        self.instance = Instance(system, self.guid, counts_events, protocol, preset, self.instanceName)
+        self.instance = BlockInstance(system, self.guid, counts_events, protocol, preset, self.instanceName)
         self._counts_events = counts_events
-        self._sensitivity = Sensitivity(system, self.model_description.modelVariables)
+        self._sensitivity = BlockSensitivity(system, self.model_description.modelVariables)
         self._folder: str | None = None
 
     # -- identity ---------------------------------------------------------------------------------------------------
@@ -217,7 +217,7 @@ class FMIInterface:
     def directional_derivative(
         self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]
     ) -> list[float]:
-        """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`.
+        """Exact directional derivatives of real outputs and derivatives, see `BlockSensitivity.directional`.
 
         Args:
             unknowns: value references of outputs or derivatives. knowns: value references of inputs or states.

@@ -18,7 +18,7 @@ from fmu_observer.description import VariableTable, exposed_inputs, referenced
 from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, traced_once, width
 
 
-class Sensitivity:
+class BlockSensitivity:
     """Exact directional derivatives of one system.
 
     Args:

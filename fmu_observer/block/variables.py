@@ -1,4 +1,4 @@
-"""Variables: what each value reference of a block stands for, and in which modes it may be set.
+"""BlockVariables: what each value reference of a block stands for, and in which modes it may be set.
 
 The same rules as in the exported FMU, so that a master which works with the block works with the FMU.
 """
@@ -76,7 +76,7 @@ class Place:
     index: int
 
 
-class Variables:
+class BlockVariables:
     """The variables of one runtime by value reference.
 
     `derivatives` and `indicators` hold what `refresh` has computed last.

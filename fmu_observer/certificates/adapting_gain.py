@@ -21,7 +21,7 @@ from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.quadratic import (
-    Condition,
+    QuadraticCondition,
     common_quadratic_form,
     flow_condition,
     inequalities,
@@ -175,7 +175,7 @@ def _common_decrease(adaptation: GainAdaptation, max_gap: float) -> tuple[float,
     if cells.changing[0] and (cells.smallest[0] < 1.0 or cells.largest[0] > 1.0):
         return -inf, None  # changes of the gain without any time to correct: nothing here covers them
     grids = [_Grid(vertex, cells) for vertex in adaptation.vertices]
-    sought = reduce(Condition.joined, (grid.condition(range(0, CELLS, CELLS // COARSE)) for grid in grids))
+    sought = reduce(QuadraticCondition.joined, (grid.condition(range(0, CELLS, CELLS // COARSE)) for grid in grids))
     best: tuple[float, np.ndarray | None] = (-inf, None)
     for _ in range(CUTS):
         candidate = common_quadratic_form(sought)
@@ -188,7 +188,7 @@ def _common_decrease(adaptation: GainAdaptation, max_gap: float) -> tuple[float,
         if margin > MARGIN or candidate.margin <= MARGIN:
             break
         worst = sorted({cell for _, cell in judged})
-        sought = reduce(Condition.joined, (grid.condition(worst) for grid in grids), sought)
+        sought = reduce(QuadraticCondition.joined, (grid.condition(worst) for grid in grids), sought)
     return best
 
 
@@ -217,13 +217,13 @@ class _Grid:
         self._changes = np.stack([cells.smallest[self._cells], cells.largest[self._cells]])
         self._first = np.clip(self._cells - 2, 0, CELLS - 4)  # the cell and its neighbours: four points
 
-    def condition(self, cells: Sequence[int]) -> Condition:
+    def condition(self, cells: Sequence[int]) -> QuadraticCondition:
         """The inequalities at some of the cells, with the extreme changes of gain possible there."""
         chosen = np.isin(self._cells, np.asarray(cells))
         ends = self._cells[chosen]
         parts = [self._unchanged.picked(cells)]
         parts += [self._changed(ends - 1 + end, change[chosen]) for change in self._changes for end in (0, 1)]
-        return reduce(Condition.joined, parts)
+        return reduce(QuadraticCondition.joined, parts)
 
     def judge(self, P: np.ndarray) -> tuple[float, int]:
         """Largest eigenvalue on the grid with a bound for what lies between its points, and the cell where it is
@@ -245,7 +245,7 @@ class _Grid:
             found = max(found, (worst, int(self._cells[largest.argmax()])))
         return found
 
-    def _changed(self, at: np.ndarray, change: np.ndarray) -> Condition:
+    def _changed(self, at: np.ndarray, change: np.ndarray) -> QuadraticCondition:
         """Inequalities of ``theta eps' P eps`` over transitions and the changes ``m = theta_k / theta_(k+1)`` after
         them.
         """

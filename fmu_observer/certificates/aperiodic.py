@@ -15,7 +15,7 @@ import numpy as np
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.quadratic import (
-    Condition,
+    QuadraticCondition,
     common_quadratic_form,
     flow_condition,
     inequalities,
@@ -168,7 +168,7 @@ def _growth(inclusion: SwitchingError, P: np.ndarray, longest: float) -> np.ndar
     return np.asarray(inclusion.growth(P, longest, np.linspace(0.0, longest, FINE + 1)) / inclusion.centre.rate)
 
 
-def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray) -> Condition:
+def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray) -> QuadraticCondition:
     """``(Phi' P Phi - P) / (rate gap) < 0`` at gaps from 0 to `longest`, in scaled coordinates.
 
     At gap 0 the quotient is the derivative: the condition of the flow for infinitely frequent samples.
@@ -193,9 +193,9 @@ def _largest_between(values: np.ndarray) -> float:
     return float(np.linalg.eigvalsh(values)[:, -1].max() + 0.125 * bend)
 
 
-def _pick(conditions: list[Condition], indices: Sequence[int]) -> Condition:
+def _pick(conditions: list[QuadraticCondition], indices: Sequence[int]) -> QuadraticCondition:
     parts = [condition.picked(indices) for condition in conditions]
-    return reduce(Condition.joined, parts)
+    return reduce(QuadraticCondition.joined, parts)
 
 
 def _scaling(vertices: tuple[GapError, ...]) -> np.ndarray:

@@ -13,7 +13,7 @@ from math import inf
 
 import numpy as np
 
-from fmu_observer.certificates.quadratic import Condition, common_quadratic_form, decrease, flow_condition
+from fmu_observer.certificates.quadratic import QuadraticCondition, common_quadratic_form, decrease, flow_condition
 
 BISECTIONS = 20
 ROUNDING = 1e-12  # of the largest number in an inequality
@@ -90,7 +90,7 @@ def _proven(matrices: list[np.ndarray], decay: float) -> tuple[np.ndarray, float
     shifted = [A + decay * np.eye(len(A)) for A in matrices]
     if max(np.linalg.eigvals(A).real.max() for A in shifted) >= 0.0:
         return None
-    conditions = reduce(Condition.joined, map(flow_condition, shifted))
+    conditions = reduce(QuadraticCondition.joined, map(flow_condition, shifted))
     found = common_quadratic_form(conditions)
     if found is None:
         return None

@@ -29,7 +29,7 @@ class QuadraticForm:
 
 
 @dataclass(frozen=True)
-class Condition:
+class QuadraticCondition:
     """Inequalities ``M_j' P N_j + N_j' P M_j - w_j P < 0``: arrays M, N of shape (count, n, n) and w of shape (count,).
 
     A discrete transition F asks ``F' P F - P < 0`` (M = F / 2, N = F, w = 1), a flow A asks ``A' P + P A < 0`` (M = A,
@@ -40,22 +40,22 @@ class Condition:
     N: np.ndarray
     w: np.ndarray
 
-    def picked(self, indices: Sequence[int]) -> Condition:
+    def picked(self, indices: Sequence[int]) -> QuadraticCondition:
         """The inequalities at `indices`."""
         chosen = list(indices)
-        return Condition(self.M[chosen], self.N[chosen], self.w[chosen])
+        return QuadraticCondition(self.M[chosen], self.N[chosen], self.w[chosen])
 
-    def joined(self, other: Condition) -> Condition:
+    def joined(self, other: QuadraticCondition) -> QuadraticCondition:
         """Both together.
 
         Args:
             other: of the same components.
         """
         pairs = ((self.M, other.M), (self.N, other.N), (self.w, other.w))
-        return Condition(*(np.concatenate(pair) for pair in pairs))
+        return QuadraticCondition(*(np.concatenate(pair) for pair in pairs))
 
 
-def transition_condition(matrices: np.ndarray, weights: Array = 1.0) -> Condition:
+def transition_condition(matrices: np.ndarray, weights: Array = 1.0) -> QuadraticCondition:
     """``(F' P F - P) / weight < 0`` for transitions of shape (count, n, n) and weights of shape (count,) or a
     number.
 
@@ -63,15 +63,15 @@ def transition_condition(matrices: np.ndarray, weights: Array = 1.0) -> Conditio
         matrices: transitions F, shape (count, n, n).
     """
     scale = 1.0 / np.broadcast_to(np.asarray(weights, dtype=float), (len(matrices),))
-    return Condition(0.5 * scale[:, None, None] * matrices, matrices, scale)
+    return QuadraticCondition(0.5 * scale[:, None, None] * matrices, matrices, scale)
 
 
-def flow_condition(matrix: np.ndarray) -> Condition:
+def flow_condition(matrix: np.ndarray) -> QuadraticCondition:
     """``A' P + P A < 0`` for one matrix of shape (n, n)."""
-    return Condition(matrix[None], np.eye(len(matrix))[None], np.zeros(1))
+    return QuadraticCondition(matrix[None], np.eye(len(matrix))[None], np.zeros(1))
 
 
-def inequalities(condition: Condition, P: np.ndarray) -> np.ndarray:
+def inequalities(condition: QuadraticCondition, P: np.ndarray) -> np.ndarray:
     """Left-hand side of every inequality at P, shape (count, n, n).
 
     Args:
@@ -82,7 +82,7 @@ def inequalities(condition: Condition, P: np.ndarray) -> np.ndarray:
     return np.asarray(values)
 
 
-def decrease(condition: Condition, P: np.ndarray) -> np.ndarray:
+def decrease(condition: QuadraticCondition, P: np.ndarray) -> np.ndarray:
     """Largest eigenvalue of every inequality at P, shape (count,); all negative when P is a Lyapunov matrix.
 
     Args:
@@ -91,7 +91,7 @@ def decrease(condition: Condition, P: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.eigvalsh(inequalities(condition, P))[:, -1])
 
 
-def common_quadratic_form(condition: Condition) -> QuadraticForm | None:
+def common_quadratic_form(condition: QuadraticCondition) -> QuadraticForm | None:
     """The P with the largest common margin: maximise g subject to every inequality <= -g I, P >= 0, trace(P) = n.
 
     Args:
@@ -130,7 +130,7 @@ def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:
     )
 
 
-def _inequality_rows(condition: Condition) -> np.ndarray:
+def _inequality_rows(condition: QuadraticCondition) -> np.ndarray:
     """The packed left-hand side of every inequality as a linear map of packed P, shape (count * size, size)."""
     n = condition.M.shape[1]
     columns = []

@@ -16,7 +16,12 @@ import scipy
 from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.exponential import small_exponential
-from fmu_observer.certificates.quadratic import Condition, common_quadratic_form, inequalities, transition_condition
+from fmu_observer.certificates.quadratic import (
+    QuadraticCondition,
+    common_quadratic_form,
+    inequalities,
+    transition_condition,
+)
 
 HORIZON = 10.0  # [s]
 COARSE_PHASES, FINE_PHASES = 5, 41  # phases of the balise in an odometer period, for finding and for checking
@@ -153,7 +158,7 @@ def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarr
     return best
 
 
-def _recomputed(condition: Condition, P: np.ndarray, samples: int) -> tuple[float, set[int]]:
+def _recomputed(condition: QuadraticCondition, P: np.ndarray, samples: int) -> tuple[float, set[int]]:
     """Margin over the fine grid and between its phases, and the worst phase of every sample count."""
     values = inequalities(condition, P).reshape(samples, FINE_PHASES, *P.shape)
     largest = np.linalg.eigvalsh(values)[..., -1]

@@ -22,7 +22,7 @@ THETAS = (1.0, 2.0, 4.0, 5.0, 8.0)  # [1/s], those of the table
 
 
 @dataclass(frozen=True)
-class BoundRow:
+class DesignBoundRow:
     """One line of the table of bounds: the longest gap each formula allows at one gain.
 
     Attributes:
@@ -128,7 +128,7 @@ def longest_gap_3_87(theta: float, lipschitz: float) -> float:
     return (theta - 2.0 * lipschitz / theta) / (2.0 * theta**2 * _gain_size())
 
 
-def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tuple[BoundRow, ...]:
+def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tuple[DesignBoundRow, ...]:
     """Printed bounds beside the exact limits of the double integrator with K = (2, 1).
 
     Args:
@@ -141,7 +141,7 @@ def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tup
     return tuple(_row(float(theta), lipschitz) for theta in thetas)
 
 
-def bound_text(rows: Sequence[BoundRow]) -> str:
+def bound_text(rows: Sequence[DesignBoundRow]) -> str:
     """The table as plain text, one line a gain, all gaps in seconds.
 
     Args:
@@ -158,13 +158,13 @@ def bound_text(rows: Sequence[BoundRow]) -> str:
     return "\n".join([head, *lines])
 
 
-def _row(theta: float, lipschitz: float) -> BoundRow:
+def _row(theta: float, lipschitz: float) -> DesignBoundRow:
     if not theta > 0.0:
         raise ValueError(f"Bounds: theta must be positive [1/s], got {theta!r}.")
     gain, decay = (theta * SHAPE[0], theta**2 * SHAPE[1]), theta * SHAPE[0]
     vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, decay) for s in sorted({0.0, lipschitz}))
     exact = certify_sampled_error(vertices, 2.0 / theta, "double integrator with drag")
-    return BoundRow(
+    return DesignBoundRow(
         theta,
         by_1_52=longest_gap_1_52(theta, lipschitz),
         by_3_32=longest_gap_3_32(theta, lipschitz),

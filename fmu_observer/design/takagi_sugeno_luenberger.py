@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.quadratic import Condition, common_quadratic_form, decrease, flow_condition
+from fmu_observer.certificates.quadratic import QuadraticCondition, common_quadratic_form, decrease, flow_condition
 from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models import TakagiSugenoModel
@@ -74,7 +74,7 @@ def vertex_decrease(model: TakagiSugenoModel, gains: np.ndarray) -> VertexDecrea
     """
     errors = vertex_errors(model, gains)
     abscissa = max(float(np.linalg.eigvals(error).real.max()) for error in errors)
-    conditions = reduce(Condition.joined, map(flow_condition, errors))
+    conditions = reduce(QuadraticCondition.joined, map(flow_condition, errors))
     found = common_quadratic_form(conditions) if abscissa < 0.0 else None
     margin = -inf if found is None else -float(decrease(conditions, found.P).max())
     return VertexDecrease(margin, abscissa)

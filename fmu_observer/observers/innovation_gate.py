@@ -131,7 +131,7 @@ class Told(NamedTuple):
     t: Array
 
 
-class Judgement(NamedTuple):
+class GateJudgement(NamedTuple):
     """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. weight: of the
     innovation, 0 to 1. memory: afterwards.
     """
@@ -205,7 +205,7 @@ def gate_limit(before: GateMemory, told: Told, p: Any) -> Array:
     return p.gate_floor + known_accuracy(told.accuracy) + granted_error(before, told, p)
 
 
-def judge(before: GateMemory, told: Told, p: Any) -> Judgement:
+def judge(before: GateMemory, told: Told, p: Any) -> GateJudgement:
     """Whether a told position is used, how much it weighs, and what the gate remembers of it.
 
     Args:
@@ -237,7 +237,7 @@ def judge(before: GateMemory, told: Told, p: Any) -> Judgement:
     )
     kept = (np.where(used > 0.0, new, old) for new, old in zip(after[1:6], before[1:6], strict=True))
     still_doubted = np.where(used > 0.0, 0.0, after.doubted)
-    return Judgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
+    return GateJudgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
 
 
 def _row(before: GateMemory, told: Told, p: Any) -> tuple[Array, ...]:

@@ -21,7 +21,7 @@ UNDECIDED = -1
 
 
 @dataclass(frozen=True)
-class SearchSpace:
+class PencilSpace:
     """Coordinates among which is drawn.
 
     Args:
@@ -77,7 +77,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Stage:
+class SearchStage:
     """One decision: is it this class, or one of those left?
 
     Args:
@@ -112,7 +112,7 @@ class SignatureClassifier:
         stages: in their order. last: label of what no stage has told apart. labels: all.
     """
 
-    stages: tuple[Stage, ...]
+    stages: tuple[SearchStage, ...]
     last: Hashable
     labels: tuple[Hashable, ...] = field(default=())
 
@@ -142,7 +142,7 @@ class SeparationError(ValueError):
 
 
 def train_classifier(
-    records: np.ndarray, labels: Sequence[Hashable], space: SearchSpace, *, overlap: bool = False
+    records: np.ndarray, labels: Sequence[Hashable], space: PencilSpace, *, overlap: bool = False
 ) -> SignatureClassifier:
     """Decisions that tell classes apart, by random search: Omar 2012, section 3.4.5.
 
@@ -160,7 +160,7 @@ def train_classifier(
     records, groups = np.asarray(records, dtype=float), _groups(records, labels)
     values = _table(records, space)
     drawn = {pair: _strips(pair, values, groups) for pair in _draws(values, space)}
-    left, stages = set(groups), list[Stage]()
+    left, stages = set(groups), list[SearchStage]()
     while len(left) > 1:
         found = {pair: _isolated(strips, left) for pair, strips in drawn.items()}
         best = max(found, key=lambda pair: max(found[pair].values()))
@@ -175,7 +175,7 @@ def train_classifier(
             rivals = {rival: s for rival, s in drawn[best][label].items() if rival in left}
             margin = min(s.margin for s in rivals.values())
             if label == ranked[0] or margin >= space.margin:
-                stages.append(Stage(label, _plane(best, values), rivals, margin))
+                stages.append(SearchStage(label, _plane(best, values), rivals, margin))
                 left.remove(label)
     return SignatureClassifier(tuple(stages), next(iter(left)), tuple(groups))
 
@@ -193,7 +193,7 @@ class Drawn(NamedTuple):
     margin: float
 
 
-def drawn_planes(records: np.ndarray, labels: Sequence[Hashable], space: SearchSpace) -> list[Drawn]:
+def drawn_planes(records: np.ndarray, labels: Sequence[Hashable], space: PencilSpace) -> list[Drawn]:
     """All pairs of a search with the experiments in them, for those who choose by something else than the margin.
 
     Args:
@@ -222,7 +222,7 @@ def _groups(records: np.ndarray, labels: Sequence[Hashable]) -> dict[Hashable, n
     return groups
 
 
-def _table(records: np.ndarray, space: SearchSpace) -> dict[Coordinate, np.ndarray]:
+def _table(records: np.ndarray, space: PencilSpace) -> dict[Coordinate, np.ndarray]:
     """Values of all coordinates; each signature is computed once. Those without a range or not finite are left out."""
     table: dict[Coordinate, np.ndarray] = {}
     for order in space.orders:
@@ -237,7 +237,7 @@ def _table(records: np.ndarray, space: SearchSpace) -> dict[Coordinate, np.ndarr
     return usable
 
 
-def _draws(values: Mapping[Coordinate, np.ndarray], space: SearchSpace) -> list[tuple[Coordinate, Coordinate]]:
+def _draws(values: Mapping[Coordinate, np.ndarray], space: PencilSpace) -> list[tuple[Coordinate, Coordinate]]:
     """Pairs without repetition in a pair, from the seed."""
     names, generator = list(values), np.random.default_rng(space.seed)
     pairs = (generator.choice(len(names), 2, replace=False) for _ in range(space.draws))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from fmu_observer.signatures.classification import Drawn, Plane, SearchSpace, drawn_planes
+from fmu_observer.signatures.classification import Drawn, PencilSpace, Plane, drawn_planes
 
 PLACES = 400
 """Places at which a curve is compared with a point."""
@@ -66,7 +66,7 @@ class ClassCurve:
         return Located(self.place_values[place], away[np.arange(len(place)), place])
 
 
-def train_curve(records: np.ndarray, values: Sequence[float], space: SearchSpace) -> tuple[ClassCurve, float]:
+def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace) -> tuple[ClassCurve, float]:
     """Curve of classes in the drawn plane in which it gives the experiments of the training back best [ours: the plane
     with the widest strips may have the classes out of order, and values between them are then lost].
 
@@ -154,7 +154,7 @@ class ConditionalEstimator:
 
 
 def train_conditional(
-    records: np.ndarray, first: Sequence[float], second: Sequence[float], space: SearchSpace
+    records: np.ndarray, first: Sequence[float], second: Sequence[float], space: PencilSpace
 ) -> tuple[ConditionalEstimator, dict[str, float]]:
     """Curves of both stages from experiments at known places.
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.build import Plan
+from fmus.build import BuildPlan
 from fmus.toolchain.cached_library import cached_library
 from fmus.toolchain.compile import find_compiler
 from plant_models.disk_cache.folder import cache_folder
@@ -47,7 +47,7 @@ class Columns(ctypes.Structure):
     kept: Any
 
 
-class Events(ctypes.Structure):
+class BatchEvents(ctypes.Structure):
     """Events of all members, sorted by member and stamp, as in `batch.c`."""
 
     _fields_ = (
@@ -58,7 +58,7 @@ class Events(ctypes.Structure):
     )
 
 
-def load_batch(plan: Plan) -> ctypes.CDLL:
+def load_batch(plan: BuildPlan) -> ctypes.CDLL:
     """The library of a system's batch, compiled on the first call ever.
 
     Args:
@@ -86,7 +86,7 @@ def _declared(path: Path) -> ctypes.CDLL:
         "batch_failure": (ctypes.c_char_p, batch, number),
         "batch_set": (number, batch, columns),
         "batch_get": (None, batch, columns),
-        "batch_schedule": (None, batch, ctypes.c_void_p, ctypes.POINTER(Events)),
+        "batch_schedule": (None, batch, ctypes.c_void_p, ctypes.POINTER(BatchEvents)),
         "batch_next_event": (number, batch, number),
         "batch_run": (None, batch, number, number, ctypes.c_void_p, number, columns, columns),
     }

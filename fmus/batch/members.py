@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fmus.batch.error import BatchError
-from fmus.batch.library import Columns, Events, load_batch
+from fmus.batch.library import BatchEvents, Columns, load_batch
 from fmus.batch.schedule import Schedule
 from fmus.build import plan_fmu
 from fmus.recipes import recipe
@@ -136,7 +136,7 @@ class Batch:
         self._schedule = waiting.joined(added)
         kept = self._schedule
         first = np.searchsorted(kept.members, np.arange(self.members + 1)).astype(np.int64)
-        events = Events(
+        events = BatchEvents(
             kept.kinds.ctypes.data, kept.stamps.ctypes.data, kept.payloads.ctypes.data, kept.payloads.shape[1]
         )
         self._library.batch_schedule(self._batch, first.ctypes.data, events)  # which stay in `_schedule`

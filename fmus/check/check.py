@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from fmus.check.context import Context
-from fmus.check.findings import Finding, Outcome, Verdict
+from fmus.check.findings import CheckOutcome, Finding, Verdict
 from fmus.fmi.standard import CO_SIMULATION
 
 NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
@@ -46,7 +46,7 @@ class Check(ABC):
 
     @staticmethod
     @abstractmethod
-    def run(context: Context) -> Outcome:
+    def run(context: Context) -> CheckOutcome:
         """Make it.
 
         Args:
@@ -57,7 +57,7 @@ class Check(ABC):
         """
 
     @classmethod
-    def finding(cls, outcome: Outcome) -> Finding:
+    def finding(cls, outcome: CheckOutcome) -> Finding:
         """The finding of an outcome."""
         verdict = outcome.verdict or cls.failing
         advice = outcome.advice or cls.advice

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from fmus.check.findings import Outcome, failed, passed
+from fmus.check.findings import CheckOutcome, failed, passed
 
 RELATIVE_STEP = 1e-6
 """Of a finite difference: near the cube root of the rounding unit, where central differences are best."""
@@ -37,7 +37,7 @@ def compare(
     knowns: Mapping[str, float],
     unknowns: Sequence[str],
     nominal: Mapping[str, float],
-) -> Outcome:
+) -> CheckOutcome:
     """Compare column by column.
 
     Args:

@@ -35,7 +35,7 @@ class Class(StrEnum):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CheckOutcome:
     """What a check function returns.
 
     Args:
@@ -91,46 +91,46 @@ def class_of(findings: Iterable[Finding]) -> Class:
     return Class.DISTRUST if worst is Verdict.DISTRUST else Class.USE
 
 
-def passed(detail: str = "") -> Outcome:
+def passed(detail: str = "") -> CheckOutcome:
     """All is as it should be.
 
     Args:
         detail: what was seen, in words.
     """
-    return Outcome(Verdict.PASS, detail)
+    return CheckOutcome(Verdict.PASS, detail)
 
 
-def noted(detail: str) -> Outcome:
+def noted(detail: str) -> CheckOutcome:
     """For information: it changes nothing in a run of this package's master.
 
     Args:
         detail: what was seen, in words.
     """
-    return Outcome(Verdict.NOTE, detail)
+    return CheckOutcome(Verdict.NOTE, detail)
 
 
-def limited(detail: str, advice: str = "") -> Outcome:
+def limited(detail: str, advice: str = "") -> CheckOutcome:
     """A run is right as long as the advice, or that of the catalogue, is followed.
 
     Args:
         detail: what was seen, in words.
     """
-    return Outcome(Verdict.LIMIT, detail, advice)
+    return CheckOutcome(Verdict.LIMIT, detail, advice)
 
 
-def failed(detail: str) -> Outcome:
+def failed(detail: str) -> CheckOutcome:
     """The FMU breaks the standard or its own word; what that means stands in the catalogue.
 
     Args:
         detail: what was seen, in words.
     """
-    return Outcome(None, detail)
+    return CheckOutcome(None, detail)
 
 
-def skipped(reason: str) -> Outcome:
+def skipped(reason: str) -> CheckOutcome:
     """Not checked, and why.
 
     Args:
         reason: why, in words.
     """
-    return Outcome(Verdict.SKIPPED, reason)
+    return CheckOutcome(Verdict.SKIPPED, reason)

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 from fmus.check.catalogue import CHECKS, EXPECTED
 from fmus.check.check import REPEATED, Check
 from fmus.check.context import Context
-from fmus.check.findings import Finding, Outcome, Verdict, failed
+from fmus.check.findings import CheckOutcome, Finding, Verdict, failed
 from fmus.check.instance import SlaveError
 from fmus.check.job import Job
 from fmus.fmi.description import read_description
@@ -101,7 +101,7 @@ def unrun(name: str, basis: str) -> Finding:
     return Finding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
 
 
-def _outcome(check: type[Check], context: Context) -> Outcome:
+def _outcome(check: type[Check], context: Context) -> CheckOutcome:
     """What a check says; what an FMU raises is its failure, what a mistake in the check raises is the check's own."""
     try:
         return check.run(context)
@@ -110,7 +110,9 @@ def _outcome(check: type[Check], context: Context) -> Outcome:
     except Exception as error:  # whatever is wrong here must not be told of the FMU
         place = extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
-        outcome = Outcome(Verdict.ERROR, f"an error of this check, not of the FMU; please report it: {said}", BY_HAND)
+        outcome = CheckOutcome(
+            Verdict.ERROR, f"an error of this check, not of the FMU; please report it: {said}", BY_HAND
+        )
     if "bench" in context.__dict__:
         context.bench.reset_works = False  # whatever failed, go on with a fresh instance
     return outcome

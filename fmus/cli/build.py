@@ -35,7 +35,7 @@ examples:
 
 
 @dataclass(frozen=True)
-class Job:
+class BuildJob:
     """One FMU to build: what, for which version of FMI, and where to."""
 
     system: Any
@@ -113,7 +113,7 @@ def execute(options: argparse.Namespace) -> int:
     with ProgressBar("library", silent=libraries < 2) as bar:
         for job in jobs:
 
-            def progress(platform: str, job: Job = job) -> None:
+            def progress(platform: str, job: BuildJob = job) -> None:
                 bar(next(number), libraries, f"{job.system.name} {platform}")
 
             path = build_fmu(
@@ -150,7 +150,7 @@ def _run_hosted(options: argparse.Namespace) -> int:
     return 0
 
 
-def _summary(job: Job, path: Path) -> str:
+def _summary(job: BuildJob, path: Path) -> str:
     platforms = platforms_of(path)
     return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
 
@@ -159,7 +159,7 @@ def _summary(job: Job, path: Path) -> str:
 # ------------------------------------------------------------------------------------------------------
 
 
-def _jobs(options: argparse.Namespace) -> list[Job]:
+def _jobs(options: argparse.Namespace) -> list[BuildJob]:
     names, versions = _names(options), VERSIONS[options.fmi]
     if len(names) > 1 and (options.preset or options.option):
         raise ValueError("--preset and --option belong to one model; build the models one by one.")
@@ -173,7 +173,7 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
     folders = {
         version: options.output / f"fmi{version}" if len(versions) > 1 else options.output for version in versions
     }
-    return [Job(system, version, folders[version]) for version in versions for system in systems]
+    return [BuildJob(system, version, folders[version]) for version in versions for system in systems]
 
 
 def _names(options: argparse.Namespace) -> list[str]:

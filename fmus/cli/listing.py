@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from fmus.catalogue import Entry, by_room, catalogue
+from fmus.catalogue import CatalogueEntry, by_room, catalogue
 from fmus.text_table import text_table
 
 
@@ -33,7 +33,7 @@ def execute(_options: argparse.Namespace) -> int:
     return 0
 
 
-def _choices(entry: Entry) -> list[str]:
+def _choices(entry: CatalogueEntry) -> list[str]:
     """Presets and options of a model in words; an option that no word can set is left out."""
     lines = []
     if entry.presets:

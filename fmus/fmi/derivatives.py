@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.fmi.elements import Layout
+from fmus.fmi.elements import ElementLayout
 from fmus.fmi.ports import is_native
 
 
@@ -40,7 +40,7 @@ def input_derivative_writer(
 
 
 def directional_derivative(
-    slave: Any, unknowns: Layout, knowns: Layout, seed: Sequence[float]
+    slave: Any, unknowns: ElementLayout, knowns: ElementLayout, seed: Sequence[float]
 ) -> Callable[[], np.ndarray]:
     """A call of getDirectionalDerivative.
 

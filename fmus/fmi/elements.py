@@ -81,7 +81,7 @@ def elements_of(variable: ModelVariable) -> list[Element]:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ElementLayout:
     """How scalars and elements lie in whole variables, which is how FMI reads and writes them.
 
     Args:
@@ -105,7 +105,7 @@ class Layout:
         return len(np.unique(self.positions)) < self.total
 
 
-def layout(elements: Sequence[Element]) -> Layout:
+def layout(elements: Sequence[Element]) -> ElementLayout:
     """The layout of scalars and elements."""
     begin: dict[str, int] = {}
     variables: list[ModelVariable] = []
@@ -116,7 +116,7 @@ def layout(elements: Sequence[Element]) -> Layout:
             variables.append(element.variable)
             total += size(element.variable)
     positions = [begin[e.variable.name] + (e.index or 0) for e in elements]
-    return Layout(tuple(variables), np.array(positions, dtype=np.intp), total)
+    return ElementLayout(tuple(variables), np.array(positions, dtype=np.intp), total)
 
 
 def described(variable: ModelVariable) -> str:

@@ -20,7 +20,7 @@ from native_foreign import foreign
 from native_step import step
 
 from fmus import build_fmu, recipe
-from fmus.build import Plan, plan_fmu
+from fmus.build import BuildPlan, plan_fmu
 from fmus.toolchain.platforms import HOST, PLATFORMS
 from fmus.toolchain.targets import choose_targets, compile_targets
 
@@ -42,7 +42,7 @@ def build() -> None:
                 print(f"  {name:<16} {measure(plan, name)}")
 
 
-def measure(plan: Plan, platform: str) -> str:
+def measure(plan: BuildPlan, platform: str) -> str:
     """Time to compile for one platform, and the size of the library."""
     targets, files, seconds = choose_targets(platform), plan.source_files() | plan.header_files(), []
     for _ in range(REPETITIONS):

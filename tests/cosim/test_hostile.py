@@ -336,7 +336,7 @@ def test_parts_of_steps_below_the_resolution_of_time_are_refused() -> None:
 def test_a_damaged_fmu_in_the_cache_is_built_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, damage: bytes | None
 ) -> None:
-    monkeypatch.setattr("fmus.build.Draft", FakeDraft)
+    monkeypatch.setattr("fmus.build.BuildDraft", FakeDraft)
     monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path))
     system, first_byte = PLANTS["odometer"](), 30 + len("modelDescription.xml")  # that of the compressed content
     entry = cache.cache_entry(system, 2)

@@ -23,8 +23,8 @@ from fmu_observer.observers.innovation_gate import (
     OFF,
     REJECT,
     WARN,
+    GateJudgement,
     GateMemory,
-    Judgement,
     Told,
     gate_limit,
     judge,
@@ -109,7 +109,7 @@ LIMIT = 0.5 + 0.2 + SINCE + 3.0 * 0.4
 """Of `SETTLED` and `judged`: floor, accuracy, the way since 60 m, and of the recent innovation [m]."""
 
 
-def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> Judgement:
+def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> GateJudgement:
     """The judgement on a position so far from an estimate of 100 m."""
     return judge(before, Told(100.0 - innovation, 0.2, 100.0, 0.3, 0.0, 10.0)._replace(**told), GATE)
 

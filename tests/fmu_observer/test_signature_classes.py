@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 from fmu_observer.observers.signature import SignatureTrack, WheelSignature
 from fmu_observer.observers.signature.wheel_classes import WHEEL_CLASSES
 from fmu_observer.observers.signature.wheel_signature import CODES, record_class
-from fmu_observer.signatures.classification import SearchSpace, SeparationError, train_classifier
+from fmu_observer.signatures.classification import PencilSpace, SeparationError, train_classifier
 from fmu_observer.signatures.clouds import Coordinate, extent, separation
 from fmu_observer.signatures.conditional_estimate import train_conditional, train_curve
 from fmu_observer.signatures.dynamic_signature import dynamic_signature
@@ -23,7 +23,7 @@ from fmu_observer.signatures.properties import PROPERTIES, branch_tips, printed_
 from plant_models.hybrid import Runtime
 
 GALLERY = Path(__file__).resolve().parents[2] / "docs" / "gallery" / "moving_horizon"
-SPACE = SearchSpace((4, 8), ("range_xi", "range_eta", "mean_xi", "path_length"), eps=(0.1,), draws=25)
+SPACE = PencilSpace((4, 8), ("range_xi", "range_eta", "mean_xi", "path_length"), eps=(0.1,), draws=25)
 
 
 def waves(frequencies: list[float], sizes: list[float], seed: int = 0) -> np.ndarray:
@@ -102,7 +102,7 @@ def test_a_value_between_classes_is_interpolated():
 
 def test_a_second_quantity_follows_under_the_condition_of_the_first():
     pairs = [(f, s) for f in (0.05, 0.08, 0.11) for s in (1.0, 2.0, 3.0) for _ in range(4)]
-    space = SearchSpace((4, 8), ("range_xi", "range_eta", "mean_xi", "path_length"), eps=(0.1, 1.0), draws=40)
+    space = PencilSpace((4, 8), ("range_xi", "range_eta", "mean_xi", "path_length"), eps=(0.1, 1.0), draws=40)
     first, second = [p[0] for p in pairs], [p[1] for p in pairs]
     estimator, margins = train_conditional(waves(first, second), first, second, space)
     assert set(margins) == {"first", "second at 0.05", "second at 0.08", "second at 0.11"}

@@ -14,7 +14,7 @@ from lying_fmus import build, description
 from fmus.check import Class, Verdict, check_fmu, isolated
 from fmus.check.check import REPEATED, Check
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, class_of, passed
+from fmus.check.findings import CheckOutcome, class_of, passed
 from fmus.check.instance import FmuInstance
 from fmus.check.worker import findings
 from fmus.cli import main
@@ -79,13 +79,13 @@ def test_memory_is_bounded(marked: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert report.verdict is Class.DISTRUST
 
 
-def made(name: str, run: Callable[[Context], Outcome], failing: Verdict, compares: bool = False) -> type[Check]:
+def made(name: str, run: Callable[[Context], CheckOutcome], failing: Verdict, compares: bool = False) -> type[Check]:
     return type("Made", (Check,), {"name": name, "run": staticmethod(run), "failing": failing, "compares": compares})
 
 
 @pytest.mark.parametrize("error", [KeyError("x"), TypeError("x"), ValueError("x"), AssertionError("x")])
 def test_an_error_of_the_check_is_not_told_of_the_fmu(error: Exception) -> None:
-    def broken(_context: Context) -> Outcome:
+    def broken(_context: Context) -> CheckOutcome:
         raise error
 
     context = Context(Path(), None, 0.01, 0.0, {}, 1.0, 1)
@@ -107,7 +107,7 @@ def test_a_wrong_call_of_ours_is_no_failure_of_the_fmu() -> None:
 
 def test_where_equal_runs_differ_nothing_is_compared() -> None:
     context = Context(Path(), None, 0.01, 0.0, {}, 1.0, 1)
-    differs = made(REPEATED, lambda _: Outcome(None, "they differ"), Verdict.LIMIT)
+    differs = made(REPEATED, lambda _: CheckOutcome(None, "they differ"), Verdict.LIMIT)
     compared = made("compared", lambda _: passed(), Verdict.LIMIT, compares=True)
     assert [f.verdict for f in findings([differs, compared], context)] == [Verdict.LIMIT, Verdict.SKIPPED]
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmus.check.derivatives import compare
-from fmus.check.findings import Outcome, Verdict
+from fmus.check.findings import CheckOutcome, Verdict
 
 CURVES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
     "sine": (np.sin, np.cos),
@@ -20,7 +20,7 @@ CURVES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
 }
 
 
-def compared(curve: Callable[[float], float], slope: float, at: float) -> Outcome:
+def compared(curve: Callable[[float], float], slope: float, at: float) -> CheckOutcome:
     return compare(
         lambda _n, value: np.array([curve(value)]), lambda _n: np.array([slope]), {"x": at}, ["y"], {"x": 1.0}
     )

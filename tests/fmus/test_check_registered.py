@@ -14,7 +14,7 @@ from fmus.check import Verdict, check_fmu
 from fmus.check.catalogue import CHECKS
 from fmus.check.check import Check
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, passed
+from fmus.check.findings import CheckOutcome, passed
 from fmus.recipes import recipe
 from plant_models import registry
 
@@ -69,7 +69,7 @@ def test_a_check_that_no_other_process_finds_is_refused() -> None:
         name = "hidden"
 
         @staticmethod
-        def run(context: Context) -> Outcome:
+        def run(context: Context) -> CheckOutcome:
             return passed(str(context))
 
     CHECKS["hidden"] = Hidden

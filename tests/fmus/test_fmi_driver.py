@@ -14,7 +14,7 @@ from test_fmus.build import linear_fmu
 from test_fmus.events import periodic_fmu, periodic_ticks, timed_fmu
 
 from cosim.components.component import Component
-from cosim.components.described import Described
+from cosim.components.described import DescribedComponent
 from cosim.components.fmi1 import FMI1Component
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
@@ -27,7 +27,7 @@ from fmus.fmi.library import MissingFunctionError, _Missing
 from fmus.fmi.native_calls import prepared_call
 
 CHECKED = (FmuInstance, FmuSlave2, FmuSlave3, FmuModel, FmuModel2, FmuModel3)
-STEPPED = (Described, Component, FMI1Component, FMI2Component, FMI3Component)
+STEPPED = (DescribedComponent, Component, FMI1Component, FMI2Component, FMI3Component)
 OWN_WORDS = {"failure", "note", "_forget"}
 """How an error reads, where messages go and what of a run is remembered is for each side to say."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.errors import ScenarioError
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.judged import Judged, at, with_unit
-from cosim.expectations.run import Run, span
+from cosim.expectations.run import JudgedRun, span
 from cosim.expectations.sizes import bounded, difference
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class BoundExpectation(WindowExpectation):
             )
         return self
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """The largest share of the bound that the error takes; it is broken where that exceeds 1."""
         error = np.abs(difference(run.recorded(self.signal), run.recorded(self.reference)))
         bound, window, unit = run.recorded(self.bound), run.window(self.start, self.end), run.unit(self.signal)

@@ -9,7 +9,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.facts import certified_gap, mapping_entry, number_entry
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import NotRecordedError, Run
+from cosim.expectations.run import JudgedRun, NotRecordedError
 from cosim.table import Name
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class CertificateExpectation(Expectation):
                 raise ScenarioError(f"{name!r} is told of no telegrams; {nearest(name, before.receivers)}")
         return self
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """Certified for the longest gap that was expected, where that was known, and for the longest that occurred."""
         certificates = mapping_entry(run.result, "certificates")
         told = [name for name, entry in certificates.items() if isinstance(entry, Mapping) and SEEN in entry]
@@ -50,7 +50,7 @@ class CertificateExpectation(Expectation):
         return [_certificate(name, certificates.get(name), run) for name in names]
 
 
-def _certificate(observer: str, entry: Any, run: Run) -> Judged:
+def _certificate(observer: str, entry: Any, run: JudgedRun) -> Judged:
     name = f"certificate of {observer}"
     if not isinstance(entry, Mapping):
         return Judged(name, "certificate", passed=False, unit="s", text="nothing to judge: it has no certificate")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from cosim.expectations.expectation import LimitedExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import Run, span
+from cosim.expectations.run import JudgedRun, span
 from cosim.expectations.sizes import difference, judge_sizes
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class DifferenceExpectation(LimitedExpectation):
         before.demand_same_dimension(self.signal, self.reference)
         return self
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """One signal minus another."""
         error = difference(run.recorded(self.signal), run.recorded(self.reference))
         window = run.window(self.start, self.end)

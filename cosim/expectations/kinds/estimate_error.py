@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, Self
 from cosim.errors import ScenarioError
 from cosim.expectations.expectation import LimitedExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import NotRecordedError, Run, span
+from cosim.expectations.run import JudgedRun, NotRecordedError, span
 from cosim.expectations.sizes import difference, judge_sizes
 from cosim.table import Name
 
@@ -56,7 +56,7 @@ class ErrorExpectation(LimitedExpectation):
             before.demand_output(observer, output)
         return self
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """Errors of the estimates of each observer, from the start of the evaluation on where no window is given."""
         role, output, unit = ERRORS[self.check]
         true = getattr(run.spec, role)

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.indicators import held, threshold_of
 from cosim.expectations.judged import Judged, at, given
-from cosim.expectations.run import Run, span
+from cosim.expectations.run import JudgedRun, span
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
@@ -34,7 +34,7 @@ class OffExpectation(WindowExpectation):
             return self
         return self.model_copy(update={"threshold": before.threshold(self.signal)})
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """Never on within the window."""
         name = f"{self.signal} off{span(self.start, self.end)}"
         values, threshold, window = (

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.indicators import ROUNDING, first_on, threshold_of
 from cosim.expectations.judged import Judged, given
-from cosim.expectations.run import Run, span
+from cosim.expectations.run import JudgedRun, span
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
@@ -45,7 +45,7 @@ class OnExpectation(Expectation):
             return self
         return self.model_copy(update={"threshold": before.threshold(self.signal)})
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """On at `before` at the latest; an indicator that is on when the window begins is on in time."""
         name = f"{self.signal} on by {given(self.before)} s{span(self.start, None)}"
         values, threshold = run.recorded(self.signal), threshold_of(self.signal, self.threshold)

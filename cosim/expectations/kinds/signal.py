@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import Run, span
+from cosim.expectations.run import JudgedRun, span
 from cosim.expectations.sizes import bounded
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class SignalExpectation(WindowExpectation):
         before.unit(self.signal)
         return self
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """Smallest, largest and last value of a signal."""
         values, unit, window = run.recorded(self.signal), run.unit(self.signal), run.window(self.start, self.end)
         shown, when = values[window.rows], window.time

@@ -10,8 +10,8 @@ from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.event_counts import USED
 from cosim.expectations.expectation import Count, WindowExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import Run, span
-from cosim.expectations.window import Window
+from cosim.expectations.run import JudgedRun, span
+from cosim.expectations.window import TimeWindow
 from cosim.results.data import BaliseRecord
 from cosim.table import Name
 
@@ -67,7 +67,7 @@ class TelegramsExpectation(WindowExpectation):
             raise ScenarioError(f"{self.of!r} is told of no telegrams; {nearest(self.of, before.receivers)}")
         return self
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """Counts of the telegrams stamped within the window: of the track as a whole, and at each receiver."""
         window = run.window(self.start, self.end)
         within = [e for e in run.result.events if window.holds(e.stamp)]
@@ -95,7 +95,7 @@ class TelegramsExpectation(WindowExpectation):
         return found
 
 
-def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: Window) -> Judged:
+def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWindow) -> Judged:
     passed = len(chosen) <= limit
     named = ", ".join(f"{e.identity or 'without name'} at {e.stamp:.6g} s" for e in chosen[:NAMES_SHOWN])
     more = ", ..." if len(chosen) > NAMES_SHOWN else ""
@@ -105,7 +105,7 @@ def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: Window) 
     return _counted(name, passed and not window.broken, chosen, limit, when, text)
 
 
-def _at_least(name: str, limit: int, chosen: list[BaliseRecord], window: Window) -> Judged:
+def _at_least(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWindow) -> Judged:
     """Enough telegrams are enough, also where the run ended early."""
     passed = len(chosen) >= limit
     text = f"{len(chosen)}, expected at least {limit}" + (

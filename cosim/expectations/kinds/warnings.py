@@ -7,7 +7,7 @@ from typing import Literal
 from cosim.evaluation.facts import list_entry
 from cosim.expectations.expectation import Count, Expectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import Run
+from cosim.expectations.run import JudgedRun
 
 WARNINGS_SHOWN = 3
 
@@ -18,7 +18,7 @@ class WarningsExpectation(Expectation):
     check: Literal["warnings"]
     at_most: Count = 0
 
-    def judge(self, run: Run) -> list[Judged]:
+    def judge(self, run: JudgedRun) -> list[Judged]:
         """The number of warnings of the run."""
         warnings = [str(text) for text in list_entry(run.result, "warnings")]
         passed = len(warnings) <= self.at_most

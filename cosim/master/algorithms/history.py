@@ -10,7 +10,7 @@ NUMBERS_SHOWN = 8
 
 
 @dataclass(frozen=True)
-class Search:
+class IterationSearch:
     """The iteration of one step.
 
     Args:
@@ -38,10 +38,10 @@ class History:
     steps: int = 0
     sweeps: int = 0
     largest: float = 0.0
-    worst: Search | None = None
-    last: Search | None = field(default=None)
+    worst: IterationSearch | None = None
+    last: IterationSearch | None = field(default=None)
 
-    def add(self, search: Search) -> None:
+    def add(self, search: IterationSearch) -> None:
         """A step converged.
 
         Args:

@@ -12,7 +12,7 @@ from cosim.coupling.planned import PlannedComponent
 
 
 @dataclass(frozen=True)
-class Link:
+class LoopLink:
     """One connection as the plan holds it.
 
     Args:
@@ -30,11 +30,11 @@ class Link:
     held: bool
 
 
-def plan_links(plan: Plan) -> list[Link]:
+def plan_links(plan: Plan) -> list[LoopLink]:
     """All connections of a plan between components that are stepped, in its order."""
     owner = [place for place, step in enumerate(plan.steps) for _ in range(step.columns.start, step.columns.stop)]
     return [
-        Link(
+        LoopLink(
             f"{plan.signals[column].name} -> {step.component.name}.{name}",
             int(column),
             owner[column],
@@ -50,7 +50,7 @@ def plan_links(plan: Plan) -> list[Link]:
     ]
 
 
-def fed_back(links: Sequence[Link], members: range | None = None) -> list[Link]:
+def fed_back(links: Sequence[LoopLink], members: range | None = None) -> list[LoopLink]:
     """Links whose target is stepped no later than their source, among consecutive members of the plan or among all.
 
     Args:
@@ -63,7 +63,7 @@ def fed_back(links: Sequence[Link], members: range | None = None) -> list[Link]:
     ]
 
 
-def interface(links: Sequence[Link], members: range | None = None) -> np.ndarray:
+def interface(links: Sequence[LoopLink], members: range | None = None) -> np.ndarray:
     """Columns of the values that are fed back, each once, ascending, shape (n,).
 
     Args:

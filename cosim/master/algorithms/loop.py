@@ -16,8 +16,8 @@ import numpy as np
 from cosim.coupling.plan import Plan, Service
 from cosim.errors import RunError
 from cosim.master.algorithms.acceleration import make_acceleration, scaled_norm
-from cosim.master.algorithms.history import History, Search, shown
-from cosim.master.algorithms.links import Link, interface, span
+from cosim.master.algorithms.history import History, IterationSearch, shown
+from cosim.master.algorithms.links import LoopLink, interface, span
 from cosim.master.algorithms.sensitivity import Sensitivity
 from cosim.master.algorithms.settings import IterationSettings
 
@@ -51,7 +51,7 @@ class IteratedLoop:
         settings: method and tolerances.
     """
 
-    def __init__(self, plan: Plan, members: range, links: Sequence[Link], settings: IterationSettings) -> None:
+    def __init__(self, plan: Plan, members: range, links: Sequence[LoopLink], settings: IterationSettings) -> None:
         self.steps = [plan.steps[place] for place in members]
         self.settings = settings
         self.history = History()
@@ -117,7 +117,7 @@ class IteratedLoop:
             services = [(service, service.save_within()) for service in self._plan.services]
             self._restore(start)
             self._search(t, until, replace(start, services=services), z, residuals)
-        self.history.add(Search(until, tuple(residuals)))
+        self.history.add(IterationSearch(until, tuple(residuals)))
 
     def _search(self, t: float, until: float, start: Start, z: np.ndarray, residuals: list[float]) -> np.ndarray:
         """Sweep until what comes back is the guess, shape (n,), which is returned; the residuals are added to those so
@@ -206,7 +206,7 @@ class IteratedLoop:
         )
 
 
-def _ends_known(links: Sequence[Link], place: int, members: range) -> np.ndarray:
+def _ends_known(links: Sequence[LoopLink], place: int, members: range) -> np.ndarray:
     """Of each input of a member, whether its value is that of the end of the step: not held, of a member or stepped
     before.
     """

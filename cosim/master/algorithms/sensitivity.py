@@ -12,7 +12,7 @@ import numpy as np
 from cosim.components.component import Component
 from cosim.coupling.feedthrough import declared_feedthrough
 from cosim.coupling.plan import Plan
-from cosim.master.algorithms.links import Link
+from cosim.master.algorithms.links import LoopLink
 from fmus.fmi.types import FLOATING_TYPES
 
 
@@ -49,7 +49,7 @@ class Sensitivity:
     `usable` says whether every component through which something passes at once declares directional derivatives.
     """
 
-    def __init__(self, plan: Plan, members: range, links: Sequence[Link], interface: np.ndarray) -> None:
+    def __init__(self, plan: Plan, members: range, links: Sequence[LoopLink], interface: np.ndarray) -> None:
         self._interface, self._count = interface, len(plan.values)
         inner = [link for link in links if link.source in members and link.target in members and not link.held]
         passages = [_passage(plan, place, inner) for place in members]
@@ -77,7 +77,7 @@ class Sensitivity:
         return found if np.isfinite(found).all() else None
 
 
-def _passage(plan: Plan, place: int, inner: Sequence[Link]) -> Passage | None:
+def _passage(plan: Plan, place: int, inner: Sequence[LoopLink]) -> Passage | None:
     """None where nothing passes through a component at once that comes from the loop and goes back into it."""
     step = plan.steps[place]
     component, given = step.component, {link.column for link in inner if link.source == place}

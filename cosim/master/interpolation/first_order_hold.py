@@ -19,7 +19,7 @@ Method = Literal["interpolate", "extrapolate"]
 
 
 @dataclass
-class History:
+class InputHistory:
     """The last two values that the sources gave, and when.
 
     Args:
@@ -31,9 +31,9 @@ class History:
     earlier_at: np.ndarray
     later_at: np.ndarray
 
-    def copy(self) -> History:
+    def copy(self) -> InputHistory:
         """An independent copy."""
-        return History(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
+        return InputHistory(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
 
 
 class Course(Protocol):
@@ -86,7 +86,7 @@ class FirstOrderHold:
         self._distinct = list({id(c): c for c in sources}.values())
         self._source_of = np.array([[id(d) for d in self._distinct].index(id(c)) for c in sources], dtype=np.intp)
         count = len(continuous)
-        self._history = History(np.zeros(count), np.zeros(count), np.full(count, np.nan), np.full(count, np.nan))
+        self._history = InputHistory(np.zeros(count), np.zeros(count), np.full(count, np.nan), np.full(count, np.nan))
         self.slope = np.zeros(count)
         self._stood = np.full(count, np.nan)
 
@@ -157,11 +157,11 @@ class FirstOrderHold:
         """
         self._history.earlier_at[which] = self._history.later_at[which] = np.nan
 
-    def save(self) -> History:
+    def save(self) -> InputHistory:
         """What a step changes here."""
         return self._history.copy()
 
-    def restore(self, state: History) -> None:
+    def restore(self, state: InputHistory) -> None:
         """Return to what was saved.
 
         Args:

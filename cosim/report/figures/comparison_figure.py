@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from cosim.comparison.verdict import Curves, Finding, SignalComparison
+from cosim.comparison.verdict import ComparisonFinding, Curves, SignalComparison
 from cosim.drawing.style import ALARM, AMBER, BLACK, BLUE, GRID, MARK, TIME, axes_or_new, headline, new_figure, styled
 from cosim.evaluation.numbers import number
 from cosim.report.figures.drawing import curve, legend_above, thin
@@ -163,7 +163,7 @@ def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
     return max(begin, centre - half), min(end, centre + min(width, half) + half)
 
 
-def _centre(finding: Finding) -> tuple[float, float]:
+def _centre(finding: ComparisonFinding) -> tuple[float, float]:
     """Where a finding is largest and how far a late jump reaches from there [s]; else where it begins, and its length
     [s].
     """
@@ -172,7 +172,7 @@ def _centre(finding: Finding) -> tuple[float, float]:
     return finding.worst, finding.size if finding.kind == "jump_time" else 0.0
 
 
-def worst_finding(signal: SignalComparison) -> Finding | None:
+def worst_finding(signal: SignalComparison) -> ComparisonFinding | None:
     """The first finding that has an instant.
 
     Args:

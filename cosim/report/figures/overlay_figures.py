@@ -15,7 +15,7 @@ from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, 
 from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
 from cosim.report.figures.scales import bounded, value_limits
-from cosim.report.overlay.runs import Run, observers_of, one_each
+from cosim.report.overlay.runs import OverlayRun, observers_of, one_each
 from cosim.results.result import Result
 
 WIDTH, FIRST_PANEL, NEXT_PANEL = 8.2, 3.3, 2.2  # inches
@@ -38,7 +38,7 @@ class OverlayPicture:
     png: bytes
 
 
-def draw_overlays(runs: Sequence[Run], signals: Sequence[str] = ()) -> list[OverlayPicture]:
+def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> list[OverlayPicture]:
     """All figures that the runs have something for.
 
     Args:
@@ -65,7 +65,7 @@ def draw_overlays(runs: Sequence[Run], signals: Sequence[str] = ()) -> list[Over
 
 
 @styled
-def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
+def true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
     """True speed of all runs in km/h, or None without any.
 
     Args:
@@ -86,7 +86,7 @@ def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
 
 
 @styled
-def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -> Figure | None:
+def error_overlay(runs: Sequence[OverlayRun], quantity: Literal["speed", "position"]) -> Figure | None:
     """Errors of speed [m/s] or position [m], a panel for each observer, or None without any.
 
     Args:
@@ -107,7 +107,7 @@ def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -
 
 
 @styled
-def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
+def estimate_overlay(runs: Sequence[OverlayRun], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
     """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any.
 
     Args:
@@ -137,7 +137,7 @@ def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_forc
 
 
 @styled
-def signal_figure(runs: Sequence[Run], name: str) -> Figure | None:
+def signal_figure(runs: Sequence[OverlayRun], name: str) -> Figure | None:
     """One recorded signal of all runs in its SI unit, or None where no run has it.
 
     Args:
@@ -155,7 +155,7 @@ def signal_figure(runs: Sequence[Run], name: str) -> Figure | None:
     return _finished([ax], f"{name} [{unit or 'unit unknown'}]")
 
 
-def changing_signals(runs: Sequence[Run], most: int) -> list[str]:
+def changing_signals(runs: Sequence[OverlayRun], most: int) -> list[str]:
     """Common signals that differ most between the first run and the others, relative to their range, in column order.
 
     Args:
@@ -170,7 +170,7 @@ def changing_signals(runs: Sequence[Run], most: int) -> list[str]:
     return [name for name in common if name in chosen]
 
 
-def _change(first: Result, run: Run, name: str) -> float:
+def _change(first: Result, run: OverlayRun, name: str) -> float:
     """Largest difference to the first run, in ranges of its values."""
     values, other = (bounded(np.nan_to_num(result[name])) for result in (first, run.result))
     if not np.array_equal(first.time, run.result.time):  # rows of events are met by those of the same time only
@@ -179,7 +179,7 @@ def _change(first: Result, run: Run, name: str) -> float:
     return float(np.max(np.abs(other - values))) / reach
 
 
-def _panels(runs: Sequence[Run], has: Callable[[Run, str], bool]) -> list[Panel]:
+def _panels(runs: Sequence[OverlayRun], has: Callable[[OverlayRun, str], bool]) -> list[Panel]:
     if one_each(runs):
         members = {i: run.spec.observers[0] for i, run in enumerate(runs) if has(run, run.spec.observers[0])}
         return [("", members)] if members else []
@@ -191,13 +191,13 @@ def _panels(runs: Sequence[Run], has: Callable[[Run, str], bool]) -> list[Panel]
     return found
 
 
-def _error_curve(run: Run, index: int, observer: str, quantity: Quantity) -> ErrorCurve:
+def _error_curve(run: OverlayRun, index: int, observer: str, quantity: Quantity) -> ErrorCurve:
     error = estimation_error(run.result, run.spec, observer, quantity)
     assert error is not None  # by the choice of the panels
     return ErrorCurve(run.result.time, error, run.result.time >= run.spec.evaluate_after, run_line(index), run.label)
 
 
-def _axes(runs: Sequence[Run], panels: Sequence[Panel]) -> list[Axes]:
+def _axes(runs: Sequence[OverlayRun], panels: Sequence[Panel]) -> list[Axes]:
     """Panels below each other over one time axis that holds all runs."""
     figure = new_figure((WIDTH, FIRST_PANEL + NEXT_PANEL * (len(panels) - 1)))
     axes: list[Axes] = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])

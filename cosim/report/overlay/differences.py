@@ -10,7 +10,7 @@ from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.facts import list_entry, mapping_entry
 from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import phases
-from cosim.report.overlay.runs import Run
+from cosim.report.overlay.runs import OverlayRun
 from cosim.results.result import BaliseRecord, Result
 
 COMPONENT_ENTRIES = {"kind": "kind", "fmi_version": "FMI version", "model": "model", "preset": "preset", "guid": "GUID"}
@@ -20,7 +20,7 @@ PLACE = 1e-6  # balises this close together are one [m]
 INSTANT = 1e-9  # likewise, where the layout tells when they are passed [s]
 
 
-def differences(runs: Sequence[Run]) -> list[list[str]]:
+def differences(runs: Sequence[OverlayRun]) -> list[list[str]]:
     """Rows of a table: what, then its value in each run; only what is not the same in all.
 
     Args:
@@ -34,7 +34,7 @@ def differences(runs: Sequence[Run]) -> list[list[str]]:
     return [row for row in rows if len(set(row[1:])) > 1]
 
 
-def layout_note(runs: Sequence[Run]) -> str:
+def layout_note(runs: Sequence[OverlayRun]) -> str:
     """Whether the balises of all runs stand at the same places; empty where no run has any.
 
     Args:
@@ -59,7 +59,7 @@ def _same_layout(a: Mapping[str, BaliseRecord], b: Mapping[str, BaliseRecord]) -
     return same_places or all(abs(a[name].stamp - b[name].stamp) <= INSTANT for name in a)
 
 
-def _properties(run: Run) -> dict[str, str]:
+def _properties(run: OverlayRun) -> dict[str, str]:
     """Everything that may differ, by name."""
     result = run.result
     found = {name: _text(result.summary[name]) for name in SETTINGS if name in result.summary}
@@ -110,7 +110,7 @@ def _telegrams(result: Result) -> dict[str, str]:
     }
 
 
-def _phases(run: Run) -> str:
+def _phases(run: OverlayRun) -> str:
     return ", ".join(f"{p.name} {number(p.start)} to {number(p.end)} s" for p in phases(run.result, run.own_spec))
 
 

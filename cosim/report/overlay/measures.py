@@ -11,7 +11,7 @@ from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
 from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.roles import label, phases
-from cosim.report.overlay.runs import Run, observers_of, one_each
+from cosim.report.overlay.runs import OverlayRun, observers_of, one_each
 from cosim.report.page.phases import COLUMNS
 
 Values = tuple[float | None, ...]
@@ -30,7 +30,7 @@ class Measured:
     values: dict[str, Values]
 
 
-def measured(runs: Sequence[Run]) -> list[Measured]:
+def measured(runs: Sequence[OverlayRun]) -> list[Measured]:
     """Maximal and rms errors of speed and position, in the columns of `table.MEASURED`.
 
     Args:
@@ -39,14 +39,14 @@ def measured(runs: Sequence[Run]) -> list[Measured]:
     return _by_phase(runs, lambda run: {(m.observer, m.phase): _sizes(m) for m in phase_metrics(run.result, run.spec)})
 
 
-def detailed(runs: Sequence[Run]) -> list[Measured]:
+def detailed(runs: Sequence[OverlayRun]) -> list[Measured]:
     """The numbers of `phase_details`, in the columns of `phases.COLUMNS` and their units.
 
     Args:
         runs: from `make_runs`.
     """
 
-    def of(run: Run) -> dict[tuple[str, str], Values]:
+    def of(run: OverlayRun) -> dict[tuple[str, str], Values]:
         return {
             (d.observer, d.phase): tuple(_scaled(getattr(d, f), f) for f in COLUMNS)
             for d in phase_details(run.result, run.spec)
@@ -109,7 +109,7 @@ def _scaled(value: float | None, field: str) -> float | None:
     return value if value is None or isinstance(value, int) else COLUMNS[field][1] * value
 
 
-def _by_phase(runs: Sequence[Run], of: Callable[[Run], dict[tuple[str, str], Values]]) -> list[Measured]:
+def _by_phase(runs: Sequence[OverlayRun], of: Callable[[OverlayRun], dict[tuple[str, str], Values]]) -> list[Measured]:
     """Rows by observer and phase; the single observers of runs that have one each stand together."""
     known = {run.label: of(run) for run in runs}
     names = [p.name for p in phases(runs[0].result, runs[0].spec)]

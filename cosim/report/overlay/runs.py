@@ -13,7 +13,7 @@ MOST_RUNS = 12  # that anybody can tell apart in a figure
 
 
 @dataclass(frozen=True)
-class Run:
+class OverlayRun:
     """A run among others.
 
     Args:
@@ -27,7 +27,7 @@ class Run:
     own_spec: ReportSpec
 
 
-def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str]) -> list[Run]:
+def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str]) -> list[OverlayRun]:
     """Put results, roles and labels together; all are judged over the phases and zones of the first.
 
     Args:
@@ -52,7 +52,7 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
             raise ComparisonError(f"{label} has no rows: {result.failure or 'an empty table'}. Leave it out.")
     shared = _shared(results, specs[0])
     return [
-        Run(label, result, _like(shared, spec), spec)
+        OverlayRun(label, result, _like(shared, spec), spec)
         for label, result, spec in zip(labels, results, specs, strict=True)
     ]
 
@@ -76,7 +76,7 @@ def _like(first: ReportSpec, spec: ReportSpec) -> ReportSpec:
     )
 
 
-def observers_of(runs: Sequence[Run]) -> list[str]:
+def observers_of(runs: Sequence[OverlayRun]) -> list[str]:
     """All observers, in the order in which the runs name them.
 
     Args:
@@ -85,7 +85,7 @@ def observers_of(runs: Sequence[Run]) -> list[str]:
     return list(dict.fromkeys(observer for run in runs for observer in run.spec.observers))
 
 
-def one_each(runs: Sequence[Run]) -> bool:
+def one_each(runs: Sequence[OverlayRun]) -> bool:
     """Whether every run has a single observer: then these are compared, whatever their names.
 
     Args:

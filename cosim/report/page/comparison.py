@@ -12,13 +12,13 @@ from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
 
-from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
 from cosim.drawing.style import png
 from cosim.evaluation.numbers import DASH, number
 from cosim.report.figures.comparison_figure import comparison_picture
 from cosim.report.page.files import explained, page_bytes, write_file
 from cosim.report.page.render import render
-from cosim.report.page.table import Table, simple_table
+from cosim.report.page.table import PageTable, simple_table
 from cosim.report.page.verdict import Fact
 from cosim.results.summary_file import jsonable
 
@@ -232,12 +232,12 @@ def _in_words(signal: SignalComparison) -> str:
     return VERDICTS[signal.status] + near
 
 
-def _text(signal: SignalComparison, finding: Finding) -> str:
+def _text(signal: SignalComparison, finding: ComparisonFinding) -> str:
     """What was found, without the name that stands before it anyway."""
     return finding.text.removeprefix(f"{signal.name}: ")
 
 
-def _table(comparison: Comparison) -> Table:
+def _table(comparison: Comparison) -> PageTable:
     """All signals, the worst first; those that fail stand out by colour and by word."""
     failed = comparison.failed
     others = [s for s in comparison.signals if not any(s is f for f in failed)]

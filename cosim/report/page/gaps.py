@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from cosim.evaluation.balise_gaps import GapErrors, largest
 from cosim.evaluation.numbers import error_number, number
-from cosim.report.page.table import Table, simple_table
+from cosim.report.page.table import PageTable, simple_table
 
 KMH = 3.6
 
 
-def gaps_table(found: GapErrors) -> Table:
+def gaps_table(found: GapErrors) -> PageTable:
     """Position errors at the end of the longest gaps, in metres and in seconds of running time; last row: the largest
     of all gaps, and how many of them ended within the envelope.
 

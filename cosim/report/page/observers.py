@@ -17,7 +17,7 @@ from cosim.report.page.files import explained, write_files
 from cosim.report.page.phases import errors_table
 from cosim.report.page.render import render
 from cosim.report.page.run_tables import HOLDS, telegrams_table
-from cosim.report.page.table import Table, simple_table
+from cosim.report.page.table import PageTable, simple_table
 from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
@@ -73,13 +73,13 @@ def benchmark_page(benchmark: ObserverBenchmark, picture: bytes) -> str:
     )
 
 
-def _overview(benchmark: ObserverBenchmark) -> Table:
+def _overview(benchmark: ObserverBenchmark) -> PageTable:
     rows = benchmark.rows()
     headings = list(rows[0]) if rows else []
     return simple_table(headings, [[cell(value) for value in row.values()] for row in rows], range(1, len(headings)))
 
 
-def _certificates(benchmark: ObserverBenchmark) -> Table:
+def _certificates(benchmark: ObserverBenchmark) -> PageTable:
     rows = [
         [
             score.label,

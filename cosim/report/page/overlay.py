@@ -14,10 +14,10 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
-from cosim.report.overlay.runs import Run, make_runs
+from cosim.report.overlay.runs import OverlayRun, make_runs
 from cosim.report.page.files import explained, write_file, write_page
 from cosim.report.page.render import render
-from cosim.report.page.table import Table, grouped_table, simple_table
+from cosim.report.page.table import PageTable, grouped_table, simple_table
 from cosim.report.page.verdict import Fact
 from cosim.results.result import Result
 
@@ -62,7 +62,10 @@ def write_overlay(
 
 
 def write_overlay_page(
-    runs: Sequence[Run], path: str | Path, pictures: Sequence[OverlayPicture] | None = None, signals: Sequence[str] = ()
+    runs: Sequence[OverlayRun],
+    path: str | Path,
+    pictures: Sequence[OverlayPicture] | None = None,
+    signals: Sequence[str] = (),
 ) -> Path:
     """Write the page alone; it needs no other file.
 
@@ -81,12 +84,12 @@ def write_overlay_page(
     return write_page(path, overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures))
 
 
-def _pictures(runs: Sequence[Run], signals: Sequence[str]) -> list[OverlayPicture]:
+def _pictures(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[OverlayPicture]:
     """Figures of the roles and of `signals`; where neither gives one, those of the signals that differ most."""
     return draw_overlays(runs, signals) or draw_overlays(runs, changing_signals(runs, SIGNALS_SHOWN))
 
 
-def overlay_page(runs: Sequence[Run], pictures: Sequence[OverlayPicture]) -> str:
+def overlay_page(runs: Sequence[OverlayRun], pictures: Sequence[OverlayPicture]) -> str:
     """The page as text.
 
     Args:
@@ -112,7 +115,7 @@ def overlay_page(runs: Sequence[Run], pictures: Sequence[OverlayPicture]) -> str
     )
 
 
-def _title(runs: Sequence[Run]) -> str:
+def _title(runs: Sequence[OverlayRun]) -> str:
     titles = list(dict.fromkeys(run.spec.title for run in runs))
     return f"{titles[0]}: {len(runs)} runs" if len(titles) == 1 else f"{len(runs)} runs over each other"
 
@@ -122,14 +125,14 @@ def _cut(rows: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
     return rows[:DIFFERENCES_SHOWN], rows[DIFFERENCES_SHOWN:]
 
 
-def _facts(runs: Sequence[Run], errors: Sequence[Measured], different: int) -> list[Fact]:
+def _facts(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: int) -> list[Fact]:
     ended = sum(run.result.failure is None for run in runs)
     complete: Fact = ("Runs", f"{ended} of {len(runs)} complete", "", "good" if ended == len(runs) else "bad")
     settings: Fact = ("Settings that differ", str(different), "see below" if different else "none is known", "")
     return [complete, settings, *_largest_changes(runs, errors)]
 
 
-def _largest_changes(runs: Sequence[Run], errors: Sequence[Measured]) -> list[Fact]:
+def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> list[Fact]:
     """Where the rms speed error rose most and fell most, relative to the first run."""
     changes = []
     for row in errors:
@@ -150,7 +153,7 @@ def _largest_changes(runs: Sequence[Run], errors: Sequence[Measured]) -> list[Fa
     return found
 
 
-def _runs_table(runs: Sequence[Run]) -> Table:
+def _runs_table(runs: Sequence[OverlayRun]) -> PageTable:
     head = ["Run", "Scenario", "From [s]", "To [s]", "Step [ms]", "Rows", "Wall time [s]", "Made"]
     rows = []
     for run in runs:
@@ -171,7 +174,7 @@ def _runs_table(runs: Sequence[Run]) -> Table:
     return simple_table(head, rows, range(2, 7))
 
 
-def _numbers(runs: Sequence[Run], rows: Sequence[Measured], names: Sequence[str]) -> Table:
+def _numbers(runs: Sequence[OverlayRun], rows: Sequence[Measured], names: Sequence[str]) -> PageTable:
     """A group of rows for each observer and phase, in it one row for each run, with the difference to the first."""
     shown, kept = headings(rows, names)
     reference = runs[0].label
@@ -186,7 +189,7 @@ def _numbers(runs: Sequence[Run], rows: Sequence[Measured], names: Sequence[str]
     return grouped_table(["Observer and phase", "Run", *shown], groups)
 
 
-def _notes(runs: Sequence[Run]) -> list[str]:
+def _notes(runs: Sequence[OverlayRun]) -> list[str]:
     """What the reader must know before comparing."""
     notes = []
     first = runs[0]

@@ -11,7 +11,7 @@ from cosim.evaluation.numbers import DASH, error_number
 from cosim.evaluation.phase_details import PhaseDetails
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.page.table import Table, grouped_table
+from cosim.report.page.table import PageTable, grouped_table
 
 COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to that unit
     "slip": ("Slip error, rms [%]", 100.0),
@@ -26,7 +26,7 @@ COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to
 }
 
 
-def errors_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> Table:
+def errors_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> PageTable:
     """Errors of speed and position of every observer in every phase, published numbers beside them.
 
     Args:
@@ -42,7 +42,7 @@ def errors_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> Table:
     return grouped_table(["Observer", "Phase", *(c.text for c in chosen)], rows)
 
 
-def phases_table(details: Sequence[PhaseDetails], spec: ReportSpec) -> Table | None:
+def phases_table(details: Sequence[PhaseDetails], spec: ReportSpec) -> PageTable | None:
     """Root mean squares and counts of every observer in every phase.
 
     Args:

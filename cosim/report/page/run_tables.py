@@ -19,7 +19,7 @@ from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged
-from cosim.report.page.table import Table, simple_table
+from cosim.report.page.table import PageTable, simple_table
 from cosim.results.result import Result
 
 LIMITS = ("aperiodic_limit", "constant_limit")
@@ -35,7 +35,7 @@ COMPONENT_COLUMNS = {"name": "Name", "kind": "Kind", "fmi_version": "FMI", "mode
 MESSAGES_SHOWN = 100
 
 
-def expectations_table(judged: list[Judged]) -> Table:
+def expectations_table(judged: list[Judged]) -> PageTable:
     """All expectations with what was measured.
 
     Args:
@@ -45,7 +45,7 @@ def expectations_table(judged: list[Judged]) -> Table:
     return simple_table(["Verdict", "Expected", "Measured"], rows)
 
 
-def seeds_table(result: Result) -> Table:
+def seeds_table(result: Result) -> PageTable:
     """Quartiles of the maximal speed errors over several seeds.
 
     Args:
@@ -60,7 +60,7 @@ def seeds_table(result: Result) -> Table:
     return simple_table(headings, rows, range(2, len(headings)))
 
 
-def certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str]]:
+def certificates(result: Result, spec: ReportSpec) -> tuple[PageTable, dict[str, str]]:
     """Limits of the observers' certificates, those of the report first.
 
     Args:
@@ -92,7 +92,7 @@ def _limit(entry: Mapping[str, Any], key: str) -> str:
 
 def telegrams_table(
     outcomes: Mapping[str, Mapping[str, int]], labels: Mapping[str, str], heading: str = "Receiver"
-) -> Table:
+) -> PageTable:
     """What became of the telegrams in each receiver.
 
     Args:
@@ -116,7 +116,7 @@ PACKET_COLUMNS = {
 }
 
 
-def packets_table(result: Result) -> Table:
+def packets_table(result: Result) -> PageTable:
     """What became of the packets of each node, and how old what receivers hold is.
 
     Args:
@@ -132,7 +132,7 @@ def packets_table(result: Result) -> Table:
     return simple_table(headings, rows, range(2, len(headings)))
 
 
-def indicators_table(result: Result, spec: ReportSpec) -> Table:
+def indicators_table(result: Result, spec: ReportSpec) -> PageTable:
     """How long slip was indicated, and how late.
 
     Args:
@@ -151,7 +151,7 @@ def indicators_table(result: Result, spec: ReportSpec) -> Table:
     return simple_table(headings, rows, range(1, len(headings)))
 
 
-def faults_table(result: Result, spec: ReportSpec) -> Table:
+def faults_table(result: Result, spec: ReportSpec) -> PageTable:
     """Faults: which were found, how late, and what was no fault.
 
     Args:
@@ -164,7 +164,7 @@ def faults_table(result: Result, spec: ReportSpec) -> Table:
     return simple_table(["Observer", *HEADINGS[:shown]], rows, range(1, shown + 1))
 
 
-def consistency_table(result: Result, spec: ReportSpec) -> Table:
+def consistency_table(result: Result, spec: ReportSpec) -> PageTable:
     """Filters whose covariances can be judged, and whether they fit.
 
     Args:
@@ -176,7 +176,7 @@ def consistency_table(result: Result, spec: ReportSpec) -> Table:
     return replace(table, bad=set(ADVICE))
 
 
-def components_table(result: Result) -> Table:
+def components_table(result: Result) -> PageTable:
     """What was run.
 
     Args:
@@ -187,7 +187,7 @@ def components_table(result: Result) -> Table:
     return simple_table(list(COMPONENT_COLUMNS.values()), rows)
 
 
-def calls_table(result: Result) -> Table:
+def calls_table(result: Result) -> PageTable:
     """Calls of the components and the milliseconds they took.
 
     Args:
@@ -196,7 +196,7 @@ def calls_table(result: Result) -> Table:
     return simple_table(["Component", *KINDS, "Messages"], cost_rows(result), range(1, len(KINDS) + 2))
 
 
-def messages_table(result: Result) -> Table:
+def messages_table(result: Result) -> PageTable:
     """What the components logged: the first and the last messages.
 
     Args:
@@ -208,7 +208,7 @@ def messages_table(result: Result) -> Table:
     return simple_table(["Component", "Time [s]", "Status", "Category", "Text"], rows, (1,))
 
 
-def versions_table(result: Result) -> Table:
+def versions_table(result: Result) -> PageTable:
     """Versions of the packages that were used.
 
     Args:

@@ -12,7 +12,7 @@ Rows = Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class PageTable:
     """A table whose rows have a heading each, their first cell; it is left out without rows.
 
     Args:
@@ -29,7 +29,7 @@ class Table:
     bad: Container[str] = BAD
 
 
-def simple_table(headings: Sequence[str], rows: Rows, numbers: Container[int] = ()) -> Table:
+def simple_table(headings: Sequence[str], rows: Rows, numbers: Container[int] = ()) -> PageTable:
     """A table without groups.
 
     Args:
@@ -40,10 +40,10 @@ def simple_table(headings: Sequence[str], rows: Rows, numbers: Container[int] = 
     Returns:
         The table.
     """
-    return Table(headings, [(None, rows)], numbers)
+    return PageTable(headings, [(None, rows)], numbers)
 
 
-def grouped_table(headings: Sequence[str], groups: Iterable[tuple[str, Rows]]) -> Table:
+def grouped_table(headings: Sequence[str], groups: Iterable[tuple[str, Rows]]) -> PageTable:
     """A table of numbers whose rows stand in groups.
 
     Args:
@@ -53,4 +53,4 @@ def grouped_table(headings: Sequence[str], groups: Iterable[tuple[str, Rows]]) -
     Returns:
         The table.
     """
-    return Table(headings, list(groups), range(2, len(headings)))
+    return PageTable(headings, list(groups), range(2, len(headings)))

@@ -7,10 +7,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.signatures.classification import SearchSpace
+from fmu_observer.signatures.classification import PencilSpace
 from fmu_observer.signatures.conditional_estimate import train_conditional
 
-SPACE = SearchSpace((8, 12, 20), eps=(0.01, 0.1, 1.0), margin=0.02, draws=120)
+SPACE = PencilSpace((8, 12, 20), eps=(0.01, 0.1, 1.0), margin=0.02, draws=120)
 WORDS = "the thesis states in words that x is told by four clouds apart; field, tank, probe and noise are ours"
 LOST = "the measurements and errors of the thesis are not printed; this is a synthetic field of ours"
 REACH = 1.5

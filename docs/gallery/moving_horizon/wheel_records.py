@@ -10,7 +10,7 @@ import numpy as np
 from shared.jam_runs import CASES, random_jams, readings, trains
 
 from fmu_observer.observers.signature.wheel_classes import DROP, RISE, STEADY
-from fmu_observer.signatures.classification import SearchSpace, SignatureClassifier, train_classifier
+from fmu_observer.signatures.classification import PencilSpace, SignatureClassifier, train_classifier
 
 CHANGES = 4  # in a record
 LENGTHS = (0.2, 0.4, 0.6, 1.0, 2.0, 3.0)  # [s]
@@ -18,7 +18,7 @@ DEPTHS = (0.05, 0.1, 0.2, 0.5, 1.0)
 LEAST = 0.6  # [m/s]: a smaller change of one reading is no example of a fault
 NOISE, TRAINING_SEED, MEMBERS = 0.05, 1, 60
 QUANTITIES = ("max_xi", "min_xi", "max_eta", "min_eta", "mean_xi", "mean_eta", "range_xi", "range_eta")
-SPACE = SearchSpace((2, 3), QUANTITIES, (0.1, 1.0, 10.0), margin=0.005, draws=60)
+SPACE = PencilSpace((2, 3), QUANTITIES, (0.1, 1.0, 10.0), margin=0.005, draws=60)
 
 
 def records(seed: int, noise: float = NOISE, members: int = MEMBERS) -> tuple[np.ndarray, list[str]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.design.proposition_4_1.check import margins
 from fmu_observer.design.proposition_4_1.inequalities import DECAY, GAIN, Proposition41Problem
-from fmu_observer.design.proposition_4_1.solve import Candidate, least_alphas, least_condition
+from fmu_observer.design.proposition_4_1.solve import Proposition41Candidate, least_alphas, least_condition
 
 BISECTIONS = 14
 SMALLEST = 1e-3  # of the decay asked for: below it nothing is called feasible
@@ -137,7 +137,9 @@ def largest_decay(A: Any, C: Any, most: float, alpha: float | None = None, *, ga
     return _largest_decay(problem, None if gains is None else _checked_gains(problem, gains))
 
 
-def _designed(problem: Proposition41Problem, candidate: Candidate, found: dict[str, float]) -> Proposition41Design:
+def _designed(
+    problem: Proposition41Problem, candidate: Proposition41Candidate, found: dict[str, float]
+) -> Proposition41Design:
     smallest, *_, largest = np.linalg.eigvalsh(candidate.P)
     return Proposition41Design(
         m=problem.m,

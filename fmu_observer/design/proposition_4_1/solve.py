@@ -18,7 +18,7 @@ STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: w
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class Proposition41Candidate:
     """What the solver returned.
 
     Attributes:
@@ -31,7 +31,7 @@ class Candidate:
     status: str
 
 
-def least_condition(problem: Proposition41Problem, gains: np.ndarray | None) -> Iterator[Candidate]:
+def least_condition(problem: Proposition41Problem, gains: np.ndarray | None) -> Iterator[Proposition41Candidate]:
     """Least ``lambda_2`` with ``lambda_1 = 1``.
 
     Args:
@@ -49,7 +49,9 @@ def least_condition(problem: Proposition41Problem, gains: np.ndarray | None) -> 
     yield from question.candidates(cp, largest, [question.P << largest * np.eye(problem.order)])
 
 
-def least_alphas(problem: Proposition41Problem, gains: np.ndarray | None) -> Callable[[float], Iterator[Candidate]]:
+def least_alphas(
+    problem: Proposition41Problem, gains: np.ndarray | None
+) -> Callable[[float], Iterator[Proposition41Candidate]]:
     """Least alpha with ``P >= I`` by the decay; decay and alpha of the problem are left aside.
 
     Args:
@@ -67,7 +69,7 @@ def least_alphas(problem: Proposition41Problem, gains: np.ndarray | None) -> Cal
     question = _Question.of(cp, replace(problem, m=m, alpha=None), gains, alpha)
     solve = question.candidates_of(cp, alpha, [])
 
-    def of_decay(decay: float) -> Iterator[Candidate]:
+    def of_decay(decay: float) -> Iterator[Proposition41Candidate]:
         m.value = decay
         yield from solve()
 
@@ -122,19 +124,21 @@ class _Question:
         matrices = [cp.bmat(rows) for _, rows in inequalities(problem, P, M, alpha).values()]
         return cls(P, M, gains, strict, [matrix >> strict * np.eye(matrix.shape[0]) for matrix in matrices])
 
-    def candidates(self, cp: Any, goal: Any, constraints: list[Any]) -> Iterator[Candidate]:
+    def candidates(self, cp: Any, goal: Any, constraints: list[Any]) -> Iterator[Proposition41Candidate]:
         yield from self.candidates_of(cp, goal, constraints)()
 
-    def candidates_of(self, cp: Any, goal: Any, constraints: list[Any]) -> Callable[[], Iterator[Candidate]]:
+    def candidates_of(
+        self, cp: Any, goal: Any, constraints: list[Any]
+    ) -> Callable[[], Iterator[Proposition41Candidate]]:
         posed = cp.Problem(cp.Minimize(goal), [*self.constraints, *constraints])
 
-        def solve() -> Iterator[Candidate]:
+        def solve() -> Iterator[Proposition41Candidate]:
             for self.strict.value in STRICTNESS:
                 if solved(cp, posed):
                     matrix = 0.5 * (self.P.value + self.P.value.T)
                     found = self.gains
                     if found is None:
                         found = np.linalg.solve(matrix, np.hstack([product.value for product in self.M])).T
-                    yield Candidate(matrix, found, float(goal.value), str(posed.status))
+                    yield Proposition41Candidate(matrix, found, float(goal.value), str(posed.status))
 
         return solve

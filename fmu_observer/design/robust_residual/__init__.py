@@ -13,13 +13,13 @@ from fmu_observer.design.robust_residual.design import (
     proven_attenuation,
 )
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.sensitivity import Sensitivity, common_bands, proven_sensitivity
+from fmu_observer.design.robust_residual.sensitivity import ResidualSensitivity, common_bands, proven_sensitivity
 
 __all__ = [
     "InfeasibleResidualDesign",
     "ResidualProblem",
+    "ResidualSensitivity",
     "RobustResidualDesign",
-    "Sensitivity",
     "common_bands",
     "design_robust_residual",
     "gain_size",

@@ -16,7 +16,7 @@ from fmu_observer.design.residual_channel import ResidualChannel
 from fmu_observer.design.robust_residual.check import least, margins
 from fmu_observer.design.robust_residual.inequalities import robustness
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.solve import Candidate, candidates
+from fmu_observer.design.robust_residual.solve import ResidualCandidate, candidates
 from fmu_observer.models.checks import check_numbers
 from fmu_observer.observability import MeasuredSystem, require_detectable
 
@@ -172,7 +172,9 @@ def _proven(
     return None
 
 
-def _margins(problem: ResidualProblem, candidate: Candidate, alpha: float, sized: bool = True) -> dict[str, float]:
+def _margins(
+    problem: ResidualProblem, candidate: ResidualCandidate, alpha: float, sized: bool = True
+) -> dict[str, float]:
     P = candidate.P
     L = [P @ K for K in candidate.gains]
     blocks = robustness(problem, P, L, candidate.attenuation**2, alpha, sized)

@@ -15,7 +15,7 @@ from fmu_observer.design.robust_residual.solve import sensitivity_candidates
 
 
 @dataclass(frozen=True)
-class Sensitivity:
+class ResidualSensitivity:
     """How strongly a fault shows, over all frequencies.
 
     Attributes:
@@ -37,7 +37,7 @@ class Sensitivity:
         )
 
 
-def proven_sensitivity(problem: ResidualProblem, gains: np.ndarray) -> Sensitivity:
+def proven_sensitivity(problem: ResidualProblem, gains: np.ndarray) -> ResidualSensitivity:
     """The largest gamma of (3.57) for given gains, over all frequencies: step 2 of Algorithm 3-2, Aguiar Cota 2019.
 
     Args:
@@ -53,8 +53,8 @@ def proven_sensitivity(problem: ResidualProblem, gains: np.ndarray) -> Sensitivi
     ceiling = min(minimum_gain(channel) for channel in problem.fault_channels(gains))
     for P, gamma2 in sensitivity_candidates(problem, gains):
         if gamma2 > 0.0 and min(margins(sensitivity(problem, gains, P, gamma2)).values()) > 0.0:
-            return Sensitivity(sqrt(gamma2), ceiling)
-    return Sensitivity(0.0, ceiling)
+            return ResidualSensitivity(sqrt(gamma2), ceiling)
+    return ResidualSensitivity(0.0, ceiling)
 
 
 def common_bands(problem: ResidualProblem, gains: np.ndarray, gamma: float) -> list[tuple[float, float]]:

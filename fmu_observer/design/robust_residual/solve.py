@@ -22,7 +22,7 @@ STRICT = (1e-7, 1e-6, 1e-5, 1e-4)  # asked of every inequality in the scaled pro
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class ResidualCandidate:
     """What the solver returned, in the units of the problem.
 
     Attributes:
@@ -43,7 +43,7 @@ def candidates(
     gains: np.ndarray | None = None,
     attenuation: float | None = None,
     sized: bool = True,
-) -> Iterator[Candidate]:
+) -> Iterator[ResidualCandidate]:
     """Seek values for the unknowns of (3.56) and (3.58).
 
     In the scaled problem M and the size of D are 1: P, L and alpha are divided by M^2, lambda by M and that size.
@@ -82,7 +82,7 @@ def candidates(
         if not np.all(np.isfinite(value)) or np.linalg.eigvalsh(value)[0] <= 0.0:
             continue
         found = np.stack([np.linalg.solve(value, part.value) for part in L]) if gains is None else gains
-        yield Candidate(
+        yield ResidualCandidate(
             value * M**2, found, M * size * sqrt(float(lambda2.value)), float(alpha.value) * M**2, str(question.status)
         )
 

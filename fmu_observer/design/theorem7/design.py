@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.design.theorem7.check import margins
 from fmu_observer.design.theorem7.inequalities import Theorem7Problem
-from fmu_observer.design.theorem7.solve import Candidate, Gains, candidates
+from fmu_observer.design.theorem7.solve import Gains, Theorem7Candidate, candidates
 from fmu_observer.models import TakagiSugenoModel, find_takagi_sugeno_model
 from fmu_observer.models.checks import checked_matrix
 from fmu_observer.observability import require_detectable_vertices
@@ -140,7 +140,7 @@ def design_theorem7(
 
 def _design(
     problem: Theorem7Problem,
-    candidate: Candidate,
+    candidate: Theorem7Candidate,
     checked: Mapping[str, float],
     options: Mapping[str, Any],
     numbers: Mapping[str, Any],
@@ -161,7 +161,7 @@ def _design(
 
 def _checked(
     problem: Theorem7Problem, performance: bool, gains: Gains | None
-) -> tuple[Candidate, dict[str, float]] | None:
+) -> tuple[Theorem7Candidate, dict[str, float]] | None:
     """A candidate whose inequalities all hold when recomputed, or None."""
     for candidate in candidates(problem, performance, gains):
         found = margins(problem, candidate.unknowns, performance)

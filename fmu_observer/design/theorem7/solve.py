@@ -27,7 +27,7 @@ ATTEMPTS: tuple[
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class Theorem7Candidate:
     """What the solver returned, in scaled coordinates.
 
     Attributes:
@@ -40,7 +40,7 @@ class Candidate:
     status: str
 
 
-def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None = None) -> Iterator[Candidate]:
+def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None = None) -> Iterator[Theorem7Candidate]:
     """Seek values for the unknowns, once with every setting in `ATTEMPTS`; take the first that proves what is asked.
 
     Args:
@@ -89,7 +89,7 @@ def _unknowns(cp: Any, problem: Theorem7Problem, gains: Gains | None) -> Unknown
     )
 
 
-def _candidate(unknowns: Unknowns, gains: Gains | None, status: str) -> Candidate | None:
+def _candidate(unknowns: Unknowns, gains: Gains | None, status: str) -> Theorem7Candidate | None:
     M = np.asarray(unknowns.M.value)
     if not np.all(np.isfinite(M)) or np.linalg.cond(M) > 1e14:
         return None
@@ -108,7 +108,7 @@ def _candidate(unknowns: Unknowns, gains: Gains | None, status: str) -> Candidat
         gamma2=float(_value(unknowns.gamma2)),
         inverse_sigma=float(_value(unknowns.inverse_sigma)),
     )
-    return Candidate(numbers, K1, K2, status)
+    return Theorem7Candidate(numbers, K1, K2, status)
 
 
 def _value(variable: Any) -> np.ndarray:

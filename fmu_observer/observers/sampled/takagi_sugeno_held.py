@@ -21,7 +21,7 @@ from fmu_observer.certificates import (
     decrease,
     with_switching_noted,
 )
-from fmu_observer.certificates.quadratic import Condition as Inequalities
+from fmu_observer.certificates.quadratic import QuadraticCondition as Inequalities
 from fmu_observer.certificates.quadratic import flow_condition
 from fmu_observer.condition import Condition
 from fmu_observer.design.pole_placement import observer_gain

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
+from fmu_observer.observers.signature.signature_observer import InvertedWindow, SignatureObserver
 from fmu_observer.signatures.class_distance import class_distance, envelope_numbers, line_slopes
 from fmu_observer.signatures.envelope import best_envelope
 from fmu_observer.signatures.inversion import curve_distances, interpolated, nearest_two, place_on_curve
@@ -27,7 +27,7 @@ LEAST = 1e-6
 """Added to each distance: a point in two envelopes lies in the middle of their classes."""
 
 
-class Tables(NamedTuple):
+class CascadeTables(NamedTuple):
     """What the signatures of a grid of states are known by.
 
     Attributes:
@@ -108,7 +108,7 @@ class CascadeSignature(SignatureObserver):
         """The printed constants."""
         return self._model(*self._constants, p.sample_period)
 
-    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> InvertedWindow:
         """x2 by envelopes, then x1 by median lines, then x3 by chords."""
         first, *middle, last, distances = self._read(past[0])
         point, chord, nodes = 0.5 * (middle[0] + middle[1]), last - first, self.nodes
@@ -120,7 +120,7 @@ class CascadeSignature(SignatureObserver):
         third = place_on_curve(nodes, np.stack([interpolated(nodes, chords[k], first_state) for k in range(2)]), chord)
         ends = np.where(np.abs(third) > SIZE - LEAST, 1.0, 0.0)  # the chord lies at or beyond an end of its curve
         outside = np.maximum(ends, np.where(np.min(distances) > 1.0, 1.0, 0.0))
-        return Inverted(np.stack([first_state, second, third]), outside)
+        return InvertedWindow(np.stack([first_state, second, third]), outside)
 
     # -- internals --------------------------------------------------------------------------------------------------
 
@@ -156,12 +156,12 @@ class CascadeSignature(SignatureObserver):
         parts = [np.reshape(found[k * count**2 : (k + 1) * count**2], (count, count)) for k in range(4)]
         return parts[:2], [[part[i] for i in range(count)] for part in parts[2:]]
 
-    def _built(self) -> Tables:
+    def _built(self) -> CascadeTables:
         signatures = self.signatures(np.stack(np.meshgrid(self.nodes, self.nodes, self.nodes, indexing="ij")))
         middles = signatures[:, POINTS // 2 - 1 : POINTS // 2 + 1].mean(axis=1)
         chords = signatures[:, -1] - signatures[:, 0]
         count, angles = range(len(self.nodes)), np.linspace(0.0, np.pi, ANGLES)
-        return Tables(
+        return CascadeTables(
             [(middles[0, :, j], middles[1, :, j]) for j in count],
             [[chords[:, i, j] for i in count] for j in count],
             np.array(

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
+from fmu_observer.observers.signature.signature_observer import InvertedWindow, SignatureObserver
 from fmu_observer.signatures.inversion import Found, network_inverse, polynomial_refinement, weighted_inverse
 from fmu_observer.signatures.pencil import NextScaling
 from plant_models.benchmarks.ecoli_culture import HOUR, EcoliCulture
@@ -131,7 +131,7 @@ class CultureSignature(SignatureObserver):
             offs.append(np.abs(np.sum(lacks)) / (RUN_ERROR * np.maximum(size, 1e-300)))
         return {"nominal run": np.max(np.stack(offs))}
 
-    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> InvertedWindow:
         """Glycerol and enzyme at the oldest sample, of its biomass and the light of the window."""
         X = past[0][0]
         target = self.properties(past[1], p.regularisation)
@@ -175,7 +175,7 @@ class CultureSignature(SignatureObserver):
         )
         told = Found(*enclosed(network, shared, target))
         state = in_tube(X, S0 + p.glycerol_width * told.values[0], P0 + p.enzyme_width * told.values[1])
-        return Inverted(state, told.outside[0])
+        return InvertedWindow(state, told.outside[0])
 
     def looked_up(self, network: Sequence[Array], target: Array, sharpness: Array) -> Found:
         """Places of glycerol and enzyme in the tube, from -1 to 1, shape (2,).

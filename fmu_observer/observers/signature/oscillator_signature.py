@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.signature.signature_observer import TABLE_ERROR, Inverted, SignatureObserver
+from fmu_observer.observers.signature.signature_observer import TABLE_ERROR, InvertedWindow, SignatureObserver
 from fmu_observer.signatures.inversion import soft_inverse
 from fmu_observer.signatures.pencil import NextScaling
 from plant_models.benchmarks.braked_oscillator import BrakedOscillator, Variant
@@ -117,7 +117,7 @@ class OscillatorSignature(SignatureObserver):
         points = self.points(window, ORDER, p.regularisation)
         return points[0][0], points[1][0]
 
-    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> InvertedWindow:
         """Both states by (4.6.5)."""
         count = len(self.nodes[0])
         xi, eta = (np.reshape(p.table[i * count**2 : (i + 1) * count**2], (count, count)) for i in range(2))
@@ -136,4 +136,4 @@ class OscillatorSignature(SignatureObserver):
             ]
         )
         beyond = np.maximum(np.max(-place), np.max(place - 1.0)) * (count - 1)
-        return Inverted(state, np.maximum(beyond, 0.0))
+        return InvertedWindow(state, np.maximum(beyond, 0.0))

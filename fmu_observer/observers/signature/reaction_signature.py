@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.signature.signature_observer import TABLE_ERROR, Inverted, SignatureObserver
+from fmu_observer.observers.signature.signature_observer import TABLE_ERROR, InvertedWindow, SignatureObserver
 from fmu_observer.signatures.inversion import (
     Found,
     best_candidate,
@@ -139,7 +139,7 @@ class ReactionSignature(SignatureObserver):
         offs.append(np.abs(first[count - 1] - np.sum(made[0]) / count) / sizes[0])
         return {"table": np.max(np.stack(offs))}
 
-    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> InvertedWindow:
         """The state for each candidate of the rate, and the candidate that fits the window best."""
         states, residuals = self.search(past[0], p)
         best = best_candidate(self.rates, residuals)
@@ -148,7 +148,7 @@ class ReactionSignature(SignatureObserver):
             for values in (states.values[0], states.values[1], np.minimum(states.outside, 1e3))
         ]
         smoothed = (x.estimated_rate + p.gain * best.values) / (1.0 + p.gain)
-        return Inverted(np.stack(chosen[:2]), np.maximum(chosen[2], best.outside), (smoothed, best.values))
+        return InvertedWindow(np.stack(chosen[:2]), np.maximum(chosen[2], best.outside), (smoothed, best.values))
 
     def search(self, window: Array, p: Any) -> tuple[Found, Array]:
         """State at the oldest sample, were each candidate the rate, shape (2, c), and the residuals that it leaves, of

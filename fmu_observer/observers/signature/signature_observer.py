@@ -55,7 +55,7 @@ NEVER = OutputWarning(
 NO_MODEL = ("sample_period", "process_noise", "measurement_noise")
 
 
-class Inverted(NamedTuple):
+class InvertedWindow(NamedTuple):
     """What the signature of a window tells.
 
     Attributes:
@@ -121,7 +121,7 @@ class SignatureObserver(HybridSystem):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> Inverted:
+    def inverted(self, past: Sequence[Array], x: Any, p: Any) -> InvertedWindow:
         """State at the oldest sample of the window.
 
         Args:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.signatures.classification import Plane, SignatureClassifier, Stage
+from fmu_observer.signatures.classification import Plane, SearchStage, SignatureClassifier
 from fmu_observer.signatures.clouds import Coordinate, Separation
 
 STEADY, DROP, RISE = "steady", "drop", "rise"
@@ -32,7 +32,7 @@ _PLANE_2 = Plane(
 )
 WHEEL_CLASSES = SignatureClassifier(
     (
-        Stage(
+        SearchStage(
             DROP,
             _PLANE_1,
             {
@@ -41,7 +41,7 @@ WHEEL_CLASSES = SignatureClassifier(
             },
             0.00672659163,
         ),
-        Stage(
+        SearchStage(
             STEADY,
             _PLANE_2,
             {

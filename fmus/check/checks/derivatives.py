@@ -11,10 +11,10 @@ from fmus.check.check import LIMIT, Check
 from fmus.check.checks.life import real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
-from fmus.check.findings import Outcome, skipped
+from fmus.check.findings import CheckOutcome, skipped
 
 
-def slave_derivatives(context: Context) -> Outcome:
+def slave_derivatives(context: Context) -> CheckOutcome:
     """Directional derivatives of the outputs along the inputs between two steps.
 
     Args:

@@ -16,14 +16,14 @@ from fmus.check.bench import WARM_UP_STEPS, Bench
 from fmus.check.check import DISTRUST, Check
 from fmus.check.checks.life import listed, not_finite
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, failed, limited, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, limited, passed, skipped
 from fmus.fmi.fmi3 import FMI3Slave
 
 PAYLOAD = "give what comes with an event a value that makes sense"
 NONE = "declares neither a triggered input clock nor a counted event"
 
 
-def events(context: Context) -> Outcome:
+def events(context: Context) -> CheckOutcome:
     """Every declared event happens once, and the run goes on.
 
     Args:
@@ -38,11 +38,11 @@ def events(context: Context) -> Outcome:
     return _clocks(context, names) if slave.has_event_mode else _no_event_mode(names)
 
 
-def _no_event_mode(clocks: Sequence[str]) -> Outcome:
+def _no_event_mode(clocks: Sequence[str]) -> CheckOutcome:
     return limited(f"declares the triggered input clocks {listed(clocks)} but no event mode", "leave its clocks alone")
 
 
-def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
+def _clocks(context: Context, clocks: Sequence[str]) -> CheckOutcome:
     """Each clock ticks once, with the values its inputs have."""
     bench = context.fresh_bench()
     try:
@@ -60,7 +60,7 @@ def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
     return passed(f"its input clocks tick in event mode and the run goes on: {listed(clocks)}")
 
 
-def _counted(context: Context, names: Sequence[str]) -> Outcome:
+def _counted(context: Context, names: Sequence[str]) -> CheckOutcome:
     """An event inside a step against the same one where two shorter steps meet."""
     bench = context.bench
     divisible = bench.component.can_vary_step and not divided_steps(bench)

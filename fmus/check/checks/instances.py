@@ -14,7 +14,7 @@ from fmus.check.bench import WARM_UP_STEPS, elsewhere, end_of_experiment
 from fmus.check.check import LIMIT, ONE_INSTANCE, Check
 from fmus.check.checks.life import SHARE_OF_BUDGET, by
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, failed, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, passed, skipped
 
 INSTANCES = 50
 FIRST_INSTANCES = 10
@@ -24,7 +24,7 @@ LEAK = 16 * 1024
 """Growth of memory for each instance that is taken for a leak [bytes]; a few pages each are the allocator's own."""
 
 
-def repeated_instantiation(context: Context) -> Outcome:
+def repeated_instantiation(context: Context) -> CheckOutcome:
     """Many instances, one after the other: memory and open files must not grow.
 
     Args:
@@ -52,7 +52,7 @@ def repeated_instantiation(context: Context) -> Outcome:
     return _growth(*marks)
 
 
-def two_instances(context: Context) -> Outcome:
+def two_instances(context: Context) -> CheckOutcome:
     """Two instances at once, under different inputs, step by step in turn: the first one must not notice.
 
     Args:
@@ -97,7 +97,7 @@ def open_files() -> int | None:
     return None
 
 
-def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | None, int | None]) -> Outcome:
+def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | None, int | None]) -> CheckOutcome:
     count = last[0] - first[0]
     said = []
     if first[2] is None or last[2] is None:

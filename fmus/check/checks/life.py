@@ -15,7 +15,7 @@ from fmus.check.behaviour import difference, repeatable
 from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
 from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
+from fmus.check.findings import CheckOutcome, Verdict, failed, limited, noted, passed, skipped
 from fmus.check.instance import FmuInstance, SlaveError
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import functions_of_capabilities
@@ -27,7 +27,7 @@ UNSEEN = "what it does when it moves was not seen: give start values (--start) o
 NAMES_SHOWN = 4
 
 
-def loading(context: Context) -> Outcome:
+def loading(context: Context) -> CheckOutcome:
     """The library can be loaded here, with all that it needs.
 
     Args:
@@ -37,7 +37,7 @@ def loading(context: Context) -> Outcome:
     return passed("the library and what it needs are loaded")
 
 
-def exported_symbols(instance: FmuInstance) -> Outcome:
+def exported_symbols(instance: FmuInstance) -> CheckOutcome:
     """The functions of the standard that the library exports, against what the FMU declares.
 
     Args:
@@ -59,7 +59,7 @@ def exported_symbols(instance: FmuInstance) -> Outcome:
     return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
 
 
-def slave_symbols(context: Context) -> Outcome:
+def slave_symbols(context: Context) -> CheckOutcome:
     """`exported_symbols` for co-simulation.
 
     Args:
@@ -68,7 +68,7 @@ def slave_symbols(context: Context) -> Outcome:
     return exported_symbols(context.slave())
 
 
-def initialise(context: Context) -> Outcome:
+def initialise(context: Context) -> CheckOutcome:
     """Instantiate, initialise, terminate, free.
 
     Args:
@@ -82,7 +82,7 @@ def initialise(context: Context) -> Outcome:
     return passed("instantiates, initialises, terminates and is freed")
 
 
-def values_at_start(context: Context) -> Outcome:
+def values_at_start(context: Context) -> CheckOutcome:
     """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs.
 
     Args:
@@ -104,7 +104,7 @@ def values_at_start(context: Context) -> Outcome:
     return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
 
 
-def getters(context: Context) -> Outcome:
+def getters(context: Context) -> CheckOutcome:
     """Every variable can be read by the getter of its type.
 
     Args:
@@ -134,7 +134,7 @@ def _unreadable(slave: Instance, variable: ModelVariable) -> str:
     return ""
 
 
-def stepping(context: Context) -> Outcome:
+def stepping(context: Context) -> CheckOutcome:
     """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
     values.
 
@@ -156,7 +156,7 @@ def stepping(context: Context) -> Outcome:
     )
 
 
-def _run(context: Context) -> Outcome:
+def _run(context: Context) -> CheckOutcome:
     bench = context.bench
     bench.begin()
     rows: list[np.ndarray] = []
@@ -185,7 +185,7 @@ def _run(context: Context) -> Outcome:
     return passed(f"{done}, {above}{late}")
 
 
-def repeated(context: Context) -> Outcome:
+def repeated(context: Context) -> CheckOutcome:
     """Two instances, one after the other, under the same inputs: identical outputs.
 
     Args:
@@ -200,7 +200,7 @@ def repeated(context: Context) -> Outcome:
     return by(problem and f"in a second run {problem}", "a second run is identical")
 
 
-def reset(context: Context) -> Outcome:
+def reset(context: Context) -> CheckOutcome:
     """After a reset the same steps give the identical outputs.
 
     Args:
@@ -209,7 +209,7 @@ def reset(context: Context) -> Outcome:
     return by(repeatable(context.bench), "the same run after a reset is identical")
 
 
-def logging(context: Context) -> Outcome:
+def logging(context: Context) -> CheckOutcome:
     """The outputs must not depend on whether the FMU is asked to log.
 
     Args:
@@ -230,7 +230,7 @@ def logging(context: Context) -> Outcome:
     return by(problem and f"with logging on {problem}", "logging changes no output")
 
 
-def time_per_step(context: Context) -> Outcome:
+def time_per_step(context: Context) -> CheckOutcome:
     """Median time of one step.
 
     Args:
@@ -259,7 +259,7 @@ def time_per_step(context: Context) -> Outcome:
 # ------------------------------------------------------------------------------------------------------------
 
 
-def by(problem: str, good: str) -> Outcome:
+def by(problem: str, good: str) -> CheckOutcome:
     """Failed with the problem where there is one, else passed.
 
     Args:

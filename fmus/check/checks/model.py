@@ -12,7 +12,7 @@ from fmus.check.checks.derivatives import nominal_of
 from fmus.check.checks.life import by, exported_symbols, listed, not_finite, real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
-from fmus.check.findings import Outcome, failed, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, passed, skipped
 from fmus.check.model import FmuModel
 from fmus.fmi.standard import MODEL_EXCHANGE
 
@@ -46,7 +46,7 @@ def _start(model: FmuModel, context: Context) -> None:
     model.initialize(context.start_time)
 
 
-def loading(context: Context) -> Outcome:
+def loading(context: Context) -> CheckOutcome:
     """The library can be loaded here, with all that it needs.
 
     Args:
@@ -56,7 +56,7 @@ def loading(context: Context) -> Outcome:
     return passed("the library and what it needs are loaded")
 
 
-def model_symbols(context: Context) -> Outcome:
+def model_symbols(context: Context) -> CheckOutcome:
     """`exported_symbols` for model exchange.
 
     Args:
@@ -65,7 +65,7 @@ def model_symbols(context: Context) -> Outcome:
     return exported_symbols(context.model())
 
 
-def initialise(context: Context) -> Outcome:
+def initialise(context: Context) -> CheckOutcome:
     """Instantiate, initialise, reach continuous-time mode, terminate, free.
 
     Args:
@@ -75,7 +75,7 @@ def initialise(context: Context) -> Outcome:
         return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
 
 
-def finite_derivatives(context: Context) -> Outcome:
+def finite_derivatives(context: Context) -> CheckOutcome:
     """Outputs, derivatives and event indicators are finite at the start.
 
     Args:
@@ -96,7 +96,7 @@ def finite_derivatives(context: Context) -> Outcome:
     return passed("outputs, derivatives and event indicators are finite at the start")
 
 
-def states(context: Context) -> Outcome:
+def states(context: Context) -> CheckOutcome:
     """States that are set are read back, and derivatives depend on nothing else.
 
     Args:
@@ -118,7 +118,7 @@ def states(context: Context) -> Outcome:
     return passed("states are read back, derivatives at the same states are identical")
 
 
-def round_trip(context: Context) -> Outcome:
+def round_trip(context: Context) -> CheckOutcome:
     """Save, integrate on, restore, integrate again: bit-identical.
 
     Args:
@@ -142,7 +142,7 @@ def round_trip(context: Context) -> Outcome:
     )
 
 
-def reset(context: Context) -> Outcome:
+def reset(context: Context) -> CheckOutcome:
     """After a reset the same path has the identical derivatives.
 
     Args:
@@ -162,7 +162,7 @@ def reset(context: Context) -> Outcome:
     )
 
 
-def directional(context: Context) -> Outcome:
+def directional(context: Context) -> CheckOutcome:
     """Directional derivatives of derivatives and outputs along states and inputs.
 
     Args:

@@ -6,7 +6,7 @@ from fmus.check.behaviour import again, continuation, difference, go_elsewhere
 from fmus.check.bench import WARM_UP_STEPS
 from fmus.check.check import LIMIT, NO_BYTES, NO_REDOING, Check
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, failed, limited, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, limited, passed, skipped
 from fmus.check.restoring import near, restoring
 from fmus.fmi.slave import Slave
 
@@ -15,7 +15,7 @@ WITHIN = "steps may be redone, and what is redone differs by as much; the master
 NOT_SERIALISED = "does not declare canSerializeFMUstate"
 
 
-def round_trip(context: Context) -> Outcome:
+def round_trip(context: Context) -> CheckOutcome:
     """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else.
 
     Args:
@@ -31,7 +31,7 @@ def round_trip(context: Context) -> Outcome:
     return failed(f"not restored: {found.problem}")
 
 
-def serialised(context: Context) -> Outcome:
+def serialised(context: Context) -> CheckOutcome:
     """The same through bytes, in the same instance.
 
     Args:
@@ -40,7 +40,7 @@ def serialised(context: Context) -> Outcome:
     return _through_bytes(context, elsewhere=False)
 
 
-def other_instance(context: Context) -> Outcome:
+def other_instance(context: Context) -> CheckOutcome:
     """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from.
 
     Args:
@@ -51,7 +51,7 @@ def other_instance(context: Context) -> Outcome:
     return _through_bytes(context, elsewhere=True)
 
 
-def _through_bytes(context: Context, *, elsewhere: bool) -> Outcome:
+def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
     bench = context.bench
     slave = bench.component
     if not slave.can_save or not slave.capabilities.canSerializeFMUState:

@@ -6,13 +6,13 @@ import warnings
 
 from fmpy.validation import validate_fmu
 
-from fmus.check.findings import Outcome, noted, passed
+from fmus.check.findings import CheckOutcome, noted, passed
 from fmus.fmi.archive import Archive
 
 SHOWN = 3
 
 
-def validation(archive: Archive) -> Outcome:
+def validation(archive: Archive) -> CheckOutcome:
     """The XML schema and fmpy's validation of the model description.
 
     Args:
@@ -32,7 +32,7 @@ def validation(archive: Archive) -> Outcome:
     )
 
 
-def platforms(archive: Archive) -> Outcome:
+def platforms(archive: Archive) -> CheckOutcome:
     """The platforms there are libraries for.
 
     Args:

@@ -10,7 +10,7 @@ from fmus.check.behaviour import divided_steps, short_step
 from fmus.check.check import FIXED_STEP, LIMIT, NOTE, Check
 from fmus.check.checks.life import by, listed, not_finite
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, failed, noted, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, noted, passed, skipped
 from fmus.fmi.slave import RawStep
 
 SCALES = (1.0, 0.37, 3.0)
@@ -21,7 +21,7 @@ BEFORE = 3
 NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
 
 
-def divided(context: Context) -> Outcome:
+def divided(context: Context) -> CheckOutcome:
     """A step of h against 2 x h/2 and an uneven split, for several h.
 
     Args:
@@ -37,7 +37,7 @@ def divided(context: Context) -> Outcome:
     return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * bench.h:g}' for s in SCALES)} s")
 
 
-def short(context: Context) -> Outcome:
+def short(context: Context) -> CheckOutcome:
     """The first change after a short step.
 
     Args:
@@ -48,7 +48,7 @@ def short(context: Context) -> Outcome:
     return by(short_step(context.bench), "tiny steps after a short one move the outputs by their share")
 
 
-def tiny(context: Context) -> Outcome:
+def tiny(context: Context) -> CheckOutcome:
     """A step of a billionth of a second.
 
     Args:
@@ -59,7 +59,7 @@ def tiny(context: Context) -> Outcome:
     return _odd(context, lambda _h: TINY, _done_or_refused)
 
 
-def huge(context: Context) -> Outcome:
+def huge(context: Context) -> CheckOutcome:
     """A step a thousand times the communication step, or to the end of the experiment.
 
     Args:
@@ -69,7 +69,7 @@ def huge(context: Context) -> Outcome:
     return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
 
 
-def zero(context: Context) -> Outcome:
+def zero(context: Context) -> CheckOutcome:
     """A step of length zero, which the standard does not know.
 
     Args:
@@ -78,7 +78,7 @@ def zero(context: Context) -> Outcome:
     return _odd(context, lambda _h: 0.0, _still_or_refused)
 
 
-def negative(context: Context) -> Outcome:
+def negative(context: Context) -> CheckOutcome:
     """A step back in time, which the standard forbids.
 
     Args:
@@ -87,7 +87,7 @@ def negative(context: Context) -> Outcome:
     return _odd(context, lambda h: -h, _must_refuse)
 
 
-def wrong_time(context: Context) -> Outcome:
+def wrong_time(context: Context) -> CheckOutcome:
     """A step from a currentCommunicationPoint where the FMU does not stand.
 
     Args:
@@ -96,12 +96,12 @@ def wrong_time(context: Context) -> Outcome:
     return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
 
 
-Judge = Callable[[str, bool, str], Outcome]
+Judge = Callable[[str, bool, str], CheckOutcome]
 
 
 def _odd(
     context: Context, size: Callable[[float], float], judge: Judge, shift: Callable[[float], float] = lambda _h: 0.0
-) -> Outcome:
+) -> CheckOutcome:
     """One odd step on an instance of its own after three ordinary ones; the judge says what it thinks of it."""
     bench = context.fresh_bench()
     try:
@@ -121,25 +121,25 @@ def _odd(
         bench.put_away()
 
 
-def _refusal(said: RawStep) -> Outcome:
+def _refusal(said: RawStep) -> CheckOutcome:
     if said.status == "fatal":
         return noted("refused with status fatal: the instance is lost")
     return passed(f"refused with status {said.status}")
 
 
-def _done_or_refused(what: str, moved: bool, bad: str) -> Outcome:
+def _done_or_refused(what: str, moved: bool, bad: str) -> CheckOutcome:
     if bad:
         return failed(f"accepts {what} and is not finite after it: {bad}")
     return passed(f"accepts {what}, " + ("the outputs move" if moved else "the outputs stay"))
 
 
-def _still_or_refused(what: str, moved: bool, bad: str) -> Outcome:
+def _still_or_refused(what: str, moved: bool, bad: str) -> CheckOutcome:
     if bad or moved:
         return noted(f"accepts {what}, and the outputs move" + (f": {bad}" if bad else ""))
     return passed(f"accepts {what}, the outputs stay")
 
 
-def _must_refuse(what: str, moved: bool, bad: str) -> Outcome:
+def _must_refuse(what: str, moved: bool, bad: str) -> CheckOutcome:
     effect = f"not finite: {bad}" if bad else "the outputs move" if moved else "the outputs stay"
     return noted(f"accepts {what} instead of refusing it; {effect}")
 

@@ -12,7 +12,7 @@ from mock_slaves import Mock, component
 
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import Group, declared_feedthrough, execution_groups, execution_order, undeclared
-from cosim.coupling.ordering import Signal, in_order, satisfied
+from cosim.coupling.ordering import OrderedSignal, in_order, satisfied
 from cosim.coupling.strong import closed_path, strong_groups, topological
 from cosim.errors import CouplingError
 
@@ -295,7 +295,7 @@ def test_ordering_keeps_the_last_level_and_whatever_has_no_cycle(
     reach = reaches(edges, len(nodes))
     assert must <= kept <= edges
     assert {(a, b) for a, b in edges if a not in reach[b]} <= kept
-    signals = [Signal(a, frozenset({b}), bool((a + b) % 3)) for a, b in sorted(edges) if a != b]
+    signals = [OrderedSignal(a, frozenset({b}), bool((a + b) % 3)) for a, b in sorted(edges) if a != b]
     rank = {node: node % 2 for node in nodes}
     found = in_order(sorted(nodes), kept, signals, rank)
     assert sorted(found) == sorted(nodes)
@@ -307,7 +307,7 @@ def test_ordering_keeps_the_last_level_and_whatever_has_no_cycle(
 def test_the_next_node_is_one_that_makes_fewest_signals_held(case: tuple[list[int], set[tuple[int, int]]]) -> None:
     """The greedy choice against its words, all counts made anew at each node."""
     nodes, edges = case
-    signals = [Signal(a, frozenset(b for c, b in edges if c == a and b != a), a % 3 > 0) for a in sorted(nodes)]
+    signals = [OrderedSignal(a, frozenset(b for c, b in edges if c == a and b != a), a % 3 > 0) for a in sorted(nodes)]
     found = in_order(sorted(nodes), set(), signals, dict.fromkeys(nodes, 0))
     placed: set[int] = set()
     for node in found:

@@ -24,7 +24,7 @@ from cosim.components.loading import load_fmu
 from cosim.components.logged_slave import log_calls
 from cosim.diagnostics.call_log import HEADER, CallLog
 from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
-from cosim.diagnostics.call_text import Described
+from cosim.diagnostics.call_text import DescribedCall
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_rows, cost_text
 from cosim.master.master import close
@@ -212,8 +212,8 @@ def test_the_log_of_a_killed_process_ends_with_the_last_call_begun(version: Any,
 
 def test_a_call_within_a_call_and_one_that_raises(tmp_path: Path) -> None:
     log = CallLog(tmp_path / "calls.log")
-    words = Described("outer()", lambda _: ("ok", ""))
-    inner = Described("inner(x=1)", lambda _: ("warning", "2.5"))
+    words = DescribedCall("outer()", lambda _: ("ok", ""))
+    inner = DescribedCall("inner(x=1)", lambda _: ("warning", "2.5"))
     log.call(1.0, "a", words, lambda: log.call(1.5, "b", inner, int))
     with pytest.raises(ZeroDivisionError):
         log.call(2.0, "a", words, lambda: 1 // 0)

@@ -7,7 +7,14 @@ from __future__ import annotations
 import numpy as np
 
 from cosim.comparison.tolerance import Tolerance
-from cosim.comparison.verdict import Comparison, Curves, EventComparison, EventDifference, Finding, SignalComparison
+from cosim.comparison.verdict import (
+    Comparison,
+    ComparisonFinding,
+    Curves,
+    EventComparison,
+    EventDifference,
+    SignalComparison,
+)
 
 ALLOWED = 0.01
 
@@ -27,7 +34,7 @@ def curves(rows: int = 601, excess: float = 0.05) -> Curves:
 def differing(name: str = "train.speed", drawn: Curves | None = None, excess: float = 0.05) -> SignalComparison:
     """A signal that differs."""
     text = f"{name}: from 20 to 22 s outside the tube, at worst {excess:g} m/s too high at 21 s (allowed 0.01 m/s)"
-    finding = Finding("value", 20.0, 22.0, 2.1, 2.1 + excess, excess, ALLOWED, text)
+    finding = ComparisonFinding("value", 20.0, 22.0, 2.1, 2.1 + excess, excess, ALLOWED, text)
     return SignalComparison(
         name,
         "m/s",

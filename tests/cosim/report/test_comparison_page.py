@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.comparison.compare import compare_results
-from cosim.comparison.verdict import Comparison, Curves, EventComparison, Finding, SignalComparison
+from cosim.comparison.verdict import Comparison, ComparisonFinding, Curves, EventComparison, SignalComparison
 from cosim.drawing.style import new_figure, png
 from cosim.errors import OutputError
 from cosim.report.figures.comparison_figure import (
@@ -86,7 +86,7 @@ def test_the_zoom_holds_the_worst_point(at: float) -> None:
 
 
 def test_the_zoom_shows_a_shifted_jump_and_what_may_be_shifted() -> None:
-    jump = Finding("jump_time", 30.0, 30.0, 30.0, 30.4, 0.4, 0.2, "late")
+    jump = ComparisonFinding("jump_time", 30.0, 30.0, 30.0, 30.4, 0.4, 0.2, "late")
     signal = replace(differing(), findings=[jump], max_error_at=float("nan"), allowed_time=0.5)
     window = worst_window(signal)
     assert window is not None

@@ -29,7 +29,7 @@ from cosim.report.figures.overlay_figures import (
 )
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import cell, difference, measured
-from cosim.report.overlay.runs import MOST_RUNS, Run, make_runs
+from cosim.report.overlay.runs import MOST_RUNS, OverlayRun, make_runs
 from cosim.report.page import overlay
 from cosim.report.page.overlay import overlay_page, write_overlay
 from cosim.results.result import Result
@@ -45,7 +45,7 @@ def scaled(factor: float, observer: str = OBSERVERS[0], **summary: Any) -> Resul
     return replace(result, summary={**result.summary, **summary})
 
 
-def two(**summary: Any) -> list[Run]:
+def two(**summary: Any) -> list[OverlayRun]:
     return make_runs([scaled(1.0), scaled(2.0, **summary)], [SPEC, SPEC], ["before", "after"])
 
 

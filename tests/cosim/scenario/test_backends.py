@@ -16,7 +16,7 @@ import fmu_observer
 from cosim import Outcome, Scenario
 from cosim.cli import main
 from cosim.errors import FmuLoadError, ScenarioError
-from fmus.build import Draft
+from fmus.build import BuildDraft
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state, vector
 
 pytestmark = pytest.mark.compiler
@@ -187,13 +187,13 @@ def test_the_command_says_what_it_builds(tmp_path: Path, capsys: pytest.CaptureF
 
 def test_two_are_compiled_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of the two waits for the other one to begin."""
-    compile_one, both = Draft.compile, Barrier(2, timeout=20.0)
+    compile_one, both = BuildDraft.compile, Barrier(2, timeout=20.0)
 
-    def compile_together(draft: Draft) -> Any:
+    def compile_together(draft: BuildDraft) -> Any:
         both.wait()
         return compile_one(draft)
 
-    monkeypatch.setattr(Draft, "compile", compile_together)
+    monkeypatch.setattr(BuildDraft, "compile", compile_together)
     outcome, said = run(scenario("reckoning"))
     assert len(said) == 3
     assert set(kinds(outcome).values()) == {"FMU"}

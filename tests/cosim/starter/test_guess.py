@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.starter.guess import Quantity, Signal, guess
+from cosim.starter.guess import GuessedSignal, Quantity, guess
 from cosim.starter.words import words_of
 from plant_models.hybrid.units import parse_unit
 
 
-def signal(name: str, unit: str | None = None, description: str = "") -> Signal:
-    return Signal(name, unit, None if unit is None else parse_unit(unit), description)
+def signal(name: str, unit: str | None = None, description: str = "") -> GuessedSignal:
+    return GuessedSignal(name, unit, None if unit is None else parse_unit(unit), description)
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_what_is_taken_is_not_taken_again() -> None:
 
 
 def test_a_unit_nobody_understands_leaves_the_name() -> None:
-    found = guess("speed", [Signal("speed", "furlong/fortnight")])
+    found = guess("speed", [GuessedSignal("speed", "furlong/fortnight")])
     assert found is not None
     assert not found.signal.readable
     assert found.sureness == "likely"
