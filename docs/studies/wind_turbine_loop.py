@@ -14,15 +14,17 @@ from typing import Any
 import numpy as np
 
 import fmus
-from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, MEMORY, WindTurbineDiagnosis
+from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
 from plant_models.benchmarks.wind_turbine import Wind, WindTurbine, WindTurbineController
 from plant_models.hybrid import HybridSystem, PeriodicEvent, memory, output_signal, parameter, vector
 from plant_models.hybrid.signal import Signal
+from plant_models.hybrid.state_layout import StateLayout
 from plant_models.hybrid.system import Array
 
 PARTS = {"wind": Wind(), "turbine": WindTurbine(), "controller": WindTurbineController()}
 DIAGNOSIS = WindTurbineDiagnosis()
 SYSTEMS = {**PARTS, "diagnosis": DIAGNOSIS}
+DIAGNOSED = StateLayout(DIAGNOSIS.states)
 SETTLED = 20.0  # [s]: residuals count from here on
 PEAKS = (
     ("pitch_difference", 3),
@@ -122,8 +124,7 @@ class WindTurbineLoop(HybridSystem):
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A sampling instant, or one of the diagnosis alone."""
         if event != "sampling":
-            told = DIAGNOSIS.jump(event, t, self._part("diagnosis", x), None, p)
-            return self._with(x, diagnosis=told)
+            return self._with(x, diagnosis=self._diagnosed(event, t, x, None, p))
         wind = PARTS["wind"].jump_vector("gust", t, self._part("wind", x), vector(u.gust_noise), self._wind(p))
         x = self._with(x, wind=wind)
         inputs, turbine = self._turbine_inputs(t, x, u, p), self._part("turbine", x)
@@ -141,12 +142,16 @@ class WindTurbineLoop(HybridSystem):
                 controller[1],
             )
         )
-        before = self._part("diagnosis", x)
-        told = DIAGNOSIS.jump("sampling", t, before, given, p)
+        told = self._diagnosed("sampling", t, x, given, p)
         asked = vector(readings["generator"][0], readings["power"])
         moved = PARTS["controller"].jump_vector("sampling", t, controller, asked, FIXED["controller"])
-        log = self._logged(t, x, before, told, p)
+        log = self._logged(t, x, told, p)
         return self._with(self._with(x, diagnosis=told, controller=moved), log=log)
+
+    def _diagnosed(self, event: str, t: Array, x: Array, given: Any, p: Any) -> Array:
+        before = self._part("diagnosis", x)
+        changed = DIAGNOSIS.jump(event, t, DIAGNOSED.named(before), given, p)
+        return DIAGNOSED.flat(changed, "the diagnosis", before.shape[1:], before)
 
     # -- parts ------------------------------------------------------------------------------------------------------
 
@@ -223,8 +228,8 @@ class WindTurbineLoop(HybridSystem):
     def _acts(t: Array, p: Any) -> Array:
         return np.where(t >= p.onset - 1e-6, np.where(t < p.end - 1e-6, 1.0, 0.0), 0.0)
 
-    def _logged(self, t: Array, x: Array, before: Array, told: Array, p: Any) -> Array:
-        was, now = (MEMORY.unpack(state) for state in (before, told))
+    def _logged(self, t: Array, x: Array, told: Array, p: Any) -> Array:
+        was, now = (DIAGNOSED.named(state) for state in (self._part("diagnosis", x), told))
         log = {s.name: x[LAYOUT[s.name].start] if s.size is None else x[LAYOUT[s.name]] for s in _LOG}
         acts = self._acts(t, p)
         own = 0.0 * t

@@ -1,5 +1,5 @@
 """Speeds of a wind turbine's rotor and generator against the torsion between them, and the torque of the generator
-against its reference. Pure functions on a named memory, for the system that carries it.
+against its reference. Pure functions on states by name, for the system that carries it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fmu_observer.diagnosis.redundancy import disagreement
 from fmu_observer.diagnosis.residual_filters import residual_filter
 from fmu_observer.diagnosis.windowed_residual import windowed_square
 from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
-from plant_models.hybrid import memory, parameter
+from plant_models.hybrid import matrix, memory, parameter, vector
 from plant_models.hybrid.system import Array
 
 WINDOW = 5  # samples of the observer of the torsion
@@ -82,7 +82,7 @@ DRIVE_MEMORY = (
             strict=True,
         )
     ),
-    memory("speed_filter", "rad/s", 0.0, "Filters of the speed sensors", size=8),
+    memory("speed_filter", "rad/s", 0.0, "Filters of the speed sensors", shape=(4, 2)),
     memory("speed_squares", "rad2/s2", 0.0, "Square of the sample before, of each speed sensor", size=4),
     memory("torque_filter", "N.m", 0.0, "Filter of the generator torque", size=2),
     memory("torque_squares", "N2.m2", 0.0, "Squares of the two samples before", size=2),
@@ -98,14 +98,14 @@ DRIVE_MEMORY = (
 
 def sample_speeds(
     m: Any, rotor: Array, generator: Array, rotor_torque: Array, torque: Array, p: Any, starts: Array
-) -> dict[str, Any]:
+) -> dict[str, Array]:
     """Residuals of the four speed sensors after a sample: Omar 2012, (7.7.4)-(7.7.6).
 
     Each sensor stands beside the mean of the two of the other speed; a fault of one speed leaves the other healthy, as
     at most one fault is assumed.
 
     Args:
-        m: named memory with `DRIVE_MEMORY`. rotor: speeds of the two sensors [rad/s], shape (2,).
+        m: named tuple with `DRIVE_MEMORY`. rotor: speeds of the two sensors [rad/s], shape (2,).
         generator: the same [rad/s], shape (2,). rotor_torque: estimated torque of the wind on the rotor [N.m].
         torque: measured torque of the generator [N.m]. p: parameters with `DRIVE_PARAMETERS` and `sample_period`.
         starts: 1 at the first sample, else 0.
@@ -115,7 +115,7 @@ def sample_speeds(
     """
     now = (rotor[0], rotor[1], generator[0], generator[1], rotor_torque, torque)
     histories = {
-        name: [np.where(starts > 0.0, value, getattr(m, name)[i]) for i in range(WINDOW - 1)] + [value]
+        name: [*(np.where(starts > 0.0, value, before) for before in getattr(m, name)), value]
         for name, value in zip(_HISTORIES, now, strict=True)
     }
     gains: tuple[Array, ...] = (p.rotor_speed_gain, p.rotor_speed_gain, p.generator_speed_gain, p.generator_speed_gain)
@@ -126,30 +126,28 @@ def sample_speeds(
     torsions = _beside(r1, r2, g1, g2, 1.0)
     rates = _beside(rotor[0], rotor[1], generator[0], generator[1], -1.0 / p.gear_ratio)
     coefficients = residual_filter(p.speed_filter_time, p.sample_period)
-    filters: list[Array] = []
-    squares, residuals = [], []
+    filters, squares, residuals = [], [], []
     for i, (torsion, rate) in enumerate(zip(torsions, rates, strict=True)):
-        before = (m.speed_filter[2 * i], m.speed_filter[2 * i + 1])
-        out = rate_residual(coefficients, before, torsion + driving + braking, rate, starts)
+        out = rate_residual(coefficients, m.speed_filter[i], torsion + driving + braking, rate, starts)
         window = windowed_square(m.speed_squares[i : i + 1], out.value)
-        filters.extend(out.memory)
+        filters.append(out.memory)
         squares.append(window.memory[0])
         residuals.append(window.value)
     return {
-        **{name: values[1:] for name, values in histories.items()},
-        "speed_filter": filters,
-        "speed_squares": squares,
-        "held_speed_difference": [disagreement(rotor[0], rotor[1]), disagreement(generator[0], generator[1])],
-        "held_speed_residual": residuals,
+        **{name: vector(*values[1:]) for name, values in histories.items()},
+        "speed_filter": matrix(*filters),
+        "speed_squares": vector(*squares),
+        "held_speed_difference": vector(disagreement(*rotor), disagreement(*generator)),
+        "held_speed_residual": vector(*residuals),
         "held_estimated_torsion": 0.5 * (torsions[0] + torsions[1]) + driving + braking,
     }
 
 
-def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
+def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array) -> dict[str, Array]:
     """Residual of the generator torque over three samples: Omar 2012, 7.8.1.
 
     Args:
-        m: named memory with `DRIVE_MEMORY`, as it was before the sample. torque: measured [N.m].
+        m: named tuple with `DRIVE_MEMORY`, as it was before the sample. torque: measured [N.m].
         reference: that was held since the last sample [N.m].
         p: parameters with `DRIVE_PARAMETERS`, `centring` and `sample_period`. starts: 1 at the first sample, else 0.
 
@@ -157,27 +155,30 @@ def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array
         New values of the memory by name.
     """
     coefficients = residual_filter(p.torque_filter_time, p.sample_period)
-    before = (m.torque_filter[0], m.torque_filter[1])
     previous = np.where(starts > 0.0, torque, m.torques[WINDOW - 2])
     late = centred(torque, previous, p.centring)
-    out = first_order_residual(coefficients, before, late, reference, p.converter_time, starts)
+    out = first_order_residual(coefficients, m.torque_filter, late, reference, p.converter_time, starts)
     window = windowed_square(m.torque_squares, out.value)
-    return {"torque_filter": out.memory, "torque_squares": window.memory, "held_torque_residual": window.value}
+    return {
+        "torque_filter": vector(*out.memory),
+        "torque_squares": window.memory,
+        "held_torque_residual": window.value,
+    }
 
 
-def end_shaft_block(m: Any) -> dict[str, Any]:
+def end_shaft_block(m: Any) -> dict[str, Array]:
     """The long window of the angle between rotor and generator moves on by a block [ours].
 
     A shaft twists by some 1e-3 rad and no further: an angle that grows is an error of a speed, or of the gear's ratio.
 
     Args:
-        m: named memory with `DRIVE_MEMORY`.
+        m: named tuple with `DRIVE_MEMORY`.
 
     Returns:
         New values of the memory by name.
     """
-    kept = [m.shaft_blocks[i] for i in range(1, BLOCKS)] + [m.shaft_partial]
-    return {"shaft_blocks": kept, "shaft_partial": 0.0 * m.shaft_partial, "held_shaft_angle": sum(kept[1:], kept[0])}
+    kept = [*m.shaft_blocks[1:], m.shaft_partial]
+    return {"shaft_blocks": vector(*kept), "shaft_partial": 0.0, "held_shaft_angle": sum(kept[1:], kept[0])}
 
 
 def _weighted(gain: Array, values: Sequence[Array]) -> Array:

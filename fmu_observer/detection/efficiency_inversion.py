@@ -1,5 +1,5 @@
 """Efficiency of a wind turbine's drive train from a window of some minutes: simulated for a grid of efficiencies,
-bracketed by the measured generator speed. Pure functions on a named memory, for the system that carries it.
+bracketed by the measured generator speed. Pure functions on states by name, for the system that carries it.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ EFFICIENCY_MEMORY = (
 )
 
 
-def sample_torques(m: Any, generator: Array, driving: Array, braking: Array) -> dict[str, Any]:
+def sample_torques(m: Any, generator: Array, driving: Array, braking: Array) -> dict[str, Array]:
     """A sample is added to the block that grows.
 
     Args:
-        m: named memory with `EFFICIENCY_MEMORY`. generator: its speed [rad/s].
+        m: named tuple with `EFFICIENCY_MEMORY`. generator: its speed [rad/s].
         driving: estimated torque of the wind on the rotor [N.m]. braking: measured torque of the generator [N.m].
 
     Returns:
@@ -63,7 +63,7 @@ def sample_torques(m: Any, generator: Array, driving: Array, braking: Array) -> 
     }
 
 
-def simulated_speed(efficiency: Array, start: Array, driving: Any, braking: Any, period: Array, p: Any) -> Array:
+def simulated_speed(efficiency: Array, start: Array, driving: Array, braking: Array, period: Array, p: Any) -> Array:
     """Generator speed after the blocks of a window.
 
     The two inertias turn as one, ``(Jr + Ng^2 Jg / eta) w' = tau_r - (Br + Ng^2 Bg / eta) w - Ng tau_g / eta``, exact
@@ -87,8 +87,7 @@ def simulated_speed(efficiency: Array, start: Array, driving: Any, braking: Any,
     rate = friction / inertia
     kept = np.exp(-rate * period)
     gain = (1.0 - kept) / friction
-    torques = (vector(*(driving[i] for i in range(BLOCKS))), vector(*(braking[i] for i in range(BLOCKS))))
-    (speed,) = enclosed(_turned, 0.0 * efficiency + start / p.gear_ratio, kept, gain, ratio, *torques)
+    (speed,) = enclosed(_turned, 0.0 * efficiency + start / p.gear_ratio, kept, gain, ratio, driving, braking)
     return p.gear_ratio * speed
 
 
@@ -103,13 +102,13 @@ def _block(carry: Arrays, row: Arrays, shared: Arrays) -> tuple[Arrays, Arrays]:
     return (kept * carry[0] + gain * (row[0][0] - ratio * row[1][0]),), ()
 
 
-def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
+def update_efficiency(m: Any, p: Any) -> dict[str, Array]:
     """The window moves on by a block and is inverted for the efficiency: Omar 2012, (7.7.7), (7.7.8).
 
     Before the window is full the efficiency stays nominal.
 
     Args:
-        m: named memory with `EFFICIENCY_MEMORY`. p: parameters with `EFFICIENCY_PARAMETERS` and `gear_ratio`.
+        m: named tuple with `EFFICIENCY_MEMORY`. p: parameters with `EFFICIENCY_PARAMETERS` and `gear_ratio`.
 
     Returns:
         New values of the memory by name.
@@ -117,7 +116,7 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
     samples = np.maximum(m.block_samples, 1.0)
     ends = {"driving_means": m.driving_sum / samples, "braking_means": m.braking_sum / samples}
     ends["generator_starts"] = m.last_generator
-    moved = {name: [getattr(m, name)[i] for i in range(1, BLOCKS)] + [end] for name, end in ends.items()}
+    moved = {name: vector(*getattr(m, name)[1:], end) for name, end in ends.items()}
     full_blocks = m.full_blocks + np.where(m.block_samples > 0.0, 1.0, 0.0)
     previous = m.held_efficiency_estimate
     bounds = (p.grid_lowest, p.grid_highest, p.least_efficiency, p.most_efficiency)
@@ -129,9 +128,9 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
     full = full_blocks > BLOCKS + 0.5  # the block before the window tells where it begins
     return {
         **moved,
-        "driving_sum": 0.0 * m.driving_sum,
-        "braking_sum": 0.0 * m.braking_sum,
-        "block_samples": 0.0 * m.block_samples,
+        "driving_sum": 0.0,
+        "braking_sum": 0.0,
+        "block_samples": 0.0,
         "full_blocks": full_blocks,
         "held_efficiency_estimate": np.where(full, smoothed(previous, found.value, p.smoothing), p.nominal_efficiency),
         "held_efficiency_crossings": np.where(full, found.crossings, 1.0),

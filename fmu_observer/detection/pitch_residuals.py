@@ -1,5 +1,5 @@
 """Pitch of a wind turbine's blades against its reference: residuals of six sensors, sharp for faults of a sensor, slow
-for faults of an actuator. Pure functions on a named memory, for the system that carries it.
+for faults of an actuator. Pure functions on states by name, for the system that carries it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from fmu_observer.diagnosis.actuator_residual import centred, second_order_resid
 from fmu_observer.diagnosis.redundancy import disagreement
 from fmu_observer.diagnosis.residual_filters import residual_filter
 from fmu_observer.diagnosis.windowed_residual import windowed_square
-from plant_models.hybrid import memory, parameter, vector
+from plant_models.hybrid import matrix, memory, parameter, vector
 from plant_models.hybrid.system import Array
 
 BLADES, SENSORS = 3, 6
@@ -38,12 +38,14 @@ PITCH_PARAMETERS = (
 
 PITCH_MEMORY = (
     memory("previous_pitch", "deg", 0.0, "Readings of the sample before", size=SENSORS),
-    memory("sensor_filter", "deg/s2", 0.0, "Filters of the pitch sensors", size=2 * SENSORS),
-    memory("sensor_squares", "deg2/s4", 0.0, "Squares of the two samples before, of each pitch sensor", size=12),
-    memory("brief_filter", "deg/s2", 0.0, "Filters of the residual of one sample", size=2 * SENSORS),
-    memory("long_filter", "deg/s2", 0.0, "Filters of the residual over the long window", size=2 * SENSORS),
+    memory("sensor_filter", "deg/s2", 0.0, "Filters of the pitch sensors", shape=(SENSORS, 2)),
+    memory(
+        "sensor_squares", "deg2/s4", 0.0, "Squares of the two samples before, of each pitch sensor", shape=(SENSORS, 2)
+    ),
+    memory("brief_filter", "deg/s2", 0.0, "Filters of the residual of one sample", shape=(SENSORS, 2)),
+    memory("long_filter", "deg/s2", 0.0, "Filters of the residual over the long window", shape=(SENSORS, 2)),
     memory("long_partial", "deg2/s4", 0.0, "Sum of the block that grows, of each blade", size=BLADES),
-    memory("long_blocks", "deg2/s4", 0.0, "Sums of the blocks of the long window", size=BLOCKS * BLADES),
+    memory("long_blocks", "deg2/s4", 0.0, "Sums of the blocks of the long window", shape=(BLADES, BLOCKS)),
     memory("held_pitch_difference", "deg", 0.0, "Difference of the two sensors of each blade", size=BLADES),
     memory("held_pitch_single", "deg2/s4", 0.0, "Residual of each pitch sensor, one sample", size=SENSORS),
     memory("held_pitch_triple", "deg2/s4", 0.0, "Residual of each pitch sensor, three samples", size=SENSORS),
@@ -52,14 +54,14 @@ PITCH_MEMORY = (
 )
 
 
-def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
+def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Array) -> dict[str, Array]:
     """Residuals of the pitch after a sample: Omar 2012, (7.6.2), (7.6.9), (7.6.10), (7.6.13), (7.6.14).
 
     An actuator is judged by the smaller one of its two sensors' residuals at each sample, and only where both have one
     sign: a faulty sensor leaves the other, and noise of one sensor counts for nothing [ours].
 
     Args:
-        m: named memory with `PITCH_MEMORY`. readings: of blades 1, 1, 2, 2, 3, 3 [deg], shape (6,).
+        m: named tuple with `PITCH_MEMORY`. readings: of blades 1, 1, 2, 2, 3, 3 [deg], shape (6,).
         reference: pitch asked of all blades [deg]. p: parameters with `PITCH_PARAMETERS` and `sample_period`.
         starts: 1 at the first sample, else 0.
 
@@ -69,54 +71,49 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
     sharp = residual_filter(p.sensor_filter_time, p.sample_period)
     brief = residual_filter(p.brief_filter_time, p.sample_period)
     long = residual_filter(p.long_filter_time, p.sample_period)
-    filters: dict[str, list[Array]] = {"sensor_filter": [], "brief_filter": [], "long_filter": []}
+    filters: dict[str, list[tuple[Array, Array]]] = {"sensor_filter": [], "brief_filter": [], "long_filter": []}
     squares, single, triple, quick, slow = [], [], [], [], []
     for i in range(SENSORS):
         found = []
         previous = np.where(starts > 0.0, readings[i], m.previous_pitch[i])
         for name, coefficients in (("sensor_filter", sharp), ("brief_filter", brief), ("long_filter", long)):
-            before = getattr(m, name)
             late = readings[i] if name == "sensor_filter" else centred(readings[i], previous, p.centring)
             model = (late, reference, p.pitch_frequency, p.pitch_damping, starts)
-            out = second_order_residual(coefficients, (before[2 * i], before[2 * i + 1]), *model)
-            filters[name].extend(out.memory)
+            out = second_order_residual(coefficients, getattr(m, name)[i], *model)
+            filters[name].append(out.memory)
             found.append(out.value)
-        window = windowed_square(m.sensor_squares[2 * i : 2 * i + 2], found[0])
-        squares.extend([window.memory[0], window.memory[1]])
+        window = windowed_square(m.sensor_squares[i], found[0])
+        squares.append(window.memory)
         single.append(found[0] * found[0])
         triple.append(window.value)
         quick.append(found[1] - p.mean_residual)
         slow.append(found[2] - p.mean_residual)
     return {
-        **filters,
+        **{name: matrix(*rows) for name, rows in filters.items()},
         "previous_pitch": readings,
-        "sensor_squares": squares,
-        "long_partial": [m.long_partial[i] + _smaller(slow, i) for i in range(BLADES)],
-        "held_pitch_difference": [disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES)],
-        "held_pitch_single": single,
-        "held_pitch_triple": triple,
-        "held_pitch_brief": [_smaller(quick, i) for i in range(BLADES)],
+        "sensor_squares": matrix(*squares),
+        "long_partial": vector(*(m.long_partial[i] + _smaller(slow, i) for i in range(BLADES))),
+        "held_pitch_difference": vector(*(disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES))),
+        "held_pitch_single": vector(*single),
+        "held_pitch_triple": vector(*triple),
+        "held_pitch_brief": vector(*(_smaller(quick, i) for i in range(BLADES))),
     }
 
 
-def end_block(m: Any) -> dict[str, Any]:
+def end_block(m: Any) -> dict[str, Array]:
     """The long window moves on by a block; its sum is that of (7.6.10) at this instant.
 
     Args:
-        m: named memory with `PITCH_MEMORY`.
+        m: named tuple with `PITCH_MEMORY`.
 
     Returns:
         New values of the memory by name.
     """
-    blocks, sums = [], []
-    for i in range(BLADES):
-        kept = [m.long_blocks[i * BLOCKS + j] for j in range(1, BLOCKS)] + [m.long_partial[i]]
-        blocks.extend(kept)
-        sums.append(sum(kept[1:], kept[0]))
+    blocks = [[*m.long_blocks[i][1:], m.long_partial[i]] for i in range(BLADES)]
     return {
-        "long_blocks": blocks,
-        "long_partial": [0.0 * m.long_partial[i] for i in range(BLADES)],
-        "held_pitch_long": sums,
+        "long_blocks": matrix(*blocks),
+        "long_partial": np.zeros(BLADES),
+        "held_pitch_long": vector(*(sum(block[1:], block[0]) for block in blocks)),
     }
 
 

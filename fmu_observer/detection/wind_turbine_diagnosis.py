@@ -39,7 +39,6 @@ from fmu_observer.detection.wind_turbine_limits import (
     repeats,
     warned,
 )
-from fmu_observer.diagnosis.named_memory import NamedMemory
 from fmu_observer.diagnosis.redundancy import larger
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.benchmarks.wind_turbine.rotor import Rotor
@@ -117,23 +116,6 @@ _RESIDUALS = (
 )
 
 
-MEMORY = NamedMemory(
-    (
-        memory("samples", "1", 0.0, "Samples since the start"),
-        memory("repeated", "1", 0.0, "Samples at which no reading of speeds and torque was a new one"),
-        *PITCH_MEMORY,
-        *DRIVE_MEMORY,
-        *EFFICIENCY_MEMORY,
-        memory("undecided_pairs", "1", 0.0, "Pairs of sensors that disagree while no model tells which one is it"),
-        memory("undecided_alarm", "1", (0.0, 0.0, 0.0), "Alarm of such pairs: raised, contrary, since", size=3),
-        memory("raised", "1", 0.0, "1 for each alarm that is raised", size=ALARMS),
-        memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=ALARMS),
-        memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
-    )
-)
-"""What the diagnosis carries from sample to sample, by name."""
-
-
 class WindTurbineDiagnosis(HybridSystem):
     """Faults of a wind turbine from its readings and references: Omar 2012, chapter 7.
 
@@ -165,7 +147,19 @@ class WindTurbineDiagnosis(HybridSystem):
     description = "Faults of a wind turbine: sensors, converter, pitch actuators, efficiency of the drive train"
     source = "Omar 2012, sections 7.5-7.8; thresholds ours"
     internal_step = 1e-2  # nothing flows
-    states = MEMORY.signals
+    by_name = True
+    states = (
+        memory("samples", "1", 0.0, "Samples since the start"),
+        memory("repeated", "1", 0.0, "Samples at which no reading of speeds and torque was a new one"),
+        *PITCH_MEMORY,
+        *DRIVE_MEMORY,
+        *EFFICIENCY_MEMORY,
+        memory("undecided_pairs", "1", 0.0, "Pairs of sensors that disagree while no model tells which one is it"),
+        memory("undecided_alarm", "1", (0.0, 0.0, 0.0), "Alarm of such pairs: raised, contrary, since", size=3),
+        memory("raised", "1", 0.0, "1 for each alarm that is raised", size=ALARMS),
+        memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=ALARMS),
+        memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
+    )
     inputs = (
         input_signal("wind_speed", "m/s", 9.0, "Measured wind speed", display_unit="km/h"),
         input_signal("rotor_speed", "rad/s", 0.0, "Rotor speed, by two sensors", size=2),
@@ -253,55 +247,48 @@ class WindTurbineDiagnosis(HybridSystem):
         }
         return within_bounds(self.parameters, p) | dict(limits) | grid_requirements(p) | period_requirements(p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""
-        m = MEMORY.unpack(x)
         if event == "block_end":
-            return MEMORY.pack(m, **end_block(m), **end_shaft_block(m))
+            return end_block(x) | end_shaft_block(x)
         if event == "efficiency_update":
-            return MEMORY.pack(m, **update_efficiency(m, p))
-        starts = np.where(m.samples > 0.0, 0.0, 1.0)
-        new = {"samples": m.samples + 1.0, "repeated": m.repeated + repeats(m, u, starts)}
-        new |= sample_pitch(m, u.pitch, u.pitch_reference, p, starts)
-        m = m._replace(**new)
+            return update_efficiency(x, p)
+        starts = np.where(x.samples > 0.0, 0.0, 1.0)
+        new: dict[str, Array] = {"samples": x.samples + 1.0, "repeated": x.repeated + repeats(x, u, starts)}
+        new |= sample_pitch(x, u.pitch, u.pitch_reference, p, starts)
+        m = x._replace(**new)
         pitches = trusted_pitches(u.pitch, p.pitch_difference_limit, m.held_pitch_triple)
-        rotor = trusted(*_pair(u.rotor_speed, 0), p.rotor_difference_limit, *_pair(m.held_speed_residual, 0))
+        rotor = trusted(*u.rotor_speed, p.rotor_difference_limit, *m.held_speed_residual[:2])
         aerodynamics = Rotor(p.rotor_radius, p.air_density, p.largest_coefficient)
         driving = aerodynamics.torque(u.wind_speed - p.wind_bias, rotor, [pitches[i] for i in range(BLADES)])
         new |= sample_torque(m, u.torque, u.torque_reference, p, starts)
         new |= sample_speeds(m, u.rotor_speed, u.generator_speed, driving, u.torque, p, starts)
         m = m._replace(**new)
-        generator = trusted(
-            *_pair(u.generator_speed, 0), p.generator_difference_limit, *_pair(m.held_speed_residual, 2)
-        )
+        generator = trusted(*u.generator_speed, p.generator_difference_limit, *m.held_speed_residual[2:])
         new |= sample_torques(m, generator, driving, u.torque)
         new |= {"shaft_partial": m.shaft_partial + p.sample_period * (rotor - generator / p.gear_ratio)}
         settled = _settled(m, p)
         exceeds, undecided = _judged(m, t, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
-        new |= {name: [getattr(alarm, field) for alarm in alarms] for name, field in _ALARM_FIELDS}
+        new |= {name: vector(*values) for name, values in zip(Alarm._fields, zip(*alarms, strict=True), strict=True)}
         pairs = settled * undecided
-        found = judge(Alarm(*_three(m.undecided_alarm)), t, pairs, p.sensor_raise_after, p.sensor_clear_after)
-        return MEMORY.pack(m, **new, undecided_pairs=pairs, undecided_alarm=vector(*found))
+        found = judge(Alarm(*m.undecided_alarm), t, pairs, p.sensor_raise_after, p.sensor_clear_after)
+        return new | {"undecided_pairs": pairs, "undecided_alarm": vector(*found)}
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Alarms, when they changed, and what they rest on."""
-        m = MEMORY.unpack(x)
         found: dict[str, Array] = {}
         at = 0
         for group in _GROUPS:
             place = at if group.size == 1 else slice(at, at + group.size)
-            found |= {group.output: m.raised[place], f"{group.output}_time": m.since[place]}
+            found |= {group.output: x.raised[place], f"{group.output}_time": x.since[place]}
             at += group.size
-        any_raised = m.undecided_alarm[0]  # detected is told although it is not isolated
+        any_raised = x.undecided_alarm[0]  # detected is told although it is not isolated
         for i in range(ALARMS):
-            any_raised = np.maximum(any_raised, m.raised[i])
-        residuals = {name: getattr(m, f"held_{name}") for name, *_ in _RESIDUALS}
-        told = {"fault": any_raised, "undecided": m.undecided_pairs}
-        return found | residuals | told | _ratios(m, p) | warned(m, p)
-
-
-_ALARM_FIELDS = (("raised", "raised"), ("contrary", "contrary"), ("since", "since"))
+            any_raised = np.maximum(any_raised, x.raised[i])
+        residuals = {name: getattr(x, f"held_{name}") for name, *_ in _RESIDUALS}
+        told = {"fault": any_raised, "undecided": x.undecided_pairs}
+        return found | residuals | told | _ratios(x, p) | warned(x, p)
 
 
 def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
@@ -377,11 +364,3 @@ def _alarms(m: Any, exceeds: Sequence[Array], t: Array, p: Any) -> list[Alarm]:
         )
         for i, kind in enumerate(kinds)
     ]
-
-
-def _three(values: Array) -> tuple[Array, Array, Array]:
-    return values[0], values[1], values[2]
-
-
-def _pair(values: Array, first: int) -> tuple[Array, Array]:
-    return values[first], values[first + 1]

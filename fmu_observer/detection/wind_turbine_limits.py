@@ -1,5 +1,5 @@
 """What the diagnosis of a wind turbine refuses before it runs, and what it warns of after: settings with which its
-verdict means nothing. Pure functions on its named memory.
+verdict means nothing. Pure functions on its states by name.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def repeats(m: Any, u: Any, starts: Array) -> Array:
     """1 where a sample brings no new reading of first rotor speed, first generator speed and torque.
 
     Args:
-        m: named memory with `DRIVE_MEMORY`, as it was before. u: inputs of the diagnosis.
+        m: named tuple with `DRIVE_MEMORY`, as it was before. u: inputs of the diagnosis.
         starts: 1 at the first sample, else 0.
     """
     pairs = (
@@ -129,7 +129,7 @@ def warned(m: Any, p: Any) -> dict[str, Array]:
     """Values of `WARNINGS` by name.
 
     Args:
-        m: named memory of the diagnosis. p: its parameters.
+        m: states of the diagnosis. p: its parameters.
     """
     return {
         "efficiency_unknown": np.where(m.full_blocks > BLOCKS + 0.5, 0.0, 1.0),

@@ -6,7 +6,7 @@ import pytest
 import fmus
 from fmu_observer.detection.drive_train_residuals import torsion_gains
 from fmu_observer.detection.efficiency_inversion import BLOCKS, simulated_speed
-from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, MEMORY, WindTurbineDiagnosis
+from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
 from fmu_observer.detection.wind_turbine_limits import WARNINGS
 from fmu_observer.diagnosis.finite_window_observer import sampled
 from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
@@ -281,11 +281,3 @@ def test_an_efficiency_that_is_not_known_is_warned_of(batch: fmus.Batch) -> None
     assert diagnosed(batch, [still], results, wind_bias=3.0, **fast)[0, -1, :3].tolist() == [0.0, 0.0, 1.0]
     above = diagnosed(batch, [still], results, grid_lowest=1.2, least_efficiency=1.05, most_efficiency=1.09, **fast)
     assert above[0, -1, :3].tolist() == [0.0, 1.0, 0.0]
-
-
-def test_a_memory_by_name_refuses_another_width() -> None:
-    x = np.arange(float(sum(s.width for s in MEMORY.signals)))
-    m = MEMORY.unpack(x)
-    np.testing.assert_array_equal(MEMORY.pack(m), x)
-    with pytest.raises(ValueError, match="expected 2"):
-        MEMORY.pack(m, torque_filter=[1.0])
