@@ -13,11 +13,10 @@ import numpy as np
 from fmu_observer.detection.train_diagnosis_signals import EVENTS, INPUTS, OUTPUTS, PARAMETERS
 from fmu_observer.detection.train_efficiency import MotionWindow, Share, brake_share, traction_share
 from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, RESIDUALS, WHEEL, isolability
-from fmu_observer.detection.train_memory import CONTINUOUS, Memory, remembered
+from fmu_observer.detection.train_memory import CONTINUOUS, remembered
 from fmu_observer.detection.train_residuals import (
     HUGE,
     Readings,
-    SpeedWindows,
     readings,
     speed_ratios,
     voted_speed,
@@ -90,6 +89,7 @@ class TrainDiagnosis(HybridSystem):
     description = "Faults of a train's odometers, radar, satellites, balises, brake and traction: isolated and timed"
     source = "Omar 2012, 7.5.1, (7.6.9)-(7.6.13), (7.7.6)-(7.7.8), for a train; table of isolation ours"
     internal_step = 1e-2  # the flow is exact for held inputs, but for the cylinder's lag
+    by_name = True
     inputs = INPUTS
     outputs = OUTPUTS
     parameters = PARAMETERS
@@ -130,112 +130,99 @@ class TrainDiagnosis(HybridSystem):
         """Thresholds and times are within their bounds; a threshold of zero would be an alarm for ever."""
         return super().requirements(p) | within_bounds(self.parameters, p)
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of dead reckoning, of the ways, and of the modelled pressure, shape (5,) or (5, members)."""
-        m, read = Memory(self.states, x), readings(u)
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of dead reckoning, of the ways, and of the modelled pressure."""
         pipe = p.pipe_pressure_released - limited(u.brake_demand) * p.pipe_depression_full
-        return vector(m["voted_speed"], *read.speeds, filling(m["modelled_pressure"], pipe, p))
+        return {
+            "estimated_position": x.voted_speed,
+            "way": vector(*readings(u).speeds),
+            "modelled_pressure": filling(x.modelled_pressure, pipe, p),
+        }
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """A sample is judged, or a balise compared; shape (n,) or (n, members)."""
-        m, read = Memory(self.states, x), readings(u)
-        if event == "balise":
-            self._at_balise(m, read, u, p)
-        else:
-            self._at_sample(m, read, t, u, p)
-        return m.joined()
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """A sample is judged, or a balise compared."""
+        return self._at_balise(x, u, p) if event == "balise" else self._at_sample(t, x, u, p)
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs."""
-        m, read = Memory(self.states, x), readings(u)
-        codes = dict(zip(FAULTS, m.each("code"), strict=True))
+        read, codes = readings(u), dict(zip(FAULTS, x.code, strict=True))
         enough = read.fitted[0] * read.fitted[1] * read.fitted[2] * read.has_pressure
         told = {f"{fault}_fault": code for fault, code in codes.items()}
         isolated = [np.where(code > 0.0, 1.0, 0.0) for code in codes.values()]
-        shares, unknown = m.each("share"), [1.0 - found for found in m.each("share_found")]
+        unknown = [1.0 - found for found in x.share_found]
         return {
             **told,
-            "fault": largest([np.where(since >= 0.0, 1.0, 0.0) for since in m.each("group_since")] + isolated),
+            "fault": largest([np.where(since >= 0.0, 1.0, 0.0) for since in x.group_since] + isolated),
             "odometer_fault": np.where(codes["odometer_1"] > 0.0, 1.0, 0.0),
             "fault_count": sum(isolated),
-            "several_faults": m["several"],
-            "detection_time": m["detected_at"],
-            "confidence": m["trust"],
-            "speed": m["voted_speed"],
-            "position": m["estimated_position"],
-            "traction_efficiency": shares[0],
-            "brake_performance": shares[1],
-            "brake_by_demand": shares[2],
+            "several_faults": x.several,
+            "detection_time": x.detected_at,
+            "confidence": x.trust,
+            "speed": x.voted_speed,
+            "position": x.estimated_position,
+            "traction_efficiency": x.share[0],
+            "brake_performance": x.share[1],
+            "brake_by_demand": x.share[2],
             "isolation_limited": 1.0 - enough,
             "traction_efficiency_unknown": unknown[0],
             "brake_performance_unknown": unknown[1],
             "brake_by_demand_unknown": unknown[2],
             "shares_unknown": sum(unknown),
-            **{f"ratio_{name}": ratio for name, ratio in zip(RESIDUALS, m.each("ratio"), strict=True)},
+            **{f"ratio_{name}": ratio for name, ratio in zip(RESIDUALS, x.ratio, strict=True)},
         }
 
     # -- a sample -----------------------------------------------------------------------------------------------------
 
-    def _at_sample(self, m: Memory, read: Readings, t: Array, u: Any, p: Any) -> None:
-        raised = m.each("raised")
-        m.put(voted_speed=voted_speed(read, raised[:SPEED_PAIRS]), samples=m["samples"] + 1.0)
-        count = np.where(read.has_gps > 0.0, m["gps_samples"] + 1.0, 0.0)
-        gps_full = np.where(count > m["lead_first"].shape[0] + 0.5, 1.0, 0.0)
-        can = availability(read, gps_full, m["telegrams"], m.each("disagree"))
-        before = SpeedWindows(
-            m["squares_odometers"],
-            m["squares_first_radar"],
-            m["squares_second_radar"],
-            (m["lead_first"], m["lead_second"], m["lead_radar"]),
-        )
-        speeds, after = speed_ratios(before, read, m.each("way"), m["voted_speed"], p)
-        m.put(
-            gps_samples=count,
-            squares_odometers=after.odometers,
-            squares_first_radar=after.first_radar,
-            squares_second_radar=after.second_radar,
-            lead_first=after.leads[0],
-            lead_second=after.leads[1],
-            lead_radar=after.leads[2],
-        )
-        since_mark = m["estimated_position"] - m["mark"]
-        held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
-        off = np.minimum(np.abs(read.gps - m["estimated_position"]), _nearest_way(m, read))
-        held["gps_position"] = off / (p.threshold_position + p.balise_share * np.abs(since_mark))
-        held["pressure"] = np.abs(read.pressure - m["modelled_pressure"]) / p.threshold_pressure
-        held |= dict(zip(MOTION.residuals[:SPEED_PAIRS], speeds, strict=True))
-        held |= self._shares(m, read, u, p)
-        raised = m.each("raised")
-        alarms_after(m, t, [held[name] * there for name, there in zip(RESIDUALS, can.residuals, strict=True)], p)
-        wheel = wheels(m, u, self._brake_force(largest([m["modelled_pressure"], read.pressure]), p), p)
-        codes_after(m, t, can, contradicted_wheels(m, read, wheel, p), stuck_sensors(m, read, wheel, p), raised, p)
+    def _at_sample(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        read = readings(u)
+        speed = voted_speed(read, x.raised[:SPEED_PAIRS])
+        count = np.where(read.has_gps > 0.0, x.gps_samples + 1.0, 0.0)
+        gps_full = np.where(count > x.lead_first.shape[0] + 0.5, 1.0, 0.0)
+        can = availability(read, gps_full, x.telegrams, x.disagree)
+        speeds, windows = speed_ratios(x, read, speed, p)
+        forces, shares = self._shares(x, read, speed, u, p)
+        off = np.minimum(np.abs(read.gps - x.estimated_position), _nearest_way(x, read))
+        held = dict(zip(RESIDUALS, x.ratio, strict=True))
+        held["gps_position"] = off / (p.threshold_position + p.balise_share * np.abs(x.estimated_position - x.mark))
+        held["pressure"] = np.abs(read.pressure - x.modelled_pressure) / p.threshold_pressure
+        held |= dict(zip(MOTION.residuals[:SPEED_PAIRS], speeds, strict=True)) | forces
+        ratios = [held[name] * there for name, there in zip(RESIDUALS, can.residuals, strict=True)]
+        new = {"voted_speed": speed, "samples": x.samples + 1.0, "gps_samples": count, **windows, **shares}
+        new |= alarms_after(x, t, ratios, p)
+        wheel, efforts = wheels(x, u, self._brake_force(largest([x.modelled_pressure, read.pressure]), p), p)
+        now = x._replace(voted_speed=speed, ratio=new["ratio"], raised=new["raised"])
+        wrong, against = contradicted_wheels(now, read, wheel, p)
+        stuck, seen = stuck_sensors(now, read, wheel, p)
+        return new | efforts | against | seen | codes_after(now, t, can, wrong, stuck, x.raised, p)
 
-    def _shares(self, m: Memory, read: Readings, u: Any, p: Any) -> dict[str, Array]:
-        """Shares of force after a coarse step, and their residuals over their thresholds."""
+    def _shares(
+        self, x: Any, read: Readings, speed: Array, u: Any, p: Any
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Residuals of the shares of force over their thresholds, and new values of states after a coarse step."""
         mass = p.mass + p.rotating_mass
         now = [
-            m["voted_speed"],
+            speed,
             np.maximum(u.effort, 0.0) / mass,
             self._brake_force(read.pressure, p) / mass,
-            self._brake_force(m["modelled_pressure"], p) / mass,
+            self._brake_force(x.modelled_pressure, p) / mass,
             (np.minimum(u.effort, 0.0) - u.gradient_force) / mass,
         ]
-        sums = [total + value for total, value in zip(m.each("coarse_sum"), now, strict=True)]
-        count = m["coarse_samples"] + 1.0
+        sums = [total + value for total, value in zip(x.coarse_sum, now, strict=True)]
+        count = x.coarse_samples + 1.0
         full = np.where(count * p.sample_period >= p.coarse_step - 1e-9, 1.0, 0.0)
-        known = [np.where(code >= WHEEL, 1.0, 0.0) for code in m.each("code")[:3]]  # these are not believed
+        known = [np.where(code >= WHEEL, 1.0, 0.0) for code in x.code[:3]]  # these are not believed
         sound = [1.0 - np.maximum(known[i], known[j] if j < len(known) else 0.0) for i, j in PAIRS_OF_SOURCES]
-        loud = largest([on * both for on, both in zip(m.each("raised")[:SPEED_PAIRS], sound, strict=True)])
-        quiet = np.where(loud > 0.0, 0.0, m["quiet_steps"] + full)
+        loud = largest([on * both for on, both in zip(x.raised[:SPEED_PAIRS], sound, strict=True)])
+        quiet = np.where(loud > 0.0, 0.0, x.quiet_steps + full)
         names = ("mean_speed", "mean_drive", "mean_measured", "mean_demanded", "mean_other")
         rings = []
         for name, total in zip(names, sums, strict=True):
-            ring = m.each(name)
+            ring = getattr(x, name)
             rings.append(
                 [np.where(full > 0.0, new, old) for old, new in zip(ring, [*ring[1:], total / count], strict=True)]
             )
         usable = full * np.where(quiet > len(rings[0]) - 0.5, 1.0, 0.0)
-        window, before = MotionWindow(*rings), m.each("share")
+        window, before = MotionWindow(*rings), x.share
         step = count * p.sample_period
         found = [
             traction_share(window, before[0], step, mass, p),
@@ -245,18 +232,18 @@ class TrainDiagnosis(HybridSystem):
         found[1] = Share(found[1].value, found[1].found * read.has_pressure, found[1].bracketed)
         told = [usable * one.found for one in found]
         shares = [np.where(on > 0.0, one.value, old) for on, one, old in zip(told, found, before, strict=True)]
-        sought = zip(told, found, m.each("share_found"), strict=True)
-        m.put(
-            coarse_sum=[(1.0 - full) * total for total in sums],
-            coarse_samples=(1.0 - full) * count,
-            quiet_steps=quiet,
-            share=shares,
-            share_found=[np.where(on > 0.0, one.bracketed, old) for on, one, old in sought],
-            **dict(zip(names, rings, strict=True)),
-        )
+        sought = zip(told, found, x.share_found, strict=True)
+        after = {
+            "coarse_sum": vector(*((1.0 - full) * total for total in sums)),
+            "coarse_samples": (1.0 - full) * count,
+            "quiet_steps": quiet,
+            "share": vector(*shares),
+            "share_found": vector(*(np.where(on > 0.0, one.bracketed, old) for on, one, old in sought)),
+            **{name: vector(*ring) for name, ring in zip(names, rings, strict=True)},
+        }
         pulls, measured, demanded = (np.abs(1.0 - share) for share in shares)
         brakes = (measured / p.threshold_brake, demanded / p.threshold_brake)
-        return {"traction": pulls / p.threshold_traction} | dict(zip(BRAKE.residuals[1:], brakes, strict=True))
+        return {"traction": pulls / p.threshold_traction, **dict(zip(BRAKE.residuals[1:], brakes, strict=True))}, after
 
     @staticmethod
     def _brake_force(pressure: Array, p: Any) -> Array:
@@ -267,40 +254,38 @@ class TrainDiagnosis(HybridSystem):
     # -- a balise -----------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def _at_balise(m: Memory, read: Readings, u: Any, p: Any) -> None:
-        distance = u.balise_position - m["mark"]
-        ways = [way - mark for way, mark in zip(m.each("way"), m.each("way_mark"), strict=True)]
-        known = np.where(m["telegrams"] > 0.5, 1.0, 0.0)
-        sound = [there * (1.0 - bad) for there, bad in zip(read.fitted, m.each("faulty"), strict=True)]
+    def _at_balise(x: Any, u: Any, p: Any) -> dict[str, Array]:
+        read, distance = readings(u), u.balise_position - x.mark
+        ways = [way - mark for way, mark in zip(x.way, x.way_mark, strict=True)]
+        known = np.where(x.telegrams > 0.5, 1.0, 0.0)
+        sound = [there * (1.0 - bad) for there, bad in zip(read.fitted, x.faulty, strict=True)]
         errors, limit = [distance - way for way in ways], p.balise_floor + p.balise_share * np.abs(distance)
         ratios, balise = way_ratios(errors, sound, limit)
         gaps = [np.where(np.abs(error) > limit, 1.0, 0.0) for error in errors]
-        held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
+        held = dict(zip(RESIDUALS, x.ratio, strict=True))
         held |= {f"way_{name}": known * r for name, r in zip(("1", "2", "radar"), ratios, strict=True)}
         held["balise"] = known * balise
         # One that no way agrees with is not used; two in a row mean that the place of the train was wrong.
-        refused = np.where(held["balise"] > 1.0, 1.0 - m["refused"], 0.0)
+        refused = np.where(held["balise"] > 1.0, 1.0 - x.refused, 0.0)
         used = 1.0 - refused
-        position = np.where(used > 0.0, u.balise_position, m["estimated_position"])
-        marks = [np.where(used > 0.0, way, mark) for way, mark in zip(m.each("way"), m.each("way_mark"), strict=True)]
-        m.put(
-            estimated_position=position,
-            ratio=[held[name] for name in RESIDUALS],
-            telegrams=m["telegrams"] + 1.0,
-            refused=refused,
-            faulty=[0.0, 0.0, 0.0],
-            disagree=[known * there * gap for there, gap in zip(read.fitted, gaps, strict=True)],
-            telegram_verdict=np.where(used > 0.0, float(USED), float(IGNORED)),
-            mark=np.where(used > 0.0, u.balise_position, m["mark"]),
-            way_mark=marks,
-        )
+        return {
+            "estimated_position": np.where(used > 0.0, u.balise_position, x.estimated_position),
+            "ratio": vector(*(held[name] for name in RESIDUALS)),
+            "telegrams": x.telegrams + 1.0,
+            "refused": refused,
+            "faulty": np.zeros(3),
+            "disagree": vector(*(known * there * gap for there, gap in zip(read.fitted, gaps, strict=True))),
+            "telegram_verdict": np.where(used > 0.0, float(USED), float(IGNORED)),
+            "mark": np.where(used > 0.0, u.balise_position, x.mark),
+            "way_mark": np.where(used > 0.0, x.way, x.way_mark),
+        }
 
 
-def _nearest_way(m: Memory, read: Readings) -> Array:
+def _nearest_way(x: Any, read: Readings) -> Array:
     """Distance of the satellite position from the nearest of the ways since the last balise [m].
 
     Satellites are off where no source of speed agrees with them, not where one source is.
     """
-    ways = zip(m.each("way"), m.each("way_mark"), read.fitted, strict=True)
-    gaps = [np.where(there > 0.0, np.abs(read.gps - m["mark"] - way + mark), HUGE) for way, mark, there in ways]
+    ways = zip(x.way, x.way_mark, read.fitted, strict=True)
+    gaps = [np.where(there > 0.0, np.abs(read.gps - x.mark - way + mark), HUGE) for way, mark, there in ways]
     return -largest([-gap for gap in gaps])

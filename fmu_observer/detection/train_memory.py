@@ -1,14 +1,9 @@
-"""What the diagnosis of a train remembers: names, sizes and places in its state. Data and slicing only."""
+"""What the diagnosis of a train remembers. Data only."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 from fmu_observer.detection.train_isolation import FAULTS, RESIDUALS
-from fmu_observer.diagnosis.named_memory import NamedMemory
-from plant_models.hybrid import Signal, memory, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Signal, memory, state
 
 CONTINUOUS = (
     state("estimated_position", "m", 0.0, "Position by dead reckoning from the last balise"),
@@ -69,40 +64,3 @@ def remembered(speed_window: int, gps_window: int, force_window: int) -> tuple[S
         memory("share", "1", 1.0, "Shares of traction, brake by measured, brake by demanded pressure", size=3),
         memory("share_found", "1", 0.0, "1 where the grid held the share that was found last", size=3),
     )
-
-
-class Memory:
-    """The state by names: read, replaced one by one, and put together again.
-
-    Args:
-        signals: all states in order. x: the state, shape (n,) or (n, members).
-    """
-
-    def __init__(self, signals: Sequence[Signal], x: Array) -> None:
-        self._parts = NamedMemory(signals)
-        self._values = self._parts.unpack(x)
-
-    def __getitem__(self, name: str) -> Array:
-        value: Array = getattr(self._values, name)
-        return value
-
-    def each(self, name: str) -> list[Array]:
-        """Elements of a vector.
-
-        Args:
-            name: of it.
-        """
-        return [self[name][i] for i in range(self[name].shape[0])]
-
-    def put(self, **values: Any) -> None:
-        """Replace some.
-
-        Args:
-            values: by name, a number, or an array or list for a vector.
-        """
-        arrays = {name: vector(*v) if isinstance(v, list) else v for name, v in values.items()}
-        self._values = self._values._replace(**arrays)
-
-    def joined(self) -> Array:
-        """The whole state again."""
-        return self._parts.pack(self._values)

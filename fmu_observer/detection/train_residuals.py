@@ -35,21 +35,6 @@ class Readings(NamedTuple):
     has_pressure: Array
 
 
-class SpeedWindows(NamedTuple):
-    """What the residuals of speed carry: squares of the pairs, shape (N - 1,) each, and leads of the satellite position
-    over the ways, shape (L,) each.
-
-    Attributes:
-        odometers: squares of the pair of odometers. first_radar: of first odometer and radar. second_radar: of second
-            odometer and radar. leads: over the ways of first odometer, second odometer, radar [m].
-    """
-
-    odometers: Array
-    first_radar: Array
-    second_radar: Array
-    leads: tuple[Array, Array, Array]
-
-
 def there(value: Array) -> Array:
     """1 where a sensor is fitted and reads, else 0.
 
@@ -81,46 +66,44 @@ def tolerance(speed: Array, p: Any) -> Array:
     return p.speed_floor + p.speed_share * np.abs(speed)
 
 
-def speed_ratios(
-    before: SpeedWindows, read: Readings, ways: list[Array], speed: Array, p: Any
-) -> tuple[list[Array], SpeedWindows]:
+def speed_ratios(x: Any, read: Readings, speed: Array, p: Any) -> tuple[list[Array], dict[str, Array]]:
     """Residuals of the six pairs of sources of speed over their thresholds.
 
     The three pairs without the satellites are root mean squares over N samples, those with them the mean over L: the
     lead of the position over the way may not change.
 
     Args:
-        before: what the sample before left. read: of the sensors. ways: of first odometer, second odometer and radar
-            since the start [m]. speed: of the train [m/s]. p: parameters.
+        x: states of the diagnosis. read: of the sensors. speed: of the train [m/s]. p: parameters.
 
     Returns:
-        Ratios in the order of the first six residuals of `MOTION`, and what is carried on.
+        Ratios in the order of the first six residuals of `MOTION`, and new values of states by name.
     """
     allowed = tolerance(speed, p)
-    pairs = ((0, 1, before.odometers), (0, 2, before.first_radar), (1, 2, before.second_radar))
-    ratios, kept = [], []
-    for (i, j, memory), threshold in zip(
-        pairs, (p.threshold_wheels, p.threshold_radar, p.threshold_radar), strict=True
+    ratios: list[Array] = []
+    after: dict[str, Array] = {}
+    for name, i, j, threshold in (
+        ("squares_odometers", 0, 1, p.threshold_wheels),
+        ("squares_first_radar", 0, 2, p.threshold_radar),
+        ("squares_second_radar", 1, 2, p.threshold_radar),
     ):
-        both = read.fitted[i] * read.fitted[j]
-        windowed = windowed_square(memory, both * (read.speeds[i] - read.speeds[j]) / allowed)
-        ratios.append(np.sqrt(windowed.value / (memory.shape[0] + 1.0)) / threshold)
-        kept.append(windowed.memory)
-    leads = []
-    for lead, way, fitted in zip(before.leads, ways, read.fitted, strict=True):
-        now = read.has_gps * (read.gps - way)
+        both, before = read.fitted[i] * read.fitted[j], getattr(x, name)
+        windowed = windowed_square(before, both * (read.speeds[i] - read.speeds[j]) / allowed)
+        ratios.append(np.sqrt(windowed.value / (before.shape[0] + 1.0)) / threshold)
+        after[name] = windowed.memory
+    for name, way, fitted in zip(("lead_first", "lead_second", "lead_radar"), x.way, read.fitted, strict=True):
+        now, lead = read.has_gps * (read.gps - way), getattr(x, name)
         window = lead.shape[0] * p.sample_period
         ratios.append(fitted * np.abs(now - lead[0]) / (window * allowed * p.threshold_gps))
-        leads.append(vector(*(lead[i] for i in range(1, lead.shape[0])), now))
-    return ratios, SpeedWindows(kept[0], kept[1], kept[2], (leads[0], leads[1], leads[2]))
+        after[name] = vector(*lead[1:], now)
+    return ratios, after
 
 
-def voted_speed(read: Readings, raised: list[Array]) -> Array:
+def voted_speed(read: Readings, raised: Array) -> Array:
     """Speed by a vote, two out of three: of the source that fewest alarms are about; of equals the radar, then the
     second odometer, then the first [m/s].
 
     Args:
-        read: of the sensors. raised: alarms of the first six residuals of `MOTION`.
+        read: of the sensors. raised: alarms of the first six residuals of `MOTION`, shape (6,).
     """
     wheels, first, second, first_gps, second_gps, radar_gps = raised
     against = [wheels + first + first_gps, wheels + second + second_gps, first + second + radar_gps]

@@ -22,11 +22,10 @@ from fmu_observer.detection.train_isolation import (
     TRACTION,
     WHEEL,
 )
-from fmu_observer.detection.train_memory import Memory
 from fmu_observer.detection.train_residuals import Readings, tolerance
 from fmu_observer.diagnosis.isolation_table import IsolationTable, Verdict, largest
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
-from plant_models.hybrid.system import Array
+from plant_models.hybrid.system import Array, vector
 
 GROUPS = (MOTION, BRAKE, TRACTION)
 UNPROVED = 3.0  # telegrams
@@ -57,12 +56,12 @@ class Wheels(NamedTuple):
     fast: Array
 
 
-def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Sequence[Array]) -> Availability:
+def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Array) -> Availability:
     """Which residuals can be computed, what can fail, and which residuals were made without it.
 
     Args:
         read: of the sensors. gps_full: 1 where the window of satellite positions is full. telegrams: balises so far.
-        disagree: 1 for each source of speed whose way the last balise contradicts.
+        disagree: 1 for each source of speed whose way the last balise contradicts, shape (3,).
     """
     first, second, radar = read.fitted
     gps, some, two = gps_full, np.where(telegrams > 0.5, 1.0, 0.0), np.where(telegrams > 1.5, 1.0, 0.0)
@@ -94,91 +93,97 @@ def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Se
     return Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source], apart)
 
 
-def alarms_after(m: Memory, t: Array, ratios: Sequence[Array], p: Any) -> None:
+def alarms_after(x: Any, t: Array, ratios: Sequence[Array], p: Any) -> dict[str, Array]:
     """Raise and clear the alarms of a sample; those of balises and shares follow at once.
 
     Args:
-        m: memory, changed in place. t: time [s]. ratios: of all residuals. p: parameters.
+        x: states of the diagnosis. t: time [s]. ratios: of all residuals. p: parameters.
+
+    Returns:
+        New values of states by name.
     """
-    raised, contrary, since = [], [], []
-    before = zip(m.each("raised"), m.each("contrary"), m.each("since"), strict=True)
-    for name, ratio, (on, against, when) in zip(RESIDUALS, ratios, before, strict=True):
+    alarms: list[Alarm] = []
+    for name, ratio, *before in zip(RESIDUALS, ratios, x.raised, x.contrary, x.since, strict=True):
         slow = name.startswith(("odometer", "radar", "gps", "pressure"))
         exceeds = np.where(ratio > 1.0, 1.0, 0.0)
         counts = (p.raise_samples, p.clear_samples) if slow else (1.0, 1.0)
-        now = judge(Alarm(on, against, when), t, exceeds, *counts)
-        raised.append(now.raised)
-        contrary.append(now.contrary)
-        since.append(now.since)
-    m.put(ratio=list(ratios), raised=raised, contrary=contrary, since=since)
+        alarms.append(judge(Alarm(*before), t, exceeds, *counts))
+    after = zip(Alarm._fields, zip(*alarms, strict=True), strict=True)
+    return {"ratio": vector(*ratios), **{name: vector(*values) for name, values in after}}
 
 
-def wheels(m: Memory, u: Any, brake_force: Array, p: Any) -> Wheels:
+def wheels(x: Any, u: Any, brake_force: Array, p: Any) -> tuple[Wheels, dict[str, Array]]:
     """Whether an effort acts, or acted until `release_time` ago, that can jam or spin a wheel.
 
     Args:
-        m: memory, changed in place. u: inputs. brake_force: of the whole train [N]. p: parameters.
+        x: states of the diagnosis. u: inputs. brake_force: of the whole train [N]. p: parameters.
+
+    Returns:
+        What a wheel may do, and new values of states by name.
     """
     pulls = np.where(u.effort > p.slip_effort, 1.0, 0.0)
     brakes = np.where(np.maximum(-u.effort, brake_force) > p.slip_effort, 1.0, 0.0)
-    since_pull = np.where(pulls > 0.0, 0.0, m["since_pull"] + p.sample_period)
-    since_brake = np.where(brakes > 0.0, 0.0, m["since_brake"] + p.sample_period)
-    m.put(since_pull=since_pull, since_brake=since_brake)
+    since_pull = np.where(pulls > 0.0, 0.0, x.since_pull + p.sample_period)
+    since_brake = np.where(brakes > 0.0, 0.0, x.since_brake + p.sample_period)
     slow, fast = (np.where(since <= p.release_time, 1.0, 0.0) for since in (since_brake, since_pull))
-    return Wheels(slow, fast)
+    return Wheels(slow, fast), {"since_pull": since_pull, "since_brake": since_brake}
 
 
-def contradicted_wheels(m: Memory, read: Readings, wheel: Wheels, p: Any) -> list[Array]:
+def contradicted_wheels(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[list[Array], dict[str, Array]]:
     """For each odometer 1 where it is off for so long that no wheel explains it: the sensor is at fault.
 
     Args:
-        m: memory, changed in place. read: of the sensors. wheel: what wheels may do. p: parameters.
+        x: states of the diagnosis. read: of the sensors. wheel: what wheels may do. p: parameters.
+
+    Returns:
+        One for each, and new values of states by name.
     """
     times, wrong = [], []
-    raised = dict(zip(RESIDUALS, m.each("raised"), strict=True))
-    for k, before in enumerate(m.each("against_wheel")):
-        ahead = read.speeds[k] - m["voted_speed"]
+    raised = dict(zip(RESIDUALS, x.raised, strict=True))
+    for k, before in enumerate(x.against_wheel):
+        ahead = read.speeds[k] - x.voted_speed
         may_be: Array = np.where(ahead < 0.0, wheel.slow, wheel.fast)
         quick, way = largest([raised[name] for name in OF_ODOMETER[k]]), raised[f"way_{k + 1}"]
         off = np.where(np.maximum(quick, way) > 0.0, read.fitted[k], 0.0)
-        now: Array = np.where(np.abs(ahead) > tolerance(m["voted_speed"], p), 1.0 - may_be, 0.0)
+        now: Array = np.where(np.abs(ahead) > tolerance(x.voted_speed, p), 1.0 - may_be, 0.0)
         # Once a wheel cannot explain it the verdict stays until the alarm ends: the same fault goes on under effort.
         known = np.where(before >= p.contrary_time - 1e-9, p.contrary_time, before + p.sample_period * now)
         # What only a way between balises shows is small and lasts: a scale, no slip.
-        small = np.where(quick > 0.0, 0.0, np.where(m["code"][k] > 0.0, 0.0, way))
+        small = np.where(quick > 0.0, 0.0, np.where(x.code[k] > 0.0, 0.0, way))
         known = np.where(small > 0.0, p.contrary_time, known)
         times.append(np.where(off > 0.0, known, 0.0))
         wrong.append(np.where(times[k] >= p.contrary_time - 1e-9, 1.0, 0.0))
-    m.put(against_wheel=times)
-    return wrong
+    return wrong, {"against_wheel": vector(*times)}
 
 
-def stuck_sensors(m: Memory, read: Readings, wheel: Wheels, p: Any) -> list[Array]:
+def stuck_sensors(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[list[Array], dict[str, Array]]:
     """For odometers, radar, satellites and pressure 1 where a reading has not changed although it should have.
 
     A wheel that is locked reads zero: that is no sensor that stands still while the brake may lock it.
 
     Args:
-        m: memory, changed in place. read: of the sensors. wheel: what wheels may do. p: parameters.
+        x: states of the diagnosis. read: of the sensors. wheel: what wheels may do. p: parameters.
+
+    Returns:
+        One for each, and new values of states by name.
     """
     values = [*read.speeds, read.gps, read.pressure]
-    believed = [m["voted_speed"]] * 3 + [m["estimated_position"], m["modelled_pressure"]]
+    believed = [x.voted_speed] * 3 + [x.estimated_position, x.modelled_pressure]
     limits = [p.stuck_speed] * 3 + [p.stuck_way, p.stuck_pressure]
     fitted = [*read.fitted, read.has_gps, read.has_pressure]
     then, stuck = [], []
-    last = zip(values, m.each("last_reading"), m.each("then"), believed, limits, fitted, strict=True)
+    last = zip(values, x.last_reading, x.then, believed, limits, fitted, strict=True)
     for k, (value, before, reference, now, limit, there) in enumerate(last):
         same = np.where(value == before, there, 0.0)
         then.append(np.where(same > 0.0, reference, now))
         locked = np.where(np.abs(value) < p.least_speed, wheel.slow, 0.0) if k < 2 else 0.0
         stuck.append(np.where(np.abs(now - then[k]) > limit, same * (1.0 - locked), 0.0))
-    m.put(last_reading=values, then=then)
-    return stuck
+    return stuck, {"last_reading": vector(*values), "then": vector(*then)}
 
 
 def codes_after(
-    m: Memory, t: Array, can: Availability, wrong: list[Array], stuck: list[Array], before: list[Array], p: Any
-) -> None:
+    x: Any, t: Array, can: Availability, wrong: list[Array], stuck: list[Array], before: Array, p: Any
+) -> dict[str, Array]:
     """Fault codes, instant of the detection, confidence.
 
     Until `isolation_delay` after the first alarm of a group a fault is suspected only: residuals are not equally quick.
@@ -187,23 +192,26 @@ def codes_after(
     slip of all wheels.
 
     Args:
-        m: memory, changed in place. t: time [s]. can: what there can be. wrong: odometers that no wheel explains.
+        x: states of the diagnosis. t: time [s]. can: what there can be. wrong: odometers that no wheel explains.
         stuck: sensors that stand still. before: alarms of the sample before. p: parameters.
+
+    Returns:
+        New values of states by name.
     """
-    raised, ratios = m.each("raised"), m.each("ratio")
+    raised, ratios = x.raised, x.ratio
     there = dict(zip(FAULTS, can.faults, strict=True))
     there["adhesion"] = there["adhesion"] * (1.0 - largest(wrong))
     codes: list[Array] = []
     begun, unexplained, trusts, counted, named = [], [], [], [], []
     place = first = 0
-    for group, since in zip(GROUPS, m.each("group_since"), strict=True):
+    for group, since in zip(GROUPS, x.group_since, strict=True):
         own = slice(place, place + len(group.residuals))
         possible = [there[fault] for fault in group.faults]
         any_alarm = largest([a * b for a, b in zip(raised[own], can.residuals[own], strict=True)])
         start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
         said = group.judge(raised[own], can.residuals[own], possible, can.apart)
         sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
-        known = m.each("code")[first : first + len(group.faults)]
+        known = x.code[first : first + len(group.faults)]
         fresh = largest([now * (1.0 - old) for now, old in zip(raised[own], before[own], strict=True)])
         stays, several = _stays(group, known, said, raised[own], possible, fresh)
         kept = largest(stays)
@@ -221,22 +229,28 @@ def codes_after(
     for fault, still in zip(("odometer_1", "odometer_2", "radar", "gps", "pressure_sensor"), stuck, strict=True):
         k = FAULTS.index(fault)
         codes[k] = np.where(still > 0.0, STUCK, codes[k])
-    newest = m["detected_at"]
-    for old, now in zip(m.each("group_since"), begun, strict=True):
+    newest = x.detected_at
+    for old, now in zip(x.group_since, begun, strict=True):
         newest = np.where(now >= 0.0, np.where(old < 0.0, now, newest), newest)
     seen = sum(counted, 0.0)
     # An alarm outlasts its residual: while it does the confidence is the last that a residual gave.
-    trust = np.where(seen > 0.5, sum(trusts, 0.0) / np.maximum(seen, 1.0), m["trust"])
+    trust = np.where(seen > 0.5, sum(trusts, 0.0) / np.maximum(seen, 1.0), x.trust)
     trust = np.where(largest(named) > 0.5, trust, 0.0)
     slips = codes[FAULTS.index("adhesion")]
     bad = [np.maximum(codes[0], slips), np.maximum(codes[1], slips), codes[2]]
-    faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(m.each("faulty"), bad, strict=True)]
-    m.put(faulty=faulty)
-    m.put(code=codes, group_since=begun, several=largest(unexplained), trust=trust, detected_at=newest)
+    faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(x.faulty, bad, strict=True)]
+    return {
+        "faulty": vector(*faulty),
+        "code": vector(*codes),
+        "group_since": vector(*begun),
+        "several": largest(unexplained),
+        "trust": trust,
+        "detected_at": newest,
+    }
 
 
 def _stays(
-    group: IsolationTable, known: list[Array], said: Verdict, alarms: list[Array], possible: list[Array], fresh: Array
+    group: IsolationTable, known: Array, said: Verdict, alarms: Array, possible: list[Array], fresh: Array
 ) -> tuple[list[Array], Array]:
     """For each fault 1 where it was isolated and stays so: alarms only go, or others come beside its own, which it does
     not explain; and 1 where there are several: no single fault explains the alarms, or not the one that is isolated.
@@ -260,7 +274,7 @@ def _isolated_code(fault: str, wrong: list[Array]) -> Array:
     return LOSS if fault in ("cylinder", "friction", "traction") else SENSOR
 
 
-def _margin(group: IsolationTable, fault: str, ratios: list[Array], available: list[Array]) -> tuple[Array, Array]:
+def _margin(group: IsolationTable, fault: str, ratios: Array, available: list[Array]) -> tuple[Array, Array]:
     """1 - threshold / residual of the weakest alarm of a fault, and 1 where there is one above its threshold"""
     margin: Array = 1.0
     seen: Array = 0.0
