@@ -117,14 +117,15 @@ def end_block(m: Any) -> dict[str, Array]:
     }
 
 
-def trusted(first: Array, second: Array, limit: Array, first_residual: Array, second_residual: Array) -> Array:
+def trusted(readings: Array, limit: Array, residuals: Array) -> Array:
     """Mean of two sensors; where they disagree, the one with the smaller residual.
 
     Args:
-        first: reading m1. second: reading m2. limit: largest difference without a fault.
-        first_residual: of the model with m1. second_residual: of the model with m2.
+        readings: of both, shape (2,). limit: largest difference without a fault.
+        residuals: of the model with each, shape (2,).
     """
-    better = np.where(first_residual <= second_residual, first, second)
+    first, second = readings
+    better = np.where(residuals[0] <= residuals[1], first, second)
     return np.where(disagreement(first, second) > limit, better, 0.5 * (first + second))
 
 
@@ -135,8 +136,8 @@ def trusted_pitches(readings: Array, limit: Array, residuals: Array) -> Array:
         readings: of the six sensors [deg], shape (6,). limit: largest difference of two without a fault [deg].
         residuals: of the six sensors, shape (6,).
     """
-    pairs = ((2 * i, 2 * i + 1) for i in range(BLADES))
-    return vector(*(trusted(readings[i], readings[j], limit, residuals[i], residuals[j]) for i, j in pairs))
+    pairs = (slice(2 * i, 2 * i + 2) for i in range(BLADES))
+    return vector(*(trusted(readings[pair], limit, residuals[pair]) for pair in pairs))
 
 
 def _smaller(residuals: Sequence[Array], blade: int) -> Array:
