@@ -176,7 +176,7 @@ def _told(observer: TrainObserver, runtime: Runtime, place: float, p: Any, odome
     memory = GateMemory(*runtime.x[first : first + len(GATE_MEMORY)].tolist())
     estimate = float(runtime.x[names.index(observer.position_state)])
     offsets = np.concatenate([[0.0], OFFSETS, -OFFSETS])
-    bound = float(observer.own_bound(observer.unpack_states(runtime.x) if observer.by_name else runtime.x, p))
+    bound = float(observer.own_bound(observer.unpack_states(runtime.x), p))
     used = np.asarray(judge(memory, Told(place + offsets, 0.0, estimate, bound, odometer, runtime.t), p).used)
     settled = memory.settled >= p.gate_recover
     return Telegram(estimate - place, settled, used[0] == 0.0, used[1:].reshape(2, -1).mean(axis=0))

@@ -16,10 +16,9 @@ from fmu_observer.observers.innovation_gate import (
     Told,
     judge,
 )
-from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal, vector
+from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.state_layout import StateLayout
 from plant_models.hybrid.system import Array
 
 GATED_EVENT = "balise"
@@ -40,8 +39,7 @@ class GatedObserver(HybridSystem):
     The contract:
 
     1. A subclass declares the event `balise` with the payload `balise_position`, and the position it believes is the
-       state `position_state`, the first one unless it says so. It writes `update` in place of `jump`, and returns
-       there own states only.
+       state `position_state`, the first one unless it says so. It writes `update` in place of `jump`.
     2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event
        gets `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
     3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what
@@ -55,6 +53,7 @@ class GatedObserver(HybridSystem):
         options: of the observer, see its `option_choices`.
     """
 
+    by_name = True
     position_state: str = ""
     gate_start: float = REJECT
     weighing: Weighing = "innovation"
@@ -62,8 +61,6 @@ class GatedObserver(HybridSystem):
 
     def __init__(self, **options: Any) -> None:
         self.position_state = self.position_state or self.states[0].name
-        self._updated_places = StateLayout(self.states)
-        self.own_count = self._updated_places.width
         self.gated = any(_is_gated(event) for event in self.events)
         if self.gated:
             self.states = (*self.states, *GATE_MEMORY)
@@ -76,7 +73,7 @@ class GatedObserver(HybridSystem):
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
-    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """New values of the own states that an event changes, by name; a telegram here is one to be used."""
         raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no update for it.")
 
@@ -98,23 +95,18 @@ class GatedObserver(HybridSystem):
         """Bounds of the gate's parameters, see `HybridSystem.requirements`."""
         return super().requirements(p) | (within_bounds(GATE_PARAMETERS, p) if self.gated else {})
 
-    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """`update`, where the gate lets the telegram pass."""
         judges = self.gated and event == GATED_EVENT
-        bound = self.own_bound(x, p) if judges else None
-        if self.by_name:
-            return self._judged_update(t, x, bound, u, p) if judges else self._update_of(event, t, x, u, p)
-        places, named = self._own_places, self._own_places.named(x)
-        changed = self._judged_update(t, named, bound, u, p) if judges else self._update_of(event, t, named, u, p)
-        return places.flat(changed, f"{self.name}: jump({event!r})", x.shape[1:], x)
+        return self._judged_update(t, x, u, p) if judges else self.update(event, t, x, u, p)
 
-    def _judged_update(self, t: Array, x: Any, bound: Array, u: Any, p: Any) -> dict[str, Array]:
+    def _judged_update(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         estimate = getattr(x, self.position_state)
         gate = GateMemory(*(getattr(x, s.name) for s in GATE_MEMORY))
         odometer = self.odometer_of(u)
         if odometer is not None:  # where it is missing, the one at the telegram before is the last that is known
             odometer = or_else(odometer, gate.last_odometer)
-        told = Told(u.balise_position, u.balise_location_accuracy, estimate, bound, odometer, t)
+        told = Told(u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), odometer, t)
         judged, listens = judge(gate, told, p), self.listens(p)
         used = np.where(listens > 0.0, judged.used, 1.0)
         begun = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
@@ -129,19 +121,9 @@ class GatedObserver(HybridSystem):
         estimate, told = getattr(x, self.position_state), u.balise_position
         if self.weighing == "innovation":
             u = u._replace(balise_position=_towards(estimate, told, weight))
-        after = {self.position_state: estimate} | self._update_of(GATED_EVENT, t, x, u, p)
+        after = {self.position_state: estimate} | self.update(GATED_EVENT, t, x, u, p)
         if self.weighing == "position":
             after |= {name: _towards(getattr(x, name), after[name], weight) for name in self.weighed_states}
-        return after
-
-    def _update_of(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """`update`, of systems without `by_name` too."""
-        if self.by_name:
-            changed: dict[str, Array] = self.update(event, t, x, u, p)
-            return changed
-        own = [(getattr(x, s.name), s.size) for s in self._updated_places.signals]
-        flat = vector(*(v if n is None else v[i] for v, n in own for i in range(n or 1)))
-        after: dict[str, Array] = self._updated_places.named(self.update(event, t, flat, u, p))._asdict()
         return after
 
 

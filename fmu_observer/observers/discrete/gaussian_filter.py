@@ -77,7 +77,6 @@ class GaussianFilter(GatedObserver):
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("joseph", "short", "square_root")
-    by_name = True
     internal_step = 0.1  # nothing flows between samples
     own_parameters: tuple[Signal, ...] = ()
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {

@@ -80,7 +80,6 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         ValueError: the model is unknown, or has more than three unknown constants.
     """
 
-    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
     predicts: ClassVar[bool]

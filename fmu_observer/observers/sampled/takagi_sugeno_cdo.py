@@ -71,7 +71,6 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         "Takagi-Sugeno continuous-discrete observer of any such model, continuous and aperiodic sampled outputs"
     )
     source = "Bouchama 2024, (2.6)"
-    by_name = True
     internal_step = 1e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 

@@ -49,7 +49,6 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
     [ours].
     """
 
-    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": SUITED}
     payload_in_event: ClassVar[bool] = True

@@ -90,7 +90,6 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     name = "adaptive_davis"
     description = "Train observer that learns the Davis coefficients per unit mass"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
-    by_name = True
     internal_step = 1e-2
     weighing = "itself"
     frictions = ("estimated_speed",)

@@ -79,7 +79,6 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     name = "adaptive_wheel_radius"
     description = "Train observer that learns the error of the wheel radius from balises"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
-    by_name = True
     internal_step = 1e-2
     weighing = "itself"
     inputs: tuple[Signal, ...] = (

@@ -112,7 +112,6 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     name = "balise_odometer_ekf"
     description = "Extended Kalman filter of odometer and balises, with disturbance and creep"
     source = "Allaoui 2024, section II.5; the train case is ours"
-    by_name = True
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "itself"

@@ -22,7 +22,6 @@ class OdometerReset(GatedObserver):
     name = "odometer_reset"
     description = "Integrated odometer, reset at balises"
     source = "Aguiar Cota 2019, section 3.3.2"
-    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     gate_start = WARN
     weighing = "position"

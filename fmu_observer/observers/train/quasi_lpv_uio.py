@@ -117,7 +117,6 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     name = "quasi_lpv_uio"
     description = "Quasi-LPV unknown-input observer with jam detection and balise reset"
     source = "Aguiar Cota 2019, (3.36)-(3.45), Algorithm 3-3, section 3.3.2; the repaired rules ours"
-    by_name = True
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "position"

@@ -76,7 +76,6 @@ class TrainObserver(GatedObserver, GapCertified):
         options: of the observer, see its `option_choices`.
     """
 
-    by_name = True
     estimator_states: tuple[Signal, ...] = ()
     estimator_memory: tuple[Signal, ...] = ()
     estimator_parameters: tuple[Signal, ...] = ()
