@@ -56,6 +56,8 @@ class ModelPlant(HybridSystem):
     inputs.
     """
 
+    by_name = False
+
     name, description, source = "model_plant", "A plant that is what its observer believes", "docs/gallery"
     inputs = (input_signal("unused", "1"),)
 
@@ -83,6 +85,8 @@ class Together(HybridSystem):
             the plant's outputs and the noise, an input of the whole. step: internal step [s]. preset, overrides: of the
             observer.
     """
+
+    by_name = False
 
     name, description, source = "together", "A plant and its observer", "docs/gallery"
     inputs = (input_signal("noise", "1"),)

@@ -36,6 +36,8 @@ PARAMETERS: Mapping[str, Any] = {"train_speed": SPEED, "wheel_rate": SPEED / 0.5
 class EffortProfile(HybridSystem):
     """An effort that steps at given instants and is constant between them."""
 
+    by_name = False
+
     name = "effort_profile"
     description = "Effort in steps"
     source = "the mutation study"
@@ -54,6 +56,8 @@ class EffortProfile(HybridSystem):
 
 class BaliseRegister(HybridSystem):
     """Keeps the position told by the last balise."""
+
+    by_name = False
 
     name = "balise_register"
     description = "Position of the last balise"

@@ -79,6 +79,8 @@ FIXED = {name: system.start_parameters() for name, system in PARTS.items()}
 class WindTurbineLoop(HybridSystem):
     """The closed loop with one fault at a time, and what came of it."""
 
+    by_name = False
+
     name = "wind_turbine_loop"
     description = "Wind turbine, controller, fault and diagnosis"
     source = "Omar 2012, chapter 7"

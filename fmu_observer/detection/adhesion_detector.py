@@ -51,7 +51,6 @@ class AdhesionDetector(HybridSystem):
     name = "adhesion_detector"
     description = "Nominal or degraded adhesion, by the optimal slip of two creep curves nearest to the slip"
     source = "Bouchama 2024, (4.16)-(4.17), Table 4.5; filter and debouncing ours"
-    by_name = True
     internal_step = 1e-2
     states = (
         state("filtered_slip", "1", 0.0, "Magnitude of the slip relative to the train speed, filtered"),

@@ -43,7 +43,6 @@ class CouplerRisk(HybridSystem):
     name = "coupler_risk"
     description = "Risk that a coupler breaks, from its force and the rate of it, with hysteresis and peak hold"
     source = "Named in Bouchama 2024, section 4.2; breaking loads of EN 15566; levels ours"
-    by_name = True
     internal_step = 1e-2
     states = (
         state("filtered_tension", "N", 0.0, "Tension behind the filter"),

@@ -41,7 +41,6 @@ class ExcessiveSlip(HybridSystem):
     name = "excessive_slip"
     description = "Excessive slip from odometer and train speed: confirmed, held, and by how much"
     source = "Bouchama 2024, (4.14)-(4.15), Remark 16; times ours"
-    by_name = True
     internal_step = 1e-2
     states = (
         FILTERED_SLIP,

@@ -109,7 +109,6 @@ class JamDetector(HybridSystem):
     name = "jam_detector"
     description = "Jams and skids of the odometer's wheel from the residual of an observer"
     source = "Aguiar Cota 2019, Algorithm 3-3; the repaired rules ours"
-    by_name = True
     internal_step = 1e-2
     inputs = (
         input_signal("residual", "m/s", 0.0, "Residual of the observer, M (y - vh)"),

@@ -64,7 +64,6 @@ class SlipIndicator(HybridSystem):
     name = "slip_indicator"
     description = "Slip ratio and indicator of degraded adhesion from odometer and train speed"
     source = "Bouchama 2024, (3.49), (4.14)"
-    by_name = True
     states = (FILTERED_SLIP,)
     inputs = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed r w"),

@@ -89,7 +89,6 @@ class TrainDiagnosis(HybridSystem):
     description = "Faults of a train's odometers, radar, satellites, balises, brake and traction: isolated and timed"
     source = "Omar 2012, 7.5.1, (7.6.9)-(7.6.13), (7.7.6)-(7.7.8), for a train; table of isolation ours"
     internal_step = 1e-2  # the flow is exact for held inputs, but for the cylinder's lag
-    by_name = True
     inputs = INPUTS
     outputs = OUTPUTS
     parameters = PARAMETERS

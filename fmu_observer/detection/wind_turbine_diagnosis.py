@@ -147,7 +147,6 @@ class WindTurbineDiagnosis(HybridSystem):
     description = "Faults of a wind turbine: sensors, converter, pitch actuators, efficiency of the drive train"
     source = "Omar 2012, sections 7.5-7.8; thresholds ours"
     internal_step = 1e-2  # nothing flows
-    by_name = True
     states = (
         memory("samples", "1", 0.0, "Samples since the start"),
         memory("repeated", "1", 0.0, "Samples at which no reading of speeds and torque was a new one"),

@@ -53,7 +53,6 @@ class GatedObserver(HybridSystem):
         options: of the observer, see its `option_choices`.
     """
 
-    by_name = True
     position_state: str = ""
     gate_start: float = REJECT
     weighing: Weighing = "innovation"

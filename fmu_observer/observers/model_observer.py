@@ -59,7 +59,6 @@ class ModelObserver(HybridSystem):
         ValueError: the model is unknown, or it does not suit the observer.
     """
 
-    by_name = True
     timing: ClassVar[Timing] = "continuous"
     discrete: ClassVar[bool] = False
     leaves_out: ClassVar[bool] = False

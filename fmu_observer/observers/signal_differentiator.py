@@ -41,7 +41,6 @@ class SignalDifferentiator(HybridSystem):
         ValueError: no gains are tabulated for n + nf, or an order is not a whole number.
     """
 
-    by_name = True
     discrete: ClassVar[bool] = False
 
     def __init__(

@@ -21,7 +21,6 @@ class TriangularisablePlant(HybridSystem):
     name = "triangularisable_plant"
     description = "First academic plant of chapter 2: four states, one nonlinear damping"
     source = "Bouchama 2024, section 2.5.1"
-    by_name = True
     internal_step = 1e-3
     states = tuple(state(f"state_{i}", "1", 1.0, f"State {i}") for i in (1, 2, 3, 4))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)

@@ -26,7 +26,6 @@ class NoisyPlant(HybridSystem):
     that the plant is the plain differential equation.
     """
 
-    by_name = True
     moving: tuple[Signal, ...] = ()
     plain_outputs: tuple[Signal, ...] = ()
 

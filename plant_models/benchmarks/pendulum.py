@@ -26,7 +26,6 @@ class Pendulum(HybridSystem):
     name = "pendulum"
     description = "Damped pendulum driven by a torque"
     source = "ours, in the normal form of Bouchama 2024, (1.10)"
-    by_name = True
     internal_step = 5e-3
     states = (
         state("pendulum_angle", "rad", 1.0, "Angle from the lower rest"),

@@ -81,7 +81,6 @@ class StateFeedback(HybridSystem):
     name = "state_feedback"
     description = "Linear-quadratic regulator of a pendulum on a cart"
     source = "Allaoui 2024, section IV.2, names it; weights and gains are ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows between samples
     states = (memory("held_force", "N", 0.0, "Force on the cart, held"),)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"plant": tuple(REGULATED)}

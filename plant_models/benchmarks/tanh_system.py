@@ -27,7 +27,6 @@ class TanhSystem(HybridSystem):
     name = "tanh_system"
     description = "Second-order plant with tanh(x1) x2"
     source = "Hann 2014, (3.110)"
-    by_name = True
     internal_step = 5e-3
     states = (state("first", "1", 5.0, "State x1"), state("second", "1/s", 3.0, "State x2, derivative of x1"))
     outputs = (output_signal("x1", "1", "State x1"), output_signal("x2", "1/s", "State x2"))

@@ -27,7 +27,6 @@ class VanDerPol(HybridSystem):
     name = "van_der_pol"
     description = "Van der Pol oscillator with three parameters that may change"
     source = "Omar 2012, (2.5.1)"
-    by_name = True
     internal_step = 5e-3
     states = (
         state("oscillation", "1", 1.0, "State x1, which is measured"),

@@ -60,7 +60,7 @@ class HybridSystem(Declarations):
     13. `purpose` is what its noises are drawn for: two systems of different purpose draw independently even from the
         same seed.
     14. A system that cannot be traced says ``traceable = False`` and may then use any Python.
-    15. A system without ``by_name = True`` is handed ``x`` as one flat array and returns such arrays from `flow` and
+    15. A system with ``by_name = False`` is handed ``x`` as one flat array and returns such arrays from `flow` and
         `jump`.
     """
 
@@ -121,7 +121,7 @@ class HybridSystem(Declarations):
     # -- flat arrays ------------------------------------------------------------------------------------------------
 
     def handed(self, x: Array) -> Any:
-        """The states as the equations get them: by name, or flat without `by_name`.
+        """The states as the equations get them: by name, or flat where it says so.
 
         Args:
             x: flat, shape (n,) or (n, members).

@@ -53,8 +53,6 @@ class ControlSystem(HybridSystem):
         sample_period: [s], 0 for a continuous system. method: of integration. internal_step: [s].
     """
 
-    by_name = True
-
     def __init__(
         self,
         update: Function,

@@ -59,7 +59,6 @@ class SignalFault(HybridSystem):
     name = "signal_fault"
     description = "Faults of any signal: stuck, gain, offset, drift, ramped, lost samples"
     source = "Omar 2012, section 7.4, (7.6.12)"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     purpose = Purpose.FAULTS
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {

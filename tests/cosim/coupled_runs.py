@@ -39,6 +39,8 @@ from plant_models.hybrid import (
 class Motion(HybridSystem):
     """A train on rails of time: ``p = p0 + v0 t + a t^2/2 + (A/w)(1 - cos w t)``, ``v`` its derivative."""
 
+    by_name = False
+
     name = "motion"
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
     parameters = (
@@ -60,6 +62,8 @@ class Motion(HybridSystem):
 class Pushed(HybridSystem):
     """``dp = v, dv = push``: exact for a held push with any steps (RK4 on a polynomial of order 2)."""
 
+    by_name = False
+
     name = "pushed"
     states = (state("p", "m"), state("v", "m/s", 10.0))
     inputs = (input_signal("push", "m/s2"),)
@@ -76,6 +80,8 @@ class Pushed(HybridSystem):
 class Staircase(HybridSystem):
     """Effort and odometer that are constant on every ``(0.1 k, 0.1 (k + 1)]``: the value at the end of a step is the
     one of the whole step, so that holding it is exact for every communication step that divides 100 ms."""
+
+    by_name = False
 
     name = "staircase"
     outputs = (output_signal("effort", "N"), output_signal("odometer", "m/s"), output_signal("push", "m/s2"))
@@ -97,6 +103,8 @@ class IdealCdo(HighGainTrainObserver):
 
 class Listener(HybridSystem):
     """Keeps what it is told: the last position, when, how often; between balises it integrates its input."""
+
+    by_name = False
 
     name = "listener"
     states = (state("integral", "m"), memory("told", "m"), memory("told_at", "s", -1.0), memory("count", "1"))

@@ -28,6 +28,7 @@ def fail(t: Any, begin: float = FROM) -> None:
 
 
 class InFlow(HybridSystem):
+    by_name = False
     name = "failing"
     description = "Fails in its flow"
     source = "test"
@@ -125,6 +126,7 @@ class PlainStart(PlainStep):
 
 
 class Sine(HybridSystem):
+    by_name = False
     name = "sine"
     description = "Something to measure"
     source = "test"

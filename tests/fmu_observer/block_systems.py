@@ -31,6 +31,8 @@ H = 0.05
 class Swing(HybridSystem):
     """A forced, sampled, kicked and marked pendulum: nonlinear, explicit in time, noisy; its jumps do not commute."""
 
+    by_name = False
+
     name = "swing"
     description = "Pendulum with every kind of event"
     states = (
@@ -94,6 +96,8 @@ class Swing(HybridSystem):
 class Doorman(HybridSystem):
     """Ordinary Python: it branches on values, keeps no graph and cannot be traced."""
 
+    by_name = False
+
     name = "doorman"
     states = (state("travelled", "m"), memory("doors", "1"))
     inputs = (input_signal("speed", "m/s", 1.0),)
@@ -119,6 +123,8 @@ class Doorman(HybridSystem):
 
 class Explosion(HybridSystem):
     """``dx = x^2`` with ``x(0) = 1``: without bound at t = 1 s."""
+
+    by_name = False
 
     name = "explosion"
     states = (state("x", "1", 1.0), memory("quiet", "1"), memory("noise", "1"))

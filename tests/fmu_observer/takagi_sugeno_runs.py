@@ -20,6 +20,8 @@ STEP = 1e-3
 class Together(HybridSystem):
     """Plant and observer side by side; the noise v of the continuous output is an input, held between two settings."""
 
+    by_name = False
+
     name = "together"
     description = "An academic plant and its observer"
     source = "tests"

@@ -17,6 +17,8 @@ SPEED, STEP = 3.0, 0.04  # [m/s], [s]; fixes at 10 Hz lie inside communication s
 class Corrected(HybridSystem):
     """Dead reckoning that takes the place of each fix."""
 
+    by_name = False
+
     name = "corrected"
     description = "Dead reckoning, reset at fixes"
     source = "a test"

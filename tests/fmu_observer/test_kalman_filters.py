@@ -246,6 +246,8 @@ def test_noise_through_an_input_by_hand() -> None:
 class Scaled(HybridSystem):
     """A mass whose sensor has a noise that grows with the speed, ``y = x + (1 + rate) disturbance``."""
 
+    by_name = False
+
     name = "scaled"
     states = (state("place", "m"), state("rate", "m/s", 2.0))
     inputs = (input_signal("push", "m/s2"), input_signal("disturbance", "m"))
@@ -272,6 +274,8 @@ def test_measurement_noise_through_an_input_by_hand(kind: type[GaussianFilter]) 
 
 class Read(HybridSystem):
     """A decay that a periodic event reads with noise; with `resets` the event sets it back too."""
+
+    by_name = False
 
     name = "read"
     states = (state("level", "1", 1.0), memory("reading", "1"))
@@ -388,6 +392,8 @@ def test_a_late_measurement_that_is_replayed_is_as_one_in_time() -> None:
 
 class Vehicle(HybridSystem):
     """A train as a point with an acceleration that is told."""
+
+    by_name = False
 
     name = "vehicle"
     states = (state("way", "m"), state("pace", "m/s", 10.0))

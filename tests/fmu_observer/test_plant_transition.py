@@ -28,6 +28,8 @@ MOTOR: dict[str, Any] = {"outputs": ["current_d", "current_q"]}
 class Fast(HybridSystem):
     """A linear plant that forgets within 20 ms."""
 
+    by_name = False
+
     name = "fast"
     description = "dx/dt = -50 x + u"
     source = "test"

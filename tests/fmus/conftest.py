@@ -38,6 +38,8 @@ from plant_models.hybrid import (
 class Oscillator(HybridSystem):
     """A damped oscillator: smooth, rk4, a tunable parameter, an output that depends directly on the input."""
 
+    by_name = False
+
     name = "oscillator"
     description = "Damped oscillator"
     states = (state("position", "m", 1.0), state("speed", "m/s"))
@@ -63,6 +65,8 @@ class Oscillator(HybridSystem):
 class Slider(HybridSystem):
     """A stiff slider with dry friction: rosenbrock, set-valued friction."""
 
+    by_name = False
+
     name = "slider"
     states = (state("position", "m"), state("speed", "m/s", 0.5), state("filtered", "m/s"))
     inputs = (input_signal("force", "N"),)
@@ -84,6 +88,8 @@ class Slider(HybridSystem):
 
 class Sampler(HybridSystem):
     """Two noisy periodic events with different periods, one with an offset; memory and a vector; nothing flows."""
+
+    by_name = False
 
     name = "sampler"
     states = (memory("held", "m/s", 0.25), memory("ring", "m/s", (1.0, 2.0, 3.0), size=3))
@@ -112,6 +118,8 @@ class Sampler(HybridSystem):
 
 class Tracker(HybridSystem):
     """A small observer: flows, jumps at two triggered events with payloads and at a periodic one."""
+
+    by_name = False
 
     name = "tracker"
     states = (state("position", "m"), state("speed", "m/s", 10.0), memory("innovation", "m"))
@@ -150,6 +158,8 @@ class Tracker(HybridSystem):
 class Gain(HybridSystem):
     """No state at all: what goes in comes out."""
 
+    by_name = False
+
     name = "gain"
     inputs = (input_signal("force", "N", 3.0),)
     outputs = (output_signal("twice", "N"),)
@@ -162,6 +172,8 @@ class Booster(HybridSystem):
     """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between
     switches.
     """
+
+    by_name = False
 
     name = "booster"
     states = (state("place", "m"), state("rate", "m/s", 1.0))
@@ -191,6 +203,8 @@ class Hopper(HybridSystem):
     """Everything that can be part of a replay: friction, a tunable parameter, noise, communication events, an integer
     output.
     """
+
+    by_name = False
 
     name = "hopper"
     states = (

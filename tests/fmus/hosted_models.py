@@ -23,6 +23,8 @@ from plant_models.hybrid import (
 class Gatekeeper(HybridSystem):
     """Counts train crossings and decides with loops and branches; sampled, marked and noisy."""
 
+    by_name = False
+
     name = "gatekeeper"
     description = "Ordinary Python with every kind of event"
     states = (state("place", "m", 1.0), memory("passed", "1"), memory("sample", "m"), memory("last", "m"))

@@ -39,7 +39,7 @@ def refused(arguments: list[str], capsys: Output) -> str:
 
 MODEL = """
 import numpy as np
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, state
 
 class Trolley(HybridSystem):
     name = "trolley"
@@ -53,10 +53,10 @@ class Trolley(HybridSystem):
 
     def flow(self, t, x, u, p):
 FLOW
-        return vector(u.effort)
+        return {"rate": u.effort}
 
     def output(self, t, x, u, p):
-        return {"speed": x[0]}
+        return {"speed": x.rate}
 """
 
 
@@ -92,8 +92,8 @@ def test_a_users_own_system_is_built_from_its_file(
 @pytest.mark.parametrize(
     ("flow", "line", "words"),
     [
-        ("        if x[0] > 0:\n            return vector(0.0)", "if x[0] > 0:", "np.where instead of 'if'"),
-        ("        return np.array([u.effort + x[0]])", "np.array", "vector(...) instead of np.array"),
+        ("        if x.rate > 0:\n            return {'rate': 0.0}", "if x.rate > 0:", "np.where instead of 'if'"),
+        ("        return {'rate': np.array([u.effort + x.rate])[0]}", "np.array", "vector(...) instead of np.array"),
         ("        return u.efort", "return u.efort", "no attribute 'efort'"),
     ],
 )
@@ -145,6 +145,7 @@ def test_options_of_a_users_system_are_checked(own_model: Callable[..., Path], c
 
 def named(name: str, event: str = "ping") -> HybridSystem:
     class Named(HybridSystem):
+        by_name = False
         states = (state("place", "m"),)
         outputs = (output_signal("out", "m"),)
         events = (TriggeredEvent(event, (input_signal(f"{event}_value", "m", variability="discrete"),)),)

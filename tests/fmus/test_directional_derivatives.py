@@ -30,6 +30,8 @@ RAW = {2: "Real", 3: "Float64"}
 class Kinked(HybridSystem):
     """A root at its end, where it has no derivative, and a whole number among the outputs."""
 
+    by_name = False
+
     name = "kinked"
     states = (state("level", "m"),)
     outputs = (

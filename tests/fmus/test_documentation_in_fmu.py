@@ -126,6 +126,8 @@ class Odd(HybridSystem):
         ValueError: never told to the user of an FMU.
     """
 
+    by_name = False
+
     name = "odd"
     description = 'A <model> & "more"'
     source = "K&R, <1978>"

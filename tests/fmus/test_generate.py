@@ -25,6 +25,8 @@ from plant_models.hybrid import (
 class Hasty(HybridSystem):
     """Its flow reads the payload of an event, which is not known before the event."""
 
+    by_name = False
+
     name = "hasty"
     states = (state("place", "m"),)
     outputs = (output_signal("place_out", "m"),)
@@ -49,6 +51,8 @@ def test_a_payload_read_outside_its_event_is_refused() -> None:
 
 class Plain(HybridSystem):
     """What the wrong ones below are derived from."""
+
+    by_name = False
 
     name = "plain"
     states = (state("x", "1", 1.0),)

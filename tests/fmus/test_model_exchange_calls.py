@@ -37,6 +37,8 @@ EXCHANGED = ("oscillator", "slider", "sampler", "tracker", "gain", *(n for n in 
 class Root(HybridSystem):
     """A square root that has no value below zero."""
 
+    by_name = False
+
     name = "root"
     states = (state("level", "m", 1.0), state("other", "m", 2.0))
     inputs = (input_signal("offset", "m"),)
@@ -51,6 +53,8 @@ class Root(HybridSystem):
 
 class Follower(HybridSystem):
     """Works on communication steps, so it has no model exchange."""
+
+    by_name = False
 
     name = "follower"
     states = (state("held", "m"),)

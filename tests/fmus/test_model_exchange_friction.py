@@ -30,6 +30,8 @@ class SlidingMass(HybridSystem):
     once.
     """
 
+    by_name = False
+
     name = "sliding_mass"
     states = (state("place", "m"), state("speed", "m/s"))
     inputs = (input_signal("force", "N"),)
@@ -60,6 +62,8 @@ class SwitchedMass(HybridSystem):
     """A mass at rest on dry friction. By a switch a force of twice the friction begins, which then fades at a rate of
     one friction a second.
     """
+
+    by_name = False
 
     name = "switched_mass"
     states = (state("speed", "m/s"),)

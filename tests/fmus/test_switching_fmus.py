@@ -62,6 +62,8 @@ def test_zones_moved_a_little_change_little(component: Callable[..., Any], excha
 class Chattering(HybridSystem):
     """Pushed back wherever it goes: its switch changes without end, beside a clock."""
 
+    by_name = False
+
     name = "chattering"
     states = (state("place", "m"), state("elapsed", "s"))
     outputs = (output_signal("clock", "s"),)

@@ -23,7 +23,6 @@ class MassUnderAdrc(HybridSystem):
     """A mass, a constant disturbing acceleration and the controller, as one continuous system."""
 
     name = "mass_under_adrc"
-    by_name = True
     states = (*ADRC.states, state("speed", "m/s"))
     inputs = (input_signal("reference", "m/s"), input_signal("rise", "m/s2"), input_signal("disturbance", "m/s2"))
     parameters = (*ADRC.parameters, parameter("true_mass", "kg", MASS))

@@ -90,6 +90,8 @@ def test_dependencies_of_the_derivative_include_the_friction() -> None:
 class Listener(HybridSystem):
     """Remembers what it was told at the end of each communication step, and when."""
 
+    by_name = False
+
     name = "listener"
     states = (memory("heard", "1"), memory("heard_at", "s", -1.0), memory("times", "1"))
     inputs = (input_signal("word", "1"),)

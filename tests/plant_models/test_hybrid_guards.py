@@ -90,6 +90,7 @@ def test_a_preset_sets_a_seed_only_where_there_is_noise() -> None:
 
 
 class _Sized(HybridSystem):
+    by_name = False
     name = "sized"
     states = (state("x", "1"), state("y", "1"), memory("m", "1"))
     outputs = (output_signal("o", "1"),)
@@ -133,6 +134,7 @@ def test_an_output_that_is_no_scalar_does_not_write_past_its_place() -> None:
 
 
 class _Reader(HybridSystem):
+    by_name = False
     name = "reader"
     states = (state("x", "1"), memory("m", "1"))
     outputs = (output_signal("told", "1"),)

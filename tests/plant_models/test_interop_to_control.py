@@ -35,6 +35,8 @@ DAVIS_B, DAVIS_C = 32.0, 1.7
 class Chain(HybridSystem):
     """Two masses with a spring and a damper between them, and a force on the first."""
 
+    by_name = False
+
     name = "chain"
     states = (state("p", "m", (0.0, 0.0), size=2), state("v", "m/s", (1.0, 0.0), size=2))
     inputs = (input_signal("force", "N"),)
@@ -56,6 +58,8 @@ class Chain(HybridSystem):
 
 class Counter(HybridSystem):
     """Nothing in it flows."""
+
+    by_name = False
 
     name = "counter"
     states = (memory("count", "1"),)

@@ -84,7 +84,6 @@ class Counted(HybridSystem):
     """A clock of matrices, for what its functions may return wrongly."""
 
     name = "counted"
-    by_name = True
     states = (
         state("level", "1", 1.0),
         memory("count", "1"),

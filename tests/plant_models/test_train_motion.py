@@ -170,6 +170,7 @@ def test_plain_numpy_and_the_traced_step_agree_where_a_part_is_implicit() -> Non
 
 def test_stiff_names_states_that_flow() -> None:
     class Faulty(HybridSystem):
+        by_name = False
         name = "faulty"
         states = (state("x", "m"),)
         stiff = ("y",)

@@ -22,6 +22,8 @@ from plant_models.hybrid import (
 class Hyperbola(HybridSystem):
     """``dx = -2 t x^2`` with ``x(0) = 1``: ``x = 1 / (1 + t^2)``. Nonlinear and explicit in time."""
 
+    by_name = False
+
     name = "hyperbola"
     states = (state("x", "1", 1.0),)
     outputs = (output_signal("y", "1"),)
@@ -43,6 +45,8 @@ class ImplicitHyperbola(Hyperbola):
 class Stiff(HybridSystem):
     """``dx = -rate (x - cos t) - sin t`` with ``x(0) = 1``: ``x = cos t`` at any rate."""
 
+    by_name = False
+
     name = "stiff"
     states = (state("x", "1", 1.0),)
     parameters = (parameter("rate", "1/s", 1e6),)
@@ -55,6 +59,8 @@ class Stiff(HybridSystem):
 
 class Clockwork(HybridSystem):
     """A damped oscillator that is sampled, kicked and measured: every feature of the foundation at once."""
+
+    by_name = False
 
     name = "clockwork"
     states = (
@@ -103,6 +109,8 @@ class Slider(HybridSystem):
     starts.
     """
 
+    by_name = False
+
     name = "slider"
     states = (state("x", "m"), state("v", "m/s", 1.0))
     inputs = (input_signal("push", "m/s2"),)
@@ -125,6 +133,8 @@ class Booster(HybridSystem):
     """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between
     switches.
     """
+
+    by_name = False
 
     name = "booster"
     states = (state("place", "m"), state("rate", "m/s", 1.0))

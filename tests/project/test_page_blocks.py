@@ -28,6 +28,8 @@ WITH_CODE = [
 class Engine(HybridSystem):
     """Its torque falls with the speed of the shaft."""
 
+    by_name = False
+
     name = "engine"
     description = "An engine"
     source = "tests"
@@ -40,6 +42,8 @@ class Engine(HybridSystem):
 
 class Load(HybridSystem):
     """A mass that turns."""
+
+    by_name = False
 
     name = "load"
     description = "A load"

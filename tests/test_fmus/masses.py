@@ -101,6 +101,7 @@ def linear_system(part: Part, step: float) -> HybridSystem:
         ]
 
     class Linear(HybridSystem):
+        by_name = False
         name = part.name
         description = "A linear test system"
         source = "tests"

@@ -24,6 +24,8 @@ OURS = "ours: locomotive and wagon behind a coupler; the thesis shows these two 
 class Beside(HybridSystem):
     """The plant of `coupled_vehicles` under an unknown acceleration, and an observer that sees both speeds."""
 
+    by_name = False
+
     name, description, source = "beside", "A plant and its observer", "docs/gallery"
     inputs = (input_signal("unknown", "m/s2"),)
 

@@ -47,7 +47,6 @@ class TakagiSugenoLuenberger(HybridSystem):
     name = "takagi_sugeno_luenberger"
     description = "Takagi-Sugeno Luenberger observer, continuous measurements"
     source = "Bouchama 2024, (1.19)-(1.28), inequality (1.26) repaired"
-    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 

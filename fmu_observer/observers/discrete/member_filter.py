@@ -90,7 +90,6 @@ class MemberFilter(HybridSystem):
         ValueError: an option is not legal, or the model does not suit; the message says which.
     """
 
-    by_name = True
     internal_step = 0.1  # nothing flows between samples
     purpose = Purpose.MEMBERS
     perturbs: ClassVar[bool] = False

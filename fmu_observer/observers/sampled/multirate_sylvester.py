@@ -56,7 +56,6 @@ class MultirateSylvester(GapCertified):
     name = "multirate_sylvester"
     description = "Multirate observer by a Sylvester equation, every sampled output at its own instants"
     source = "Bouchama 2024, (1.42)-(1.46)"
-    by_name = True
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MULTIRATE_MODELS), "continuous": (0, 1, 2)}
 

@@ -80,7 +80,6 @@ class SignatureObserver(HybridSystem):
     are estimated it overrides `model_parameters`.
     """
 
-    by_name = True
     internal_step = 0.1  # nothing flows between samples
     plant: NoisyPlant
     window: int

@@ -59,7 +59,6 @@ class SignatureTrack(HybridSystem):
     name = "signature_track"
     description = "Signature properties of an oscillating signal, and which parameter has changed"
     source = "Omar 2012, (2.3.1)-(2.3.6), section 2.5; detection of the tips ours"
-    by_name = True
     internal_step = 1e-2
     inputs = (input_signal("signal", "1", 0.0, "The signal"),)
     outputs = (

@@ -40,7 +40,6 @@ class WheelSignature(HybridSystem):
     name = "wheel_signature"
     description = "Jams and skids of the odometer's wheel from the signature of its record"
     source = "Omar 2012, sections 2.3 and 3.4, for the record of an odometer; classes trained on synthetic trains"
-    by_name = True
     internal_step = 1e-2
     inputs = (input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),)
     outputs = (

@@ -60,7 +60,6 @@ class MotorFilter(HybridSystem):
         options: of the subclass.
     """
 
-    by_name = True
     internal_step = 1e-2  # nothing flows between samples
 
     def __init__(self, frame: str, known_load: bool, start_variance: Sequence[float], **options: Any) -> None:

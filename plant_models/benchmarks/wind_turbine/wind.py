@@ -26,7 +26,6 @@ class Wind(HybridSystem):
     name = "wind"
     description = "Wind speed, stand-in for a recording: mean, sine and turbulence"
     source = "stand-in for Omar 2012, Fig. 7.2"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("turbulence", "m/s", 0.0, "Turbulent part of the wind at the last instant"),

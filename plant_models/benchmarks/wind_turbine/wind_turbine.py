@@ -62,7 +62,6 @@ class WindTurbine(HybridSystem):
     name = "wind_turbine"
     description = "Wind turbine of the benchmark on fault detection, with two sensors for each speed and pitch"
     source = "Omar 2012, (7.3.1)-(7.3.5); Odgaard, Stoustrup, Kinnaert 2009; power coefficient: Heier, stand-in"
-    by_name = True
     internal_step = 1e-2  # the shaft swings with 28 rad/s; with this step its damping is 0.6 % too strong
     states = (
         state("rotor_turning", "rad/s", 1.1, "Speed of the rotor"),

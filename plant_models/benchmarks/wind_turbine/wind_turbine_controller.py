@@ -33,7 +33,6 @@ class WindTurbineController(HybridSystem):
     name = "wind_turbine_controller"
     description = "Controller of a wind turbine: measured generator speed and power in, torque and pitch out"
     source = "Omar 2012, section 7.2.2; Odgaard, Stoustrup, Kinnaert 2009"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("strong_wind", "1", 0.0, "1 in zone 3, 0 in zone 2"),

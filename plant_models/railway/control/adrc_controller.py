@@ -72,7 +72,6 @@ class AdrcController(HybridSystem):
     name = "adrc_controller"
     description = "ADRC speed controller on the odometer: extended state observer, effort and air brake demand out"
     source = "Bouchama 2024, sections 4.1 and 4.5; Gao 2003; gains ours"
-    by_name = True
     internal_step = 1e-2  # the observer's poles are at 1.5 rad/s
     states: tuple[Signal, ...] = (
         state("observed_speed", "m/s", 0.0, "Speed estimate z1 of the extended state observer"),

@@ -52,7 +52,6 @@ class AntiSlipDevice(HybridSystem):
     name = "anti_slip_device"
     description = "Anti-slip device of a locomotive with four axles: effort cut and restored, sanding request"
     source = "Bouchama 2024, section 4.2.2; thresholds and slopes ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("filtered_speed", "m/s", 0.0, "Filtered axle speeds", size=AXLES),

@@ -82,7 +82,6 @@ class Driver(HybridSystem):
     name = "driver"
     description = "Driver: speed profile and PI controller on the odometer, with effort and power limits"
     source = "Bouchama 2024, section 3.4.3 (gains) and section 4.1 (limits)"
-    by_name = True
     internal_step = 1e-2  # the integral's fastest time constant is tracking_time
     states = (
         state("integral", "N", 0.0, "Integral part of the effort"),

@@ -101,7 +101,6 @@ class MdpeController(HybridSystem):
         "Observer-based train control: regulators by mode and adhesion, limits by estimated adhesion and coupler force"
     )
     source = "Bouchama 2024, section 4.5 and Table 4.3; gains and thresholds ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("held_effort", "N", 0.0, "Effort of this period"),

@@ -47,7 +47,6 @@ class Mission(HybridSystem):
     name = "mission"
     description = "Mission: speed reference of a journey over a distance, braking by time or by position"
     source = "Bouchama 2024, section 4.5 and Table 4.4"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     outputs = (
         output_signal("speed_reference", "m/s", "Speed to be driven", display_unit="km/h"),

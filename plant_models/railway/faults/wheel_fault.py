@@ -66,7 +66,6 @@ class WheelFault(HybridSystem):
     name = "wheel_fault"
     description = "Wheel that jams and skids, given, drawn or by adhesion: speed in, wheel speed and distance out"
     source = "Aguiar Cota 2019, (2.26)-(2.29), Figs. 2-13 and 2-14; causes and time laws are ours"
-    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     purpose = Purpose.FAULTS
     outputs = (

@@ -53,7 +53,6 @@ class NetworkProtocol(HybridSystem):
     name = "network_protocol"
     description = "Network: signals in, values last received out, one node at a time, delayed"
     source = "Hann 2014, section 1.1.3, (2.3) to (2.7); loss is ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     purpose = Purpose.NETWORK
     events = (

@@ -83,7 +83,6 @@ class BaliseReader(HybridSystem):
     name = "balise_reader"
     description = "Balise reader: position and speed of a train in, balise events with their own time stamps out"
     source = "Bouchama 2024, section 3.4 (balises as aperiodic samples); the localisation is ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     inputs = (
         input_signal("position", "m", 0.0, "Position of the train, at the instant that input_instant names"),

@@ -39,7 +39,6 @@ class BrakePressureSensor(HybridSystem):
     name = "brake_pressure_sensor"
     description = "Pressure sensor of a brake cylinder: lag, offset, scale error, noise and resolution"
     source = "Ours: an industrial transmitter of class 0.5 with 12 bits over 10 bar"
-    by_name = True
     internal_step = 1e-2
     states = (
         state("lagged_pressure", "Pa", 0.0, "Pressure behind the lag of the sensor"),

@@ -41,7 +41,6 @@ class DopplerRadar(HybridSystem):
     name = "doppler_radar"
     description = "Doppler radar: speed over ground with scale error, noise of the ground and a lowest speed"
     source = "Schubert, Heide, Magori 1995 (1 % of speed, 2 m in 1000 m); dwell time and floor are ours"
-    by_name = True
     internal_step = 1e-2  # the lag is resolved
     states = (
         state("averaged_speed", "m/s", 0.0, "Speed over ground, averaged over the dwell time"),

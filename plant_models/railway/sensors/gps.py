@@ -38,7 +38,6 @@ class Gps(HybridSystem):
     """
 
     name = "gps"
-    by_name = True
     description = "Satellite positioning: position of a train in, fixes with drift and noise out"
     source = "Bouchama 2024, section 4.1 (10 Hz, 0.5 m); the error model is ours"
     internal_step = 1e-2  # nothing flows

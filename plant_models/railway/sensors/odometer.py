@@ -43,7 +43,6 @@ class Odometer(HybridSystem):
     name = "odometer"
     description = "Wheel odometer: sampled wheel speed with noise and tooth quantisation"
     source = "Bouchama 2024, (3.16), (3.50)"
-    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     states = (
         state("wheel_distance", "m", 0.0, "Distance run by the wheel's rim"),

@@ -55,7 +55,6 @@ class PulseOdometer(HybridSystem):
     name = "pulse_odometer"
     description = "Toothed wheel odometer: counted pulses, sampled at 50 ms and aggregated at 200 ms"
     source = "Aguiar Cota 2019, section 2.1.2; teeth and radius are ours"
-    by_name = True
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     outputs = (
         output_signal(

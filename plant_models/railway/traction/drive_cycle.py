@@ -31,7 +31,6 @@ class DriveCycle(HybridSystem):
     name = "drive_cycle"
     description = "Speed reference and load torque of a drive, in steps"
     source = "Allaoui 2024, section III.3, Figs. 3.10, 4.16-4.18; speeds are ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     outputs = (
         output_signal("speed_reference", "rad/s", "Speed asked for", display_unit="rpm", variability="discrete"),

@@ -40,7 +40,6 @@ class FieldOrientedControl(HybridSystem):
     name = "field_oriented_control"
     description = "Field-oriented control of a synchronous motor, speed and currents"
     source = "Allaoui 2024, section IV.2.3.8, Fig. 4.15; gains and limits are ours"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("speed_integral", "A", 0.0, "Integral of the speed control"),

@@ -28,7 +28,6 @@ class Inverter(HybridSystem):
     name = "inverter"
     description = "Voltage-source inverter with space-vector modulation, averaged"
     source = "standard averaged model; Allaoui 2024, Fig. 4.15, names one"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     inputs = (
         input_signal("wanted_voltage_alpha", "V", 0.0, "Voltage asked for along alpha"),

@@ -56,7 +56,6 @@ class SynchronousMotor(HybridSystem):
     name = "synchronous_motor"
     description = "Permanent-magnet synchronous motor in the rotor frame, continuous"
     source = "Allaoui 2024, (4.27)-(4.38), Annex C"
-    by_name = True
     internal_step = 1e-4
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(state)
     parameters: tuple[Signal, ...] = MOTOR_PARAMETERS

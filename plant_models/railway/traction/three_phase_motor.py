@@ -32,7 +32,6 @@ class ThreePhaseMotor(HybridSystem):
     name = "three_phase_motor"
     description = "Permanent-magnet synchronous motor in its three phases"
     source = "Allaoui 2024, (4.22)-(4.26)"
-    by_name = True
     internal_step = 1e-4
     states = (
         state("phase_current_a", "A", 0.0, "Current of phase a"),

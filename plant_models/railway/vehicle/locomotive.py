@@ -60,7 +60,6 @@ class Locomotive(HybridSystem):
     name = "locomotive"
     description = "Single-mass train with wheel slip: effort in, position, speed and wheel speed out"
     source = "Bouchama 2024, (3.1)-(3.15) and Table 4.1"
-    by_name = True
     method = "rosenbrock"  # the wheel's time constant is 4.6e-5 s per m/s of speed: far below the step near standstill
     internal_step = 5e-4  # at 1 ms the linearly implicit step overshoots the creep curve below the slip floor by mm/s
     states = (

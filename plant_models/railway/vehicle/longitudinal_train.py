@@ -54,7 +54,6 @@ class LongitudinalTrain(LongitudinalForces):
     name = "longitudinal_train"
     description = "Train as one point per unit mass: effort in, position, speed and adhesion limit out"
     source = "Aguiar Cota 2019, (2.1)-(2.8), (2.26)-(2.28), Tables 2.1 and 5.1"
-    by_name = True
     internal_step = 2e-3  # a stop is placed within 2e-6 m per m/s2 of braking; the motion would allow 10 ms
     states = (
         state("train_position", "m", 0.0, "Position of the train at start"),

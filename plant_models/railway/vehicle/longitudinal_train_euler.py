@@ -42,7 +42,6 @@ class LongitudinalTrainEuler(LongitudinalForces):
     name = "longitudinal_train_euler"
     description = "Train as one point in discrete time: the Euler form of longitudinal_train"
     source = "Aguiar Cota 2019, (2.9)-(2.10)"
-    by_name = True
     internal_step = 1e-2  # nothing flows
     states = (
         memory("train_position", "m", 0.0, "Position of the train at start"),

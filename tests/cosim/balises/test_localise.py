@@ -28,6 +28,8 @@ class Slippery(HybridSystem):
     ends.
     """
 
+    by_name = False
+
     name = "slippery"
     states = (state("p", "m"), state("v", "m/s", 5.0))
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))

@@ -27,6 +27,8 @@ FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at")
 class Listener(HybridSystem):
     """Remembers all that a telegram says."""
 
+    by_name = False
+
     name = "listener"
     states = tuple(memory(field, "1") for field in FIELDS)
     outputs = tuple(output_signal(f"told_{field}", "1", variability="discrete") for field in FIELDS)

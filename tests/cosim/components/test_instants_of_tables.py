@@ -49,6 +49,8 @@ ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
 class Lag(HybridSystem):
     """``dx/dt = rate * (a - x) + b``: an input that acts over the step, one that also passes through at once."""
 
+    by_name = False
+
     name = "lag"
     description = "A lag"
     source = "a test"
@@ -66,6 +68,8 @@ class Lag(HybridSystem):
 
 class Sampler(HybridSystem):
     """Keeps a sample of its inputs."""
+
+    by_name = False
 
     name = "sampler"
     description = "A sampler"

@@ -19,6 +19,8 @@ from plant_models.hybrid import HybridSystem, input_signal, output_signal, param
 class Runaway(HybridSystem):
     """``dv = growth v + push``: from 1 mm/s it is beyond 1000 m/s after ``ln(1e6) / growth``."""
 
+    by_name = False
+
     name = "runaway"
     description = "A train that goes its own way"
     source = "tests"
@@ -43,6 +45,8 @@ class Ranged(Runaway):
 
 class Limited(HybridSystem):
     """A driver whose effort stays within 100 N, until a power in it overflows."""
+
+    by_name = False
 
     name = "limited"
     description = "A driver"

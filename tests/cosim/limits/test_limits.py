@@ -19,6 +19,8 @@ from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, outp
 class Relaxation(HybridSystem):
     """``x -> x - gain * period * (x - y)`` at a packet: lost from ``gain period = 2`` on."""
 
+    by_name = False
+
     name = "relaxation"
     description = "One state that is corrected by its own gain times the period"
     states = (state("x", "1", 1.0, "Estimate"),)

@@ -51,6 +51,8 @@ BALISE = TriggeredEvent("balise", (input_signal("balise_position", "m", variabil
 class Jumper(HybridSystem):
     """Holds the last balise; nothing flows. With a share the output also follows a feedback at once."""
 
+    by_name = False
+
     name = "jumper"
     states = (state("held", "m"),)
     inputs = (input_signal("speed", "m/s"),)
@@ -83,6 +85,8 @@ class Looped(Jumper):
 class Gain(HybridSystem):
     """``y = 2 u``."""
 
+    by_name = False
+
     name = "gain"
     inputs = (input_signal("u", "m"),)
     outputs = (output_signal("y", "m"),)
@@ -93,6 +97,8 @@ class Gain(HybridSystem):
 
 class Adder(HybridSystem):
     """A train at constant speed that integrates what it is told: ``di = u``."""
+
+    by_name = False
 
     name = "adder"
     states = (state("sum", "m.s"),)

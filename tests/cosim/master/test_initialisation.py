@@ -29,6 +29,8 @@ STIFFNESS, DAMPING, MASS = 3.0, 0.5, 2.0
 class Mass(HybridSystem):
     """``m x'' = force``; feeds its acceleration through."""
 
+    by_name = False
+
     name = "mass"
     states = (state("x", "m", 1.0), state("v", "m/s", 0.3))
     inputs = (input_signal("force", "N"),)
@@ -45,6 +47,8 @@ class Mass(HybridSystem):
 class Spring(HybridSystem):
     """``force = -k x - d v``: nothing but feedthrough."""
 
+    by_name = False
+
     name = "spring"
     inputs = (input_signal("position", "m"), input_signal("speed", "m/s"))
     outputs = (output_signal("force", "N"),)
@@ -55,6 +59,8 @@ class Spring(HybridSystem):
 
 class Sampler(HybridSystem):
     """Samples at the start time and every 0.5 s."""
+
+    by_name = False
 
     name = "sampler"
     states = (memory("kept", "m", -7.0),)

@@ -106,6 +106,7 @@ def waves_for(signals: Any) -> HybridSystem:
     named = tuple(output_signal(f"wave_{i}", s.unit, "A wave") for i, s in enumerate(signals))
 
     class Waves(HybridSystem):
+        by_name = False
         name = "waves"
         description = "Waves"
         source = "test"

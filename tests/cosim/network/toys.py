@@ -24,6 +24,8 @@ STOP = 2.0
 class Source(HybridSystem):
     """Outputs that are known at any time: ``3 sin(2 t)``, ``cos(2 t)`` and a ramp."""
 
+    by_name = False
+
     name = "source"
     description = "Two sines and a ramp"
     source = "test"
@@ -45,6 +47,8 @@ class Source(HybridSystem):
 
 class Listener(HybridSystem):
     """Integrates `speed`, and is set to what packets of node 2 say; remembers all that it was told."""
+
+    by_name = False
 
     name = "listener"
     description = "Listens to packets"

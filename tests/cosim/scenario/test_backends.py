@@ -25,6 +25,8 @@ pytestmark = pytest.mark.compiler
 class Reckoning(HybridSystem):
     """Integrates a speed and takes the position of each balise."""
 
+    by_name = False
+
     name = "reckoning"
     description = "Integrated speed, reset at balises"
     states = (state("place", "m"),)
@@ -51,6 +53,8 @@ class Opaque(Reckoning):
 
 class Rolling(HybridSystem):
     """What is watched: a body that rolls on."""
+
+    by_name = False
 
     name = "rolling"
     states = (state("place", "m"), state("rate", "m/s", 12.0))

@@ -31,6 +31,8 @@ from plant_models.hybrid import (
 class Kettle(HybridSystem):
     """Warms up by one kelvin a second."""
 
+    by_name = False
+
     name = "kettle"
     states = (state("warmth", "K", 0.0),)
     parameters = (parameter("alarm_at", "K", 2.0), parameter("empty_at", "K", 5.0))

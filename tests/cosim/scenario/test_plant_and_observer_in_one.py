@@ -23,7 +23,6 @@ class Mass(HybridSystem):
     name = "mass"
     description = "A mass on a rail"
     source = "this test"
-    by_name = True
     states = (state("travelled", "m"), state("rolling", "m/s", 10.0))
     inputs = (input_signal("effort", "N"),)
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
@@ -42,7 +41,6 @@ class Together(HybridSystem):
     name = "together"
     description = "A mass and its observer"
     source = "this test"
-    by_name = True
     states = (*Mass.states, *OBSERVER.states)
     inputs = OBSERVER.inputs
     outputs = (*Mass.outputs, output_signal("own_position", "m"), output_signal("own_speed", "m/s"))

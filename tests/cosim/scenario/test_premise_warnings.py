@@ -65,4 +65,6 @@ def test_an_observer_that_counts_time_only_is_told_of_too() -> None:
     s.add("observer", observer="takagi_sugeno_luenberger", options={"model": "takagi_sugeno_train"})
     s.connect("train.position -> observer.measured_position", "train.wheel_speed -> observer.measured_odometer")
     (warning,) = [text for text in s.run().warnings if "Takagi-Sugeno" in text]
-    assert warning.startswith("observer: a premise of its Takagi-Sugeno model was outside its bounds for 1 s")
+    assert warning.startswith(
+        "observer: what its Takagi-Sugeno model mixes linear ones by (a premise) was outside its bounds for 1 s"
+    )

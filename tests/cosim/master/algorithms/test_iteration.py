@@ -286,6 +286,8 @@ class Controller(Listener):
 class Driver(HybridSystem):
     """A brake that follows the speed, and rises with the position; nothing in it acts at once."""
 
+    by_name = False
+
     name = "driver"
     states = (state("pull", "m/s2"),)
     inputs = (input_signal("speed", "m/s"), input_signal("position", "m"))
