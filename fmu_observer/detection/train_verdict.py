@@ -23,7 +23,7 @@ from fmu_observer.detection.train_isolation import (
     WHEEL,
 )
 from fmu_observer.detection.train_residuals import Readings, tolerance
-from fmu_observer.diagnosis.isolation_table import IsolationTable, Verdict, largest
+from fmu_observer.diagnosis.isolation_table import IsolationTable, IsolationVerdict, largest
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.hybrid.system import Array, vector
 
@@ -250,7 +250,7 @@ def codes_after(
 
 
 def _stays(
-    group: IsolationTable, known: Array, said: Verdict, alarms: Array, possible: list[Array], fresh: Array
+    group: IsolationTable, known: Array, said: IsolationVerdict, alarms: Array, possible: list[Array], fresh: Array
 ) -> tuple[list[Array], Array]:
     """For each fault 1 where it was isolated and stays so: alarms only go, or others come beside its own, which it does
     not explain; and 1 where there are several: no single fault explains the alarms, or not the one that is isolated.

@@ -16,7 +16,7 @@ from plant_models.hybrid.system import Array
 _NOWHERE: Mapping[str, Mapping[str, Array]] = {}
 
 
-class Verdict(NamedTuple):
+class IsolationVerdict(NamedTuple):
     """What a set of alarms says, each 1 or 0.
 
     Attributes:
@@ -72,7 +72,7 @@ class IsolationTable:
         available: Sequence[Array],
         possible: Sequence[Array],
         apart: Mapping[str, Mapping[str, Array]] = _NOWHERE,
-    ) -> Verdict:
+    ) -> IsolationVerdict:
         """Which faults explain the alarms, one at a time.
 
         Args:
@@ -104,7 +104,7 @@ class IsolationTable:
         alone = np.where(sum(bests) < 1.5, 1.0, 0.0)
         only = np.where(sum(covers) < 1.5, 1.0, 0.0)
         sure = [alone * np.maximum(only, seen) for seen in seen_of_must]
-        return Verdict(
+        return IsolationVerdict(
             [one * told for one, told in zip(bests, sure, strict=True)],
             [one * (1.0 - told) for one, told in zip(bests, sure, strict=True)],
             covers,

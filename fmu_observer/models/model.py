@@ -179,12 +179,13 @@ def stacked(values: tuple[Array, ...]) -> Array:
 
 
 def stacked_of(values: Any, signals: Sequence[Signal], prefix: str = "") -> Array:
-    """Values by name as a vector, in the order of scalar signals, shape (k,).
+    """Values by name as a vector, in the order of the signals, vectors element by element, shape (k,).
 
     Args:
-        values: named tuple, of states or inputs. signals: which ones. prefix: before each name.
+        values: named tuple, of states, inputs or parameters. signals: which ones. prefix: before each name.
     """
-    return stacked(tuple(getattr(values, f"{prefix}{s.name}") for s in signals))
+    found = ((getattr(values, f"{prefix}{s.name}"), s.size) for s in signals)
+    return stacked(tuple(v if n is None else v[i] for v, n in found for i in range(1 if n is None else n)))
 
 
 def named_as(signals: Sequence[Signal], values: Iterable[Array], prefix: str = "") -> dict[str, Array]:

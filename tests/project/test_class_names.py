@@ -8,7 +8,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("plant_models", "fmu_observer", "fmus", "cosim")
-OF_BOTH_DIAGNOSES = {"Verdict"}  # of an isolation table, and of a check of an FMU
 
 
 def test_every_public_class_name_stands_once() -> None:
@@ -17,4 +16,4 @@ def test_every_public_class_name_stands_once() -> None:
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(str(path.relative_to(ROOT)))
-    assert {name: files for name, files in places.items() if len(files) > 1 and name not in OF_BOTH_DIAGNOSES} == {}
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}

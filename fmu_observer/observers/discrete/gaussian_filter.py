@@ -15,7 +15,7 @@ import numpy as np
 from fmu_observer.condition import Condition
 from fmu_observer.filtering.kalman import Corrected, log_likelihood, normalised_square
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import named_as, stacked, stacked_of
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
@@ -188,11 +188,7 @@ class GaussianFilter(GatedObserver):
         Args:
             p: parameters of the filter.
         """
-        values: list[Array] = []
-        for s in self.model.parameters:
-            value = getattr(p, s.name)
-            values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
-        return stacked(tuple(values))
+        return stacked_of(p, self.model.parameters)
 
     def belief(self, x: Any) -> Belief:
         """What the filter believes.

@@ -12,7 +12,7 @@ from fmu_observer.condition import Condition
 from fmu_observer.filtering.ensemble import drawn
 from fmu_observer.filtering.kalman import decoupled
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import named_as, stacked, stacked_of
+from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.observers.discrete.covariance_requirements import positive
@@ -151,11 +151,7 @@ class MemberFilter(HybridSystem):
         Args:
             t: [s]. u: inputs of the filter. p: its parameters.
         """
-        values: list[Array] = []
-        for s in self.model.parameters:
-            value = getattr(p, s.name)
-            values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
-        return Known(t, stacked_of(u, self.model.inputs), stacked(tuple(values)))
+        return Known(t, stacked_of(u, self.model.inputs), stacked_of(p, self.model.parameters))
 
     def spread(self, members: Array, p: Any) -> Array:
         """The members before a correction, shape (n, M).

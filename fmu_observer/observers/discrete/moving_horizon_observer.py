@@ -12,7 +12,7 @@ import numpy as np
 from fmu_observer.condition import Condition
 from fmu_observer.filtering.kalman import through
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import named_as, stacked
+from fmu_observer.models.model import named_as, stacked, stacked_of
 from fmu_observer.models.system_model import Source
 from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.moving_horizon.real_time_iteration import (
@@ -117,7 +117,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         """The window with a row more, and the estimates that it gives."""
         n, before = self.model.order, self.belief(x)
         filtered = super().update(event, t, x, u, p)
-        row, shared = self._row(event, t, x, u, p), _flat(self, p)
+        row, shared = self._row(event, t, x, u, p), stacked_of(p, self.parameter_signals)
         start = np.hstack([before.estimate, before.estimate, np.reshape(before.spread, (n * n,))])
         found = self.iterate(
             self.problem,
@@ -134,7 +134,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates within their bounds, what is known of the last innovation, and what the window looks like."""
-        inside = self.problem.clipped(self.belief(x).estimate, _flat(self, p))
+        inside = self.problem.clipped(self.belief(x).estimate, stacked_of(p, self.parameter_signals))
         values = super().output(t, x, u, p)
         if self.robust:
             values.pop("nis")
@@ -324,12 +324,3 @@ def _losses(who: str, loss: Loss | Sequence[Loss], count: int) -> tuple[Loss, ..
 def _loss_scale(losses: Sequence[Loss]) -> Any:
     robust = next(loss for loss in losses if loss != "squares")
     return parameter("loss_scale", "1", SCALES[robust], "Deviations at which the loss begins to doubt", min=1e-3)
-
-
-def _flat(system: MovingHorizonObserver, p: Any) -> Array:
-    """All parameters in their order, shape (k,)."""
-    values: list[Array] = []
-    for s in system.parameter_signals:
-        value = getattr(p, s.name)
-        values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
-    return stacked(tuple(values))

@@ -247,9 +247,9 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         return vector(*rows)
 
     def _premises_in_use(self, x: Any, u: Any) -> tuple[Array, ...]:
-        held = stacked_of(x, self._held, "held_")
+        held = tuple(getattr(x, f"held_{premise.name}") for premise in self._held)
         if self.premise == "frozen":
-            return tuple(held)
+            return held
         return self._premises_at(self._estimate(x), held if self.premise == "live" else None, u)
 
     def _premises_at(self, estimate: Array, sampled: Array | None, u: Any) -> tuple[Array, ...]:
