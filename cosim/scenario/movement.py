@@ -22,7 +22,7 @@ from cosim.master.events.participant import interrupts
 from cosim.master.events.stride import event_stage_text
 from cosim.network.service import PACKET_STAGE_TEXT
 from cosim.scenario.schema import ScenarioTable
-from cosim.structure.structure import Balises
+from cosim.structure.structure_data import Balises
 
 AT_SET_UP = "chosen at set-up"
 COMPILED = f"{COMPILED_STAGE_TEXT} (where the run can use it)"

@@ -28,7 +28,8 @@ from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
 from cosim.scenario.tables import ComponentTable
 from cosim.structure.inspect import group_index, make_links, make_part, rate_text
-from cosim.structure.structure import Balises, Link, Packets, Structure
+from cosim.structure.structure import Structure
+from cosim.structure.structure_data import Balises, Link, Packets
 
 
 def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:

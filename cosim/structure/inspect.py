@@ -15,7 +15,7 @@ from cosim.coupling.connection import Connection
 from cosim.coupling.feedthrough import AlgebraicLoop, declared_feedthrough, undeclared_outputs
 from cosim.coupling.instants import followed, held_signals
 from cosim.master.algorithms.choose import AlgorithmChoice
-from cosim.structure.structure import Link, Part, Port, Signal
+from cosim.structure.structure_data import Link, Part, Port, Signal
 
 ABILITIES = {
     "canHandleVariableCommunicationStepSize": "variable step",

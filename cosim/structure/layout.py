@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 from cosim.structure.shapes import Box, Edge, Frame, Layout, Size, Wire
 
 if TYPE_CHECKING:
-    from cosim.structure.structure import Structure
+    from cosim.structure.structure_data import StructureData
 
 BOX_GAP, BAND_GAP, PASS = 0.28, 0.34, 0.16  # between boxes and bands; height left free for a wire that passes
 # of group frames, and the room of a wire that runs back
@@ -67,7 +67,7 @@ class _Band:
         return LANE * (len(self.lanes) + 1) if self.lanes else 0.0
 
 
-def lay_out(structure: Structure, sizes: Mapping[str, Size], edges: Sequence[Edge]) -> Layout:
+def lay_out(structure: StructureData, sizes: Mapping[str, Size], edges: Sequence[Edge]) -> Layout:
     """Place the boxes and lay the wires.
 
     Args:
@@ -79,7 +79,7 @@ def lay_out(structure: Structure, sizes: Mapping[str, Size], edges: Sequence[Edg
 class _Placing:
     """The parts of one layout while it is made."""
 
-    def __init__(self, structure: Structure, sizes: Mapping[str, Size], edges: Sequence[Edge]) -> None:
+    def __init__(self, structure: StructureData, sizes: Mapping[str, Size], edges: Sequence[Edge]) -> None:
         self.edges = edges
         pairs = {(e.source[0], e.target[0]) for e in edges if e.source[0] != e.target[0]}
         self.layers, columns = _columns(structure, pairs)
@@ -302,7 +302,7 @@ class _Placing:
 
 
 def _columns(
-    structure: Structure, pairs: set[tuple[str, str]]
+    structure: StructureData, pairs: set[tuple[str, str]]
 ) -> tuple[list[tuple[list[tuple[str, ...]], int, int]], dict[str, int]]:
     """Layers of groups with their first and last column, and the column of each component."""
     of = {name: group for group in structure.groups for name in group}

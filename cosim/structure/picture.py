@@ -44,7 +44,7 @@ from cosim.structure.layout import EVENT_PORT, lay_out
 from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
 
 if TYPE_CHECKING:
-    from cosim.structure.structure import Link, Part, Structure
+    from cosim.structure.structure_data import Link, Part, StructureData
 
 COLOURS = {"fresh": SLATE, "held": VERMILION, "iterated": VIOLET, "loop": ALARM, "event": GREEN}
 MEANINGS = {
@@ -65,7 +65,7 @@ MAX_PIXELS = 12000
 LEAST_DPI = 15  # below it nothing can be read
 
 
-def draw_structure(structure: Structure, path: str | Path) -> Path:
+def draw_structure(structure: StructureData, path: str | Path) -> Path:
     """Draw a structure to a file.
 
     Args:
@@ -98,7 +98,7 @@ def draw_structure(structure: Structure, path: str | Path) -> Path:
 
 
 @styled
-def structure_figure(structure: Structure) -> Figure:
+def structure_figure(structure: StructureData) -> Figure:
     """The picture as a figure of matplotlib, as large as it needs.
 
     Args:
@@ -128,7 +128,7 @@ def structure_figure(structure: Structure) -> Figure:
     return figure
 
 
-def wires_of(structure: Structure) -> list[Edge]:
+def wires_of(structure: StructureData) -> list[Edge]:
     """The wires to draw: connections by kind, and telegrams from the watched plant to those who are told.
 
     Args:
@@ -211,7 +211,7 @@ def text_width(text: str, size: float, bold: bool = False) -> float:
 # -- strokes ----------------------------------------------------------------------------------------------------------
 
 
-def _draw_layout(ax: Axes, structure: Structure, layout: Layout) -> None:
+def _draw_layout(ax: Axes, structure: StructureData, layout: Layout) -> None:
     loops = {node[0] for loop in structure.loops for node in loop}
     for frame in layout.frames:
         _draw_frame(ax, frame, bool(loops & set(frame.names)))
@@ -240,7 +240,7 @@ def _draw_frame(ax: Axes, frame: Frame, loop: bool) -> None:
     ax.text(frame.x + 0.1, frame.y + 0.17, text, fontsize=SMALL, color=edge if loop else QUIET, va="baseline", zorder=3)
 
 
-def _draw_box(ax: Axes, structure: Structure, part: Part, box: Box, number: int) -> None:
+def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: int) -> None:
     fill = FILLS.get(part.kind, FILLS["FMU"])
     shape = FancyBboxPatch(
         (box.x + 0.05, box.y + 0.05),
@@ -291,7 +291,7 @@ def _draw_box(ax: Axes, structure: Structure, part: Part, box: Box, number: int)
     _draw_feedthrough(ax, structure, part, box)
 
 
-def _draw_feedthrough(ax: Axes, structure: Structure, part: Part, box: Box) -> None:
+def _draw_feedthrough(ax: Axes, structure: StructureData, part: Part, box: Box) -> None:
     """Thin lines inside a box from inputs to the outputs that they act on directly, between the names."""
     if not box.size.inputs or not box.size.outputs:
         return
@@ -330,7 +330,7 @@ def _draw_wire(ax: Axes, wire: Wire, drawn: set[object]) -> None:
 # -- words ------------------------------------------------------------------------------------------------------------
 
 
-def _subtitle(structure: Structure) -> str:
+def _subtitle(structure: StructureData) -> str:
     loops = len(structure.loops)
     knots = "" if not loops else f"; {loops} algebraic loop{'s' if loops > 1 else ''}"
     algorithm = ALGORITHMS.get(structure.algorithm, structure.algorithm)

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
-    from cosim.structure.structure import Link, Part, Port, Structure
+    from cosim.structure.structure_data import Link, Part, Port, StructureData
 
 DASH = "-"
 
 
-def structure_text(structure: Structure, width: int | None = None) -> str:
+def structure_text(structure: StructureData, width: int | None = None) -> str:
     """Components, signals, connections, groups, loops, balises, algorithm, warnings; ends without a line break.
 
     Args:
@@ -42,7 +42,7 @@ def _section(title: str, lines: Sequence[str]) -> str:
     return "\n".join([title, *(f"  {line}".rstrip() for line in lines)]) if lines else ""
 
 
-def _heading(structure: Structure) -> str:
+def _heading(structure: StructureData) -> str:
     count = round((structure.stop - structure.start) / structure.step)
     steps = "1 step" if count == 1 else f"{count} steps"
     return (
@@ -52,7 +52,7 @@ def _heading(structure: Structure) -> str:
     )
 
 
-def _components(structure: Structure) -> list[str]:
+def _components(structure: StructureData) -> list[str]:
     rates = any(part.rate for part in structure.parts)
     headings = ["#", "name", "kind", "FMI", "model", "inputs", "outputs", *(["steps"] if rates else []), "declares"]
     rows = [
@@ -76,7 +76,7 @@ def _used(ports: Sequence[Port]) -> str:
     return f"{sum(port.connected for port in ports)} of {len(ports)}" if ports else DASH
 
 
-def _ports(structure: Structure) -> list[str]:
+def _ports(structure: StructureData) -> list[str]:
     every = [*structure.links, *structure.clocks]
     into = {link.target: link for link in every}
     out_of: dict[tuple[str, str], list[Link]] = {}
@@ -117,7 +117,7 @@ def _direct(port: Port) -> str:
     return f"; direct from {', '.join(port.depends_on)}" if port.depends_on else ""
 
 
-def _connections(structure: Structure) -> list[str]:
+def _connections(structure: StructureData) -> list[str]:
     rows = [
         [".".join(link.source), f"-> {'.'.join(link.target)}", when(link), _conversion(link)]
         for link in structure.links
@@ -155,7 +155,7 @@ def _conversion(link: Link) -> str:
     return f"x {link.factor:.6g}" + (f" {link.offset:+.6g}" if link.offset else "")
 
 
-def _groups(structure: Structure) -> list[str]:
+def _groups(structure: StructureData) -> list[str]:
     lines = []
     for number, group in enumerate(structure.groups, start=1):
         inner = [link for link in structure.links if link.source[0] in group and link.target[0] in group]
@@ -167,16 +167,16 @@ def _groups(structure: Structure) -> list[str]:
     return lines
 
 
-def _loops(structure: Structure) -> list[str]:
+def _loops(structure: StructureData) -> list[str]:
     return [" -> ".join(".".join(node) for node in loop) for loop in structure.loops] or ["none"]
 
 
-def _chains(structure: Structure) -> list[str]:
+def _chains(structure: StructureData) -> list[str]:
     rows = [[part.name, " > ".join(part.chain)] for part in structure.parts if part.chain]
     return text_table(rows, (0, 1)) if rows else []
 
 
-def _balises(structure: Structure) -> list[str]:
+def _balises(structure: StructureData) -> list[str]:
     balises = structure.balises
     if balises is None:
         return []
@@ -191,7 +191,7 @@ def _balises(structure: Structure) -> list[str]:
     return text_table(rows, left=(0, 1))
 
 
-def _network(structure: Structure) -> list[str]:
+def _network(structure: StructureData) -> list[str]:
     network = structure.network
     if network is None:
         return []

@@ -22,7 +22,7 @@ from cosim.studies.measures import RATES, SHARES, setting_text
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
-    from cosim.studies.sweep_result import SweepResult, SweepRun
+    from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
 LEVEL = 0.95
 GROUPS = "groups.csv"
@@ -73,7 +73,7 @@ def mean_of(values: Sequence[float]) -> Spread:
     return Spread(mean, mean - half, mean + half, len(numbers))
 
 
-def grouped(result: SweepResult, by: str) -> dict[Any, dict[str, Spread]]:
+def grouped(result: SweepRuns, by: str) -> dict[Any, dict[str, Spread]]:
     """For each value of a setting the measures over the runs that have it, in order of appearance.
 
     Shares and rates (`cosim.studies.measures.SHARES`, `RATES`) are of what was counted in all runs together, with exact
@@ -104,7 +104,7 @@ def _total(runs: Sequence[SweepRun], name: str) -> float:
     return sum(count for count in counts if isfinite(count))
 
 
-def groups_text(result: SweepResult, by: str) -> str:
+def groups_text(result: SweepRuns, by: str) -> str:
     """The groups as a table, failures in words below it.
 
     Args:
@@ -119,7 +119,7 @@ def groups_text(result: SweepResult, by: str) -> str:
     return "\n".join([*text_table(rows, left=(0,), heading=True), "", note, *result.troubles()])
 
 
-def _runs(result: SweepResult, by: str) -> Mapping[str, int]:
+def _runs(result: SweepRuns, by: str) -> Mapping[str, int]:
     counts: dict[str, int] = {}
     for run in result.runs:
         key = setting_text(run.settings.get(by))
@@ -127,7 +127,7 @@ def _runs(result: SweepResult, by: str) -> Mapping[str, int]:
     return counts
 
 
-def write_groups(result: SweepResult, by: str, directory: Path) -> Path:
+def write_groups(result: SweepRuns, by: str, directory: Path) -> Path:
     """Write the groups as a table with a line for each group and measure.
 
     Args:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.outcome import INTERRUPTED, Outcome
@@ -15,20 +15,19 @@ from cosim.scenario.override import CASE
 from cosim.scenario.starts import start_values
 from cosim.scenario.structure import describe_component
 from cosim.studies.measures import Measure, error_measures, own_measures
+from cosim.studies.runnable import RunnableScenario
 from cosim.studies.sampling import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import run_folder, write_index, write_run
 from cosim.studies.sweep_journal import SweepJournal
-from cosim.studies.sweep_result import SweepResult, SweepRun
+from cosim.studies.sweep_result import SweepResult
+from cosim.studies.sweep_runs import SweepRun
 from cosim.studies.workers import Died, Raised, attempt, in_processes
-
-if TYPE_CHECKING:
-    from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[int, int], None]
 
 
 class _Job(NamedTuple):
-    scenario: Scenario
+    scenario: RunnableScenario
     settings: Variation
 
 
@@ -40,7 +39,7 @@ class Sweep:
         scenario: what is varied. variations: for each run the values that are changed, by name.
     """
 
-    scenario: Scenario
+    scenario: RunnableScenario
     variations: Sequence[Variation]
 
     def __len__(self) -> int:
@@ -51,7 +50,7 @@ class Sweep:
         """Names of what is varied, in order of appearance."""
         return list(dict.fromkeys(name for variation in self.variations for name in variation))
 
-    def varied(self, number: int) -> Scenario:
+    def varied(self, number: int) -> RunnableScenario:
         """The scenario of one run.
 
         Args:
@@ -129,7 +128,7 @@ class Sweep:
         """
         if resume and directory is None:
             raise ScenarioError("A sweep is resumed from its folder: give directory=...")
-        journal = None if directory is None else SweepJournal(Path(directory), self)
+        journal = None if directory is None else SweepJournal(Path(directory), self.variations, self.varied)
         done: dict[int, SweepRun] = {} if journal is None or not resume else journal.read()
         if journal is not None:
             journal.begin(done.values())
@@ -151,7 +150,7 @@ class Sweep:
 
 
 def make_sweep(
-    scenario: Scenario,
+    scenario: RunnableScenario,
     values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]],
     mode: Mode,
     count: int | None,
@@ -194,7 +193,7 @@ def settings_text(settings: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} = {value!r}" for name, value in settings.items())
 
 
-def _check_parameters(scenario: Scenario, names: Iterable[str]) -> None:
+def _check_parameters(scenario: RunnableScenario, names: Iterable[str]) -> None:
     """Parameters that are varied exist: found here, and not in every run."""
     tables = scenario.table().components
     for name in dict.fromkeys(n.partition(".")[0] for n in names if n.partition(".")[0] in tables):

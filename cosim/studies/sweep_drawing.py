@@ -16,7 +16,7 @@ from cosim.studies.measures import setting_text, with_unit
 from plant_models.hybrid.units import UnitError
 
 if TYPE_CHECKING:
-    from cosim.studies.sweep_result import SweepResult, SweepRun
+    from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
 SETTING_UNITS = {
     "start": "s",
@@ -40,7 +40,7 @@ LINES_NAMED = 8
 
 
 @styled
-def sweep_figure(result: SweepResult, measure: str | None, against: str | None, ax: Axes | None) -> Axes:
+def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax: Axes | None) -> Axes:
     """A measure over a varied value, units on the axes; arguments as for `SweepResult.plot`.
 
     Args:
@@ -76,7 +76,7 @@ def sweep_figure(result: SweepResult, measure: str | None, against: str | None, 
     return ax
 
 
-def setting_unit(result: SweepResult, name: str) -> str | None:
+def setting_unit(result: SweepRuns, name: str) -> str | None:
     """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none.
 
     Args:

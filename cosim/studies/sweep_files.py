@@ -12,7 +12,7 @@ from cosim.errors import OutputError
 from cosim.results.summary_file import jsonable
 
 if TYPE_CHECKING:
-    from cosim.studies.sweep_result import SweepResult, SweepRun
+    from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
 INDEX_CSV, INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
 
@@ -42,7 +42,7 @@ def write_run(run: SweepRun, folder: Path) -> Path | None:
     return folder
 
 
-def write_sweep(result: SweepResult, directory: Path) -> dict[str, Path]:
+def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
     """Write all runs that are in memory, the index and a picture; paths by kind.
 
     Args:
@@ -59,7 +59,7 @@ def write_sweep(result: SweepResult, directory: Path) -> dict[str, Path]:
     return write_index(replace(result, runs=runs), directory)
 
 
-def write_index(result: SweepResult, directory: Path) -> dict[str, Path]:
+def write_index(result: SweepRuns, directory: Path) -> dict[str, Path]:
     """Write the table as CSV and JSON, and a picture where there is something to draw; paths by kind.
 
     Args:
@@ -81,7 +81,9 @@ def write_index(result: SweepResult, directory: Path) -> dict[str, Path]:
         }
         paths["json"].write_text(json.dumps(jsonable(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
         if _worth_drawing(result):
-            figure: Any = result.plot().figure
+            from cosim.studies.sweep_drawing import sweep_figure  # noqa: PLC0415 - matplotlib only for those who draw
+
+            figure: Any = sweep_figure(result, None, None, None).figure
             paths["picture"] = directory / PICTURE
             figure.savefig(paths["picture"], dpi=120)
         else:
@@ -116,7 +118,7 @@ def _folder(run: SweepRun, directory: Path) -> str | None:
     return run.folder.name if run.folder.parent == directory else str(run.folder)
 
 
-def _worth_drawing(result: SweepResult) -> bool:
+def _worth_drawing(result: SweepRuns) -> bool:
     return (
         bool(result.measures) and len({json.dumps(jsonable(run.settings), sort_keys=True) for run in result.runs}) > 1
     )

@@ -6,20 +6,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from cosim.errors import OutputError
 from cosim.results.summary_file import jsonable, restored
 from cosim.scenario.save import scenario_text
-from cosim.studies.sweep_result import SweepRun
-
-if TYPE_CHECKING:
-    from cosim.simulation.scenario import Scenario
-    from cosim.studies.sweep import Sweep
+from cosim.studies.runnable import RunnableScenario
+from cosim.studies.sampling import Variation
+from cosim.studies.sweep_runs import SweepRun
 
 JOURNAL = "runs.jsonl"
 
@@ -28,12 +26,15 @@ class SweepJournal:
     """The file ``runs.jsonl`` in the folder of a sweep.
 
     Args:
-        directory: the folder; created where it does not exist. sweep: what is run.
+        directory: the folder; created where it does not exist. variations: the values that each run changes, by name.
+        varied: gives the scenario of a run by the number of its variation.
     """
 
-    def __init__(self, directory: Path, sweep: Sweep) -> None:
+    def __init__(
+        self, directory: Path, variations: Sequence[Variation], varied: Callable[[int], RunnableScenario]
+    ) -> None:
         self.path = directory / JOURNAL
-        self._sweep = sweep
+        self._variations, self._varied = variations, varied
 
     def read(self) -> dict[int, SweepRun]:
         """The runs of an earlier sweep that are runs of this one as well, by number in this one; those that failed left
@@ -43,7 +44,7 @@ class SweepJournal:
             OutputError: the file cannot be read.
         """
         entries = {entry["key"]: entry for entry in read_lines(self.path)}
-        known = {number: entries.get(self.key(number)) for number in range(len(self._sweep))} if entries else {}
+        known = {number: entries.get(self.key(number)) for number in range(len(self._variations))} if entries else {}
         return {
             number: self._run(number, entry)
             for number, entry in known.items()
@@ -78,7 +79,7 @@ class SweepJournal:
         Args:
             number: of the variation.
         """
-        return scenario_key(self._sweep.varied(number))
+        return scenario_key(self._varied(number))
 
     def _entry(self, run: SweepRun) -> dict[str, Any]:
         return {
@@ -93,11 +94,11 @@ class SweepJournal:
     def _run(self, number: int, entry: dict[str, Any]) -> SweepRun:
         measures = {name: nan if value is None else float(value) for name, value in entry["measures"].items()}
         folder = None if entry["folder"] is None else Path(entry["folder"])
-        settings = self._sweep.variations[number]
+        settings = self._variations[number]
         return SweepRun(number, settings, None, None, measures, tuple(entry["faults"]), folder)
 
 
-def scenario_key(scenario: Scenario) -> str:
+def scenario_key(scenario: RunnableScenario) -> str:
     """What a run follows from: the text of its scenario, and size and age of the files it names, as a digest.
 
     Args:
@@ -147,7 +148,7 @@ def write_lines(path: Path, mode: Literal["a", "w"], entries: Iterable[dict[str,
         raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
-def _files(scenario: Scenario) -> list[Path]:
+def _files(scenario: RunnableScenario) -> list[Path]:
     """Files that the components are made from."""
     tables = scenario.table().components.values()
     named = [

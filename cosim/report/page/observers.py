@@ -22,12 +22,12 @@ from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
 if TYPE_CHECKING:
-    from cosim.observer_benchmark.observers import ObserverBenchmark
+    from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
 
 PAGE, PICTURE, DATA = "observers.html", "observers.png", "observers.json"
 
 
-def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict[str, Path]:
+def write_benchmark(benchmark: BenchmarkScores, directory: str | Path) -> dict[str, Path]:
     """Write page, picture and data of a comparison of observers.
 
     Args:
@@ -49,7 +49,7 @@ def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict
     return {"page": folder / PAGE, "picture": folder / PICTURE, "data": folder / DATA}
 
 
-def benchmark_page(benchmark: ObserverBenchmark, picture: bytes) -> str:
+def benchmark_page(benchmark: BenchmarkScores, picture: bytes) -> str:
     """The page as text.
 
     Args:
@@ -73,13 +73,13 @@ def benchmark_page(benchmark: ObserverBenchmark, picture: bytes) -> str:
     )
 
 
-def _overview(benchmark: ObserverBenchmark) -> PageTable:
+def _overview(benchmark: BenchmarkScores) -> PageTable:
     rows = benchmark.rows()
     headings = list(rows[0]) if rows else []
     return simple_table(headings, [[cell(value) for value in row.values()] for row in rows], range(1, len(headings)))
 
 
-def _certificates(benchmark: ObserverBenchmark) -> PageTable:
+def _certificates(benchmark: BenchmarkScores) -> PageTable:
     rows = [
         [
             score.label,
@@ -96,7 +96,7 @@ def _certificates(benchmark: ObserverBenchmark) -> PageTable:
     return simple_table(headings, rows, (1, 2, 4))
 
 
-def _over_time(benchmark: ObserverBenchmark) -> bytes | None:
+def _over_time(benchmark: BenchmarkScores) -> bytes | None:
     """The speed errors of all observers as PNG; None where nothing can be drawn."""
     result = merged_result(benchmark)
     if result is None or benchmark.spec.true_speed is None:
@@ -107,7 +107,7 @@ def _over_time(benchmark: ObserverBenchmark) -> bytes | None:
     return png(speed_error_figure(result, shown).figure)
 
 
-def merged_result(benchmark: ObserverBenchmark) -> Result | None:
+def merged_result(benchmark: BenchmarkScores) -> Result | None:
     """One result with the columns of all observers whose rows are at the same times as those of the first one.
 
     Args:

@@ -22,7 +22,8 @@ from cosim.structure.curves import forward_curves
 from cosim.structure.layout import EVENT_PORT, lay_out
 from cosim.structure.picture import COLOURS, box_size, structure_figure, text_width, wires_of
 from cosim.structure.shapes import Box, Layout, Wire
-from cosim.structure.structure import Balises, Link, Structure
+from cosim.structure.structure import Structure
+from cosim.structure.structure_data import Balises, Link
 
 EDGE = 1e-6
 TOUCH = 0.6  # pixels; text boxes are rounded to whole ones

@@ -17,7 +17,8 @@ from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
 from cosim.studies.groups import grouped, groups_text, mean_of
 from cosim.studies.sweep_journal import JOURNAL
-from cosim.studies.sweep_result import SweepResult, SweepRun
+from cosim.studies.sweep_result import SweepResult
+from cosim.studies.sweep_runs import SweepRun
 
 CASES: dict[str, dict[str, Any]] = {
     "light": {"train.mass": 70e3},

@@ -1,0 +1,155 @@
+"""The runs of a sweep with settings, measures and outcomes, as data and as a table. Touches no file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import OutputError, ScenarioError, nearest
+from cosim.evaluation.numbers import number as number_text
+from cosim.results.load import load_result
+from cosim.results.result import Result
+from cosim.scenario.outcome import Outcome
+from cosim.studies.measures import measure_unit, setting_text, with_unit
+from cosim.studies.runnable import RunnableScenario
+from fmus.text_table import text_table
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """One run of a sweep.
+
+    Args:
+        number: of the variation, from 0. settings: the values that were changed, by name.
+        outcome: what the run left; None where it could not begin, crashed, or was not kept.
+        failure: why it did not reach its end, or None.
+        measures: numbers by name; see `cosim.studies.measures.error_measures`.
+        faults: what went wrong in taking own measures.
+        folder: where its results were written, or None.
+    """
+
+    number: int
+    settings: Mapping[str, Any]
+    outcome: Outcome | None = None
+    failure: str | None = None
+    measures: Mapping[str, float] = field(default_factory=dict)
+    faults: Sequence[str] = ()
+    folder: Path | None = None
+
+    @property
+    def result(self) -> Result | None:
+        """The result, from memory or from its folder; None where there is none."""
+        if self.outcome is not None:
+            return self.outcome.result
+        return None if self.folder is None else load_result(self.folder)
+
+
+@dataclass(frozen=True)
+class SweepColumn:
+    """A column of a printed table.
+
+    Args:
+        measure: name. heading: above it. factor: what numbers are multiplied by.
+    """
+
+    measure: str
+    heading: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class SweepRuns:
+    """The runs of a sweep, in order of its variations.
+
+    Args:
+        scenario: what was varied. names: of what was varied. runs: that were done. units: of own measures, by name.
+    """
+
+    scenario: RunnableScenario
+    names: Sequence[str]
+    runs: Sequence[SweepRun]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __getitem__(self, number: int) -> SweepRun:
+        return self.runs[number]
+
+    @property
+    def failed(self) -> list[SweepRun]:
+        """The runs that did not reach their end."""
+        return [run for run in self.runs if run.failure is not None]
+
+    @property
+    def measures(self) -> list[str]:
+        """Names of all measures, in order of appearance."""
+        return list(dict.fromkeys(name for run in self.runs for name in run.measures))
+
+    @property
+    def columns(self) -> list[SweepColumn]:
+        """The measures that printed tables show: those the scenario chooses under ``report.measures``, or all.
+
+        Raises:
+            ScenarioError: one that is chosen is none.
+        """
+        chosen = self.scenario.table().report.measures
+        if not chosen or not self.measures:
+            return [SweepColumn(name, with_unit(name, self.unit(name))) for name in self.measures]
+        unknown = [column.measure for column in chosen if column.measure not in self.measures]
+        if unknown:
+            raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
+        return [
+            SweepColumn(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor)
+            for c in chosen
+        ]
+
+    def unit(self, measure: str) -> str | None:
+        """Unit of a measure; None where nobody has said it.
+
+        Args:
+            measure: name of the measure.
+        """
+        return self.units.get(measure) or measure_unit(measure)
+
+    def table(self) -> list[dict[str, Any]]:
+        """One row for each run: ``run``, the settings, the measures (NaN where a run has none) and ``failure``."""
+        return [
+            {"run": run.number}
+            | {name: run.settings.get(name) for name in self.names}
+            | {name: run.measures.get(name, nan) for name in self.measures}
+            | {"failure": run.failure}
+            for run in self.runs
+        ]
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas data frame, indexed by the number of the run.
+
+        Raises:
+            OutputError: pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 - optional
+        except ImportError as error:
+            raise OutputError("This needs pandas: pip install 'fmu-observer[frames]'") from error
+        return pd.DataFrame(self.table()).set_index("run")
+
+    def text(self) -> str:
+        """The table as plain text, failures in words below it."""
+        rows = self.table()
+        settings = ["run", *self.names]
+        columns = self.columns
+        cells = [[*settings, *(column.heading for column in columns)]]
+        for row in rows:
+            numbers = (number_text(column.factor * row[column.measure], digits=4) for column in columns)
+            cells.append([*(setting_text(row[name]) for name in settings), *numbers])
+        lines = text_table(cells, left=())
+        return "\n".join([*lines, *self.troubles()])
+
+    def troubles(self) -> list[str]:
+        """What failed, in words, a line each."""
+        lines = [f"run {run.number} failed: {run.failure}" for run in self.failed]
+        return [*lines, *(f"run {run.number}: {fault}" for run in self.runs for fault in run.faults)]
