@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cosim.results.load import load_result
     from cosim.results.result import Result
     from cosim.results.save import save_result
-    from cosim.scenario.outcome import Outcome
+    from cosim.run.outcome import Outcome
     from cosim.scenario.shipped import shipped_scenarios
     from cosim.simulation.scenario import Scenario
     from cosim.studies.sampling import log_uniform, uniform, whole
@@ -55,7 +55,7 @@ __all__ = [
 _HOMES = {
     "Comparison": "cosim.comparison.verdict",
     "CosimError": "cosim.errors",
-    "Outcome": "cosim.scenario.outcome",
+    "Outcome": "cosim.run.outcome",
     "Result": "cosim.results.result",
     "Scenario": "cosim.simulation.scenario",
     "Sweep": "cosim.studies.sweep",

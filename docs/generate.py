@@ -25,7 +25,8 @@ from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.fmu_filter.settings import FilterTable
 from cosim.report.figures.main_picture import main_picture
-from cosim.scenario import network_table, schema, tables
+from cosim.scenario import network_table, schema
+from cosim.scenario import scenario_tables as tables
 from cosim.scenario.model_name import ModelName
 
 DOCS = Path(__file__).parent

@@ -18,7 +18,7 @@ from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 MODELS = ("FMU", "block")
 """Components that are models; a recording that is played back is not."""

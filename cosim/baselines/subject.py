@@ -13,7 +13,7 @@ from cosim.baselines.recipe import Recipe
 from cosim.components.recording_data import Chosen
 from cosim.errors import BaselineError, ScenarioError
 from cosim.results.result import Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[float, float], None]

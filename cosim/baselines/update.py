@@ -18,7 +18,7 @@ from cosim.comparison.tolerance import Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 
 @dataclass(frozen=True)

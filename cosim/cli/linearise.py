@@ -18,8 +18,8 @@ from cosim.fmu_model.linearisation import Linearisation
 from cosim.fmu_model.linearise import linearise_fmu
 from cosim.fmu_model.sealed import declared_states
 from cosim.results.summary_file import jsonable
-from cosim.scenario.models import make_declared
-from cosim.scenario.tables import ComponentTable
+from cosim.run.component_models import make_declared
+from cosim.scenario.scenario_tables import ComponentTable
 from plant_models.hybrid import HybridSystem
 from plant_models.user_file import names_code
 

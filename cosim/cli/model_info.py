@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from cosim.errors import CosimError, ScenarioError, nearest
-from cosim.scenario.models import make_declared
-from cosim.scenario.tables import ComponentTable
+from cosim.run.component_models import make_declared
+from cosim.scenario.scenario_tables import ComponentTable
 from fmu_observer import OBSERVERS
 from fmus.recipes import legal_values
 from plant_models import PLANTS

@@ -25,7 +25,7 @@ from cosim.process.last_call import LAST_CALL
 from cosim.results.folder import check_writable
 from cosim.results.summary_file import jsonable
 from cosim.results.unfinished import SPARE
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from fmus.plain import plain
 

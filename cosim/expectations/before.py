@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.components.component import Component
 from cosim.coupling.connection import split_name
 from cosim.errors import CosimError, ScenarioError, nearest
-from cosim.expectations.indicators import BETWEEN_0_AND_1, shipped_threshold
+from cosim.expectations.indicator_levels import BETWEEN_0_AND_1, shipped_threshold
 from plant_models.hybrid.units import UnitError, conversion
 
 if TYPE_CHECKING:

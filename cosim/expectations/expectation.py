@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 from pydantic import Field, model_validator
 
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun
+from cosim.expectations.judged_run import JudgedRun
 from cosim.table import Table
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun, NotRecordedError
+from cosim.expectations.judged_run import JudgedRun, NotRecordedError
 
 if TYPE_CHECKING:
-    from cosim.scenario.outcome import Outcome
+    from cosim.run.outcome import Outcome
     from cosim.scenario.schema import ScenarioTable
 
 

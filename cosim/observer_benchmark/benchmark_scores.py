@@ -11,7 +11,7 @@ from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.observer_scores import ObserverScore
 from cosim.observer_benchmark.observer_table import aligned, main_row
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 
 @dataclass(frozen=True)

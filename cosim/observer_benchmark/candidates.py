@@ -12,11 +12,11 @@ import fmu_observer
 from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError, nearest
 from cosim.observer_benchmark.playback import FACTS, Sides, known_facts, told_to, train_observers
-from cosim.scenario.balise_service import BALISE_EVENT
+from cosim.run.balise_service import BALISE_EVENT
+from cosim.run.component_models import make_declared
 from cosim.scenario.model_name import ModelName, settings_of
-from cosim.scenario.models import make_declared
 from cosim.scenario.paths import absolute, move_file
-from cosim.scenario.tables import ComponentTable
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from plant_models.user_file import names_code
 

@@ -20,12 +20,12 @@ from cosim.observer_benchmark.playback import Sides, find_sides, playback_scenar
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
-from cosim.scenario.certificates import check_certificates
-from cosim.scenario.gaps import expected_gap
-from cosim.scenario.layouts import make_layout
-from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.run.certificates import check_certificates
+from cosim.run.expected_gaps import expected_gap
+from cosim.run.layouts import make_layout
+from cosim.run.outcome import INTERRUPTED, Outcome
+from cosim.run.run_seeds import with_seeds
 from cosim.scenario.schema import step_count
-from cosim.scenario.seeds import with_seeds
 from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[str, int, int], None]

@@ -15,13 +15,13 @@ from typing import Any
 import fmu_observer
 from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError
-from cosim.scenario.balise_service import BALISE_EVENT
-from cosim.scenario.connections import parse_connections
-from cosim.scenario.models import make_declared, make_system
-from cosim.scenario.roles import ROLES, roles_of_balises
+from cosim.run.balise_service import BALISE_EVENT
+from cosim.run.component_models import make_declared, make_system
+from cosim.run.connections import parse_connections
+from cosim.run.scenario_structure import describe_component
+from cosim.run.signal_roles import ROLES, roles_of_balises
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.structure import describe_component
-from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from fmu_observer.observers.gated_observer import GatedObserver
 from plant_models.hybrid import Signal

@@ -18,8 +18,8 @@ from cosim.errors import OutputError, ProvenanceError
 from cosim.provenance.same import same_result
 from cosim.results.load import load_result
 from cosim.results.unfinished import DID_NOT_END
-from cosim.scenario.manifest import Manifest, read_manifest
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
+from cosim.run.results_manifest import Manifest, read_manifest
 from cosim.simulation.scenario import Scenario
 
 if TYPE_CHECKING:

@@ -1,1 +1,1 @@
-"""Scenarios: what is coupled, how long, past which balises, and what is reported; read, checked, and run."""
+"""What a scenario says: TOML files and their includes, overrides, the tables with types and ranges, paths, saving."""

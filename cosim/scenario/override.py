@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.tables import ComponentTable
+from cosim.scenario.scenario_tables import ComponentTable
 
 TABLES = ("balises", "network", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}

@@ -17,7 +17,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.scenario.network_table import NetworkTable
-from cosim.scenario.tables import (
+from cosim.scenario.scenario_tables import (
     LINE,
     TABLE,
     BalisesTable,

@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cosim import ssp, studies
 from cosim.errors import CosimError, ScenarioError
-from cosim.scenario.given import given_component, given_value
+from cosim.run.outcome import Outcome
+from cosim.run.results_manifest import read_manifest
+from cosim.run.scenario_run import run_scenario
+from cosim.run.scenario_structure import scenario_structure
+from cosim.run.streaming import ending, where_to
+from cosim.scenario.fmu_alone import single_tables
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
-from cosim.scenario.manifest import read_manifest
 from cosim.scenario.origin import Origin
-from cosim.scenario.outcome import Outcome
 from cosim.scenario.override import case_values, override
 from cosim.scenario.package_names import is_package, stem
-from cosim.scenario.run import run_scenario
-from cosim.scenario.save import plain, save_scenario, scenario_text
+from cosim.scenario.saving import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
+from cosim.scenario.script_values import given_component, given_value
 from cosim.scenario.shipped import shipped_scenarios
-from cosim.scenario.single import single_tables
-from cosim.scenario.streaming import ending, where_to
-from cosim.scenario.structure import scenario_structure
 from cosim.structure.structure import Structure
 
 if TYPE_CHECKING:

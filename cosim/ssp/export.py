@@ -16,14 +16,14 @@ from fmpy.model_description import ModelDescription
 from cosim.balises.layout import TrackLayout
 from cosim.components.loading import describe_fmu
 from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, nearest
-from cosim.scenario.backends import NATIVE
-from cosim.scenario.connections import parse_connections
-from cosim.scenario.layouts import make_layout
-from cosim.scenario.models import LATE_PARAMETERS, OWN_PACKAGES, make_system, native_fmu
+from cosim.run.backends import NATIVE
+from cosim.run.component_models import LATE_PARAMETERS, OWN_PACKAGES, make_system, native_fmu
+from cosim.run.connections import parse_connections
+from cosim.run.layouts import make_layout
+from cosim.run.run_seeds import component_seed, with_seeds
+from cosim.run.starts import start_values
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.seeds import component_seed, with_seeds
-from cosim.scenario.starts import start_values
-from cosim.scenario.tables import ComponentTable
 from cosim.ssp.annotation import DIGEST, digest, write_extras
 from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import VERSIONS, Node

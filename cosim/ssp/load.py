@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.models import LATE_PARAMETERS
+from cosim.run.component_models import LATE_PARAMETERS
 from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values

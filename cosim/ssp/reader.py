@@ -12,8 +12,8 @@ from math import ceil
 from typing import Any
 
 from cosim.balises.layout import TrackLayout
-from cosim.scenario.balise_service import BALISE_EVENT
-from cosim.scenario.tables import BalisesTable, ComponentTable
+from cosim.run.balise_service import BALISE_EVENT
+from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from cosim.ssp.common import FAMILIES, INTEGER
 from cosim.ssp.interfaces import Interface
 from plant_models.railway.track.balise_layout import UNUSED

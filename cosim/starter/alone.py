@@ -8,8 +8,8 @@ from typing import Any
 from fmpy.model_description import DefaultExperiment, ModelVariable
 
 from cosim.errors import CosimError
+from cosim.run.starts import start_values
 from cosim.scenario.schema import step_count
-from cosim.scenario.starts import start_values
 from cosim.starter.look import Look, number
 from cosim.starter.toml_lines import LISTED, entry, one_line
 from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES

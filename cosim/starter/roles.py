@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from cosim.scenario.balise_service import BALISE_EVENT
+from cosim.run.balise_service import BALISE_EVENT
 from cosim.starter.guess import Guess, Quantity, guess
 from cosim.starter.look import Look
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from cosim.scenario.models import make_declared
+from cosim.run.component_models import make_declared
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import step_count
-from cosim.scenario.tables import ComponentTable
 from cosim.starter.guess import Guess, fits
 from cosim.starter.look import Look, number
 from cosim.starter.roles import PlantRoles
@@ -55,7 +55,7 @@ def train(look: Look, roles: PlantRoles, observer: str, place: str) -> dict[str,
 
 
 def declared_observer(name: str) -> Any:
-    """What an observer declares, see `cosim.scenario.models.make_declared`.
+    """What an observer declares, see `cosim.run.component_models.make_declared`.
 
     Args:
         name: of the observer, or ``file.py:Class``.

@@ -14,7 +14,7 @@ from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import Quantity, estimation_error
 from cosim.evaluation.spec import Phase
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 Measure = Callable[[Outcome], float]
 SHARES: Mapping[str, tuple[str, str]] = {

@@ -14,17 +14,17 @@ from numpy.typing import ArrayLike
 from cosim.components.loading import describe_system
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CosimError, nearest
-from cosim.scenario.connections import parse_connections
-from cosim.scenario.models import make_system
-from cosim.scenario.seeds import component_seed
+from cosim.run.component_models import make_system
+from cosim.run.connections import parse_connections
+from cosim.run.run_seeds import component_seed
 from fmus.batch.members import Batch
 from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.units import conversion, parse_unit
 
 if TYPE_CHECKING:
-    from cosim.scenario.outcome import Outcome
+    from cosim.run.outcome import Outcome
+    from cosim.scenario.scenario_tables import ComponentTable
     from cosim.scenario.schema import ScenarioTable
-    from cosim.scenario.tables import ComponentTable
     from plant_models.hybrid import HybridSystem
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 if TYPE_CHECKING:
-    from cosim.scenario.outcome import Outcome
+    from cosim.run.outcome import Outcome
     from cosim.scenario.schema import ScenarioTable
 
 

@@ -19,7 +19,7 @@ from cosim.evaluation.spec import ReportSpec
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
-    from cosim.scenario.outcome import Outcome
+    from cosim.run.outcome import Outcome
     from cosim.simulation.scenario import Scenario
 
 QUARTILES = (25.0, 50.0, 75.0)

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.errors import CosimError, ScenarioError
-from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.run.outcome import INTERRUPTED, Outcome
+from cosim.run.scenario_structure import describe_component
+from cosim.run.starts import start_values
 from cosim.scenario.override import CASE
-from cosim.scenario.starts import start_values
-from cosim.scenario.structure import describe_component
 from cosim.studies.measures import Measure, error_measures, own_measures
 from cosim.studies.runnable import RunnableScenario
 from cosim.studies.sampling import Mode, Range, Variation, variations

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from cosim.errors import OutputError
 from cosim.results.summary_file import jsonable, restored
-from cosim.scenario.save import scenario_text
+from cosim.scenario.saving import scenario_text
 from cosim.studies.runnable import RunnableScenario
 from cosim.studies.sampling import Variation
 from cosim.studies.sweep_runs import SweepRun

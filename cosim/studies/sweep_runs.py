@@ -12,7 +12,7 @@ from cosim.errors import OutputError, ScenarioError, nearest
 from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.measures import measure_unit, setting_text, with_unit
 from cosim.studies.runnable import RunnableScenario
 from fmus.text_table import text_table

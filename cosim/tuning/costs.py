@@ -15,7 +15,7 @@ from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import Phase
 from cosim.results.result import Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures
 
 KINDS = ("state", "likelihood", "nis", "expectation")

@@ -17,7 +17,7 @@ import numpy as np
 
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.results.folder import write_results
-from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sweep_journal import read_lines, scenario_key, write_lines
 from cosim.studies.workers import Died, Raised, Team, attempt

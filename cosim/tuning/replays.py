@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import CosimError
-from cosim.scenario.models import make_system
-from cosim.scenario.outcome import Outcome
+from cosim.run.component_models import make_system
+from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from cosim.studies.replay import Replay
 from cosim.tuning.costs import Cost, ExpectationCost

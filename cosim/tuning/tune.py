@@ -10,8 +10,8 @@ from typing import Any
 
 from cosim.errors import ScenarioError
 from cosim.results.folder import check_writable
-from cosim.scenario.outcome import Outcome
-from cosim.scenario.structure import describe_component
+from cosim.run.outcome import Outcome
+from cosim.run.scenario_structure import describe_component
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.bench import Seeded, seeded, why_whole, with_observer
 from cosim.tuning.costs import Cost, make_cost

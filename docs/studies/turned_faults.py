@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim import Scenario
-from cosim.scenario.models import make_system, values_in_use
+from cosim.run.component_models import make_system, values_in_use
 
 
 class Error(NamedTuple):

@@ -32,7 +32,7 @@ def identity(*values: Any, code: tuple[str, ...] = ()) -> str | None:
         values: what it is computed from, see `plant_models.disk_cache.description.Description.text`. The packages of
             all classes and functions among them count by their files, and so do the floors below.
         code: what else computes the result: a package of this project, with the floors below (``fmus``), or a folder or
-            a file alone (``cosim/scenario/certificates.py``).
+            a file alone (``cosim/run/certificates.py``).
 
     Returns:
         64 hexadecimal digits; None where one of the values is not known by its content, such as a system of a class of
@@ -57,7 +57,7 @@ def folder_digest(name: str) -> str:
     """Digest of the files of a package of this project, or of one of its folders or files; read once in a process.
 
     Args:
-        name: ``plant_models``, ``fmus/check`` or ``cosim/scenario/certificates.py``.
+        name: ``plant_models``, ``fmus/check`` or ``cosim/run/certificates.py``.
 
     Returns:
         The name and 64 hexadecimal digits.

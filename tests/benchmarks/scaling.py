@@ -25,7 +25,7 @@ from cosim import Scenario
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import execution_order
 from cosim.coupling.plan import make_plan
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 COUNTS = (2, 10, 30, 100)
 STEPS = {"compiled": (10**5, 10**6, 10**7), "python": (10**4, 10**5, 10**6)}

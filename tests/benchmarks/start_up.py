@@ -32,7 +32,7 @@ marks = [("interpreter", process_time())]
 from cosim import Scenario
 import cosim.simulation.scenario, cosim.cli.run
 marks.append(("imports", process_time()))
-from cosim.scenario import run as running
+from cosim.run import scenario_run as running
 parts = {}
 def timed(module, name, part):
     inner = getattr(module, name)

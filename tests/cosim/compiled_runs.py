@@ -10,7 +10,7 @@ import numpy as np
 from test_fmus.build import linear_fmu
 
 from cosim import Scenario
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 COUNTED = ("calls",)
 

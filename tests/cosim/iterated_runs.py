@@ -17,8 +17,8 @@ from cosim.master.algorithms.choose import choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
-from cosim.scenario.master import make_algorithm
-from cosim.scenario.tables import MasterTable
+from cosim.run.master_setup import make_algorithm
+from cosim.scenario.scenario_tables import MasterTable
 
 
 def prepare(

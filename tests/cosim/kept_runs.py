@@ -8,7 +8,7 @@ from typing import Any
 from test_fmus.build import linear_fmu
 
 from cosim import Scenario
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 
 def coast(folder: Path, rate: float = 1.0) -> Path:

@@ -20,7 +20,7 @@ from cosim.expectations.registry import EXPECTATIONS
 from cosim.report.figures.panels import FIGURES
 from cosim.results.formats.catalogue import FORMATS
 from cosim.scenario.model_name import EXPECTED
-from cosim.scenario.tables import ComponentTable
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from fmus.check.catalogue import CHECKS
 from fmus.check.catalogue import EXPECTED as CHECK

@@ -26,7 +26,7 @@ from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, CosimError, nearest
 from cosim.results.load import load_result
 from cosim.results.result import Result
-from cosim.scenario.single import run_times
+from cosim.scenario.fmu_alone import run_times
 from cosim.ssp.document import parse
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.values import read_parameter_set

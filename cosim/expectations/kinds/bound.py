@@ -11,7 +11,7 @@ import numpy as np
 from cosim.errors import ScenarioError
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.judged import Judged, at, with_unit
-from cosim.expectations.run import JudgedRun, span
+from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import bounded, difference
 
 if TYPE_CHECKING:

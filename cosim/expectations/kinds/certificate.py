@@ -9,7 +9,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.facts import certified_gap, mapping_entry, number_entry
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun, NotRecordedError
+from cosim.expectations.judged_run import JudgedRun, NotRecordedError
 from cosim.table import Name
 
 if TYPE_CHECKING:

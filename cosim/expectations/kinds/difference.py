@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from cosim.expectations.expectation import LimitedExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun, span
+from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import difference, judge_sizes
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, Self
 from cosim.errors import ScenarioError
 from cosim.expectations.expectation import LimitedExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun, NotRecordedError, span
+from cosim.expectations.judged_run import JudgedRun, NotRecordedError, span
 from cosim.expectations.sizes import difference, judge_sizes
 from cosim.table import Name
 

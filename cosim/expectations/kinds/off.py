@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 
 from cosim.expectations.expectation import WindowExpectation
-from cosim.expectations.indicators import held, threshold_of
+from cosim.expectations.indicator_levels import held, threshold_of
 from cosim.expectations.judged import Judged, at, given
-from cosim.expectations.run import JudgedRun, span
+from cosim.expectations.judged_run import JudgedRun, span
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from cosim.expectations.expectation import Expectation
-from cosim.expectations.indicators import ROUNDING, first_on, threshold_of
+from cosim.expectations.indicator_levels import ROUNDING, first_on, threshold_of
 from cosim.expectations.judged import Judged, given
-from cosim.expectations.run import JudgedRun, span
+from cosim.expectations.judged_run import JudgedRun, span
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before

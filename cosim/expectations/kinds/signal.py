@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun, span
+from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import bounded
 
 if TYPE_CHECKING:

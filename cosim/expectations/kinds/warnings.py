@@ -7,7 +7,7 @@ from typing import Literal
 from cosim.evaluation.facts import list_entry
 from cosim.expectations.expectation import Count, Expectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.run import JudgedRun
+from cosim.expectations.judged_run import JudgedRun
 
 WARNINGS_SHOWN = 3
 

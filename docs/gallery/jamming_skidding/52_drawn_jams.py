@@ -8,7 +8,7 @@ from shared.sheet import Sheet
 
 from cosim import Scenario
 from cosim.evaluation.balise_gaps import gap_errors, largest
-from cosim.scenario.tables import ComponentTable
+from cosim.scenario.scenario_tables import ComponentTable
 
 SEEDS = range(20)
 RATES = {"jam_rate": 0.05, "skid_rate": 0.01, "mean_length": 0.6, "least_depth": 0.2, "most_depth": 1.0}

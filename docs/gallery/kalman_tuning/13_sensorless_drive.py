@@ -9,7 +9,7 @@ import numpy as np
 from shared.sheet import Sheet
 
 import cosim
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 SEEDS = (0, 1)
 LOST = 1.0  # [rad]: an angle so far off has lost synchronism

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 import cosim
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.replay import Replay
 from fmu_observer.observers.traction.motor_filter_presets import ROWS
 

@@ -14,7 +14,7 @@ from test_fmus.adaptive import adaptive_fmu, crossings
 
 from cosim import Scenario
 from cosim.balises.plant_error import PlantError
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 STOP = 8.0
 PLACES = (-0.5, 0.1, 0.6)

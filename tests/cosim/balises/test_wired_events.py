@@ -10,7 +10,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import CosimError
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 FIELDS = ("count", "time", "position")
 LAYOUT = {

@@ -119,7 +119,7 @@ def test_a_second_instance_is_refused_before_anything_is_loaded(
     alone = linear_fmu(tmp_path, "alone", **LAG, once_per_process=True)
     copy = tmp_path / "copy.fmu"
     copy.write_bytes(alone.read_bytes())
-    monkeypatch.setattr("cosim.scenario.models.load_fmu", lambda *_: pytest.fail("it was loaded"))
+    monkeypatch.setattr("cosim.run.component_models.load_fmu", lambda *_: pytest.fail("it was loaded"))
     s = cosim.Scenario(stop=1.0, step=0.1).add("first", fmu=str(alone)).add("second", fmu=str(copy))
     with pytest.raises(
         CosimError, match=r"components 'first' and 'second' are the same FMU \(copy.fmu\), which can be .* only once"

@@ -26,7 +26,7 @@ from cosim.calibration.runs import FmuRuns
 from cosim.cli import identify
 from cosim.errors import CosimError
 from cosim.results.load import load_result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.structure.text import when
 from fmus import cached_fmu
 from plant_models import PLANTS

@@ -13,7 +13,7 @@ from cosim import Scenario
 from cosim.errors import CosimError, ScenarioError
 from cosim.results.events_file import write_events
 from cosim.results.result import BaliseRecord
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 FAULTS: dict[str, Any] = {
     "latency": 0.03,

@@ -16,8 +16,8 @@ from cosim import Scenario
 from cosim.coupling.inputs import Inputs
 from cosim.coupling.transformation import Transformation, as_affine
 from cosim.errors import ScenarioError
-from cosim.scenario.connections import parse_connections
-from cosim.scenario.tables import ConnectionTable
+from cosim.run.connections import parse_connections
+from cosim.scenario.scenario_tables import ConnectionTable
 
 NUMBERS = st.integers(-20, 20).map(float)
 

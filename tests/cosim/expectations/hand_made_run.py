@@ -11,7 +11,7 @@ import numpy as np
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations import Judged, judge
 from cosim.results.result import BaliseRecord, Result, SignalInfo
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.scenario.schema import parse_scenario
 
 TIME = np.array([0.0, 1, 2, 3, 4, 5, 5, 6, 7, 8, 9, 10])

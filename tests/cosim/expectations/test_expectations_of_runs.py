@@ -17,8 +17,8 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.components.component import Component
 from cosim.errors import ScenarioError
-from cosim.expectations.check import check_expectations
-from cosim.scenario.models import component_factories
+from cosim.expectations.check_expectations import check_expectations
+from cosim.run.component_models import component_factories
 from cosim.scenario.schema import ScenarioTable
 
 

@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations import Judged
-from cosim.expectations.indicators import first_on
+from cosim.expectations.indicator_levels import first_on
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result, SignalInfo
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 RMS = math.sqrt(0.5 * 0.5**2 + 0.5 * 0.1**2)  # 0.5 m/s for one half of the time, 0.1 m/s for the other
 

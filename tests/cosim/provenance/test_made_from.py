@@ -20,10 +20,10 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.errors import OutputError, ProvenanceError
 from cosim.results.folder import read_results
-from cosim.scenario.made_from import renewed
-from cosim.scenario.manifest import read_manifest
+from cosim.run.made_from import renewed
+from cosim.run.outcome import Outcome
+from cosim.run.results_manifest import read_manifest
 from cosim.scenario.origin import Origin
-from cosim.scenario.outcome import Outcome
 from cosim.scenario.schema import parse_scenario
 
 

@@ -11,7 +11,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.gap_figure import gap_error_figure
 from cosim.report.page.gaps import gaps_table
 from cosim.results.result import BaliseRecord, Result, SignalInfo
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit
 
 SPEED = 20.0  # [m/s]

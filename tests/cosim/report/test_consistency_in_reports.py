@@ -15,7 +15,7 @@ from cosim.report.figures.consistency_figure import NeesPanel, NisPanel, nees_fi
 from cosim.report.page.report import report_page
 from cosim.results.data import SignalInfo
 from cosim.results.result import Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit
 
 COUNT = 2001

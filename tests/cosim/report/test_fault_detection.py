@@ -23,7 +23,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.fault_figure import BoundsPanel, FaultsPanel
 from cosim.report.page.run_tables import faults_table
 from cosim.results.result import BaliseRecord, Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.measures import detection_measures, measure_unit
 
 SPEC = ReportSpec(true_position="train.position", true_fault="wheel.active", observers=["o", "alone"])

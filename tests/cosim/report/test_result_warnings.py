@@ -23,7 +23,7 @@ from cosim.report.overlay.runs import make_runs
 from cosim.report.page.report import report_page
 from cosim.report.page.verdict import verdict_facts
 from cosim.results.result import BaliseRecord, Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures
 
 SPEC = ReportSpec(true_position="train.position", true_speed="train.speed", observers=["obs"])

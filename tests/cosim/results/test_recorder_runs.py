@@ -17,7 +17,7 @@ from cosim.results import recorder as recorder_module
 from cosim.results.folder import read_results
 from cosim.results.result import SignalInfo
 from cosim.results.si import in_si
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from plant_models.hybrid.units import Unit, parse_unit
 
 KEEP_20_ROWS = 0.005  # MB, at some 30 columns

@@ -23,7 +23,7 @@ from cosim.errors import CosimError, ScenarioError
 from cosim.network.chance import Chance
 from cosim.network.settings import NetworkSettings, Node
 from cosim.provenance.rerun import rerun
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.tuning.seeds import drawn, with_seed
 from fmu_observer import OBSERVERS
 from fmus import Batch, cached_fmu

@@ -8,7 +8,7 @@ import pytest
 
 import cosim
 from cosim import Scenario
-from cosim.scenario.conditions import check_conditions
+from cosim.run.conditions import check_conditions
 
 SHIPPED = sorted(path.stem for path in Path(cosim.__file__).parent.joinpath("scenarios").glob("*.toml"))
 

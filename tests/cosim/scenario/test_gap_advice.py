@@ -10,9 +10,9 @@ from small_scenarios import small
 
 from cosim import CosimError, Scenario
 from cosim.balises.layout import InstantLayout, by_positions
-from cosim.scenario.certificates import check_certificates
-from cosim.scenario.gaps import expected_gap
-from cosim.scenario.tables import BalisesTable, ComponentTable
+from cosim.run.certificates import check_certificates
+from cosim.run.expected_gaps import expected_gap
+from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from fmu_observer import OBSERVERS
 
 POSITIONS = [50.0, 150.0, 250.0]

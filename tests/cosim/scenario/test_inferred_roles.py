@@ -10,7 +10,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.report.page.verdict import verdict_facts
-from cosim.scenario.roles import ROLES
+from cosim.run.signal_roles import ROLES
 from cosim.studies.measures import error_measures
 
 ALL = {

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from cosim.components.loading import load_block
-from cosim.scenario import balise_service, certificates
-from cosim.scenario.certificates import check_certificates
-from cosim.scenario.gaps import ExpectedGap
-from cosim.scenario.tables import ComponentTable
+from cosim.run import balise_service, certificates
+from cosim.run.certificates import check_certificates
+from cosim.run.expected_gaps import ExpectedGap
+from cosim.scenario.scenario_tables import ComponentTable
 from fmu_observer import OBSERVERS
 from fmus.check.probe import ProbeReport
 from plant_models import PLANTS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cosim import Scenario
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 
 WINDOW, SQUARES, FILTER = "moving_horizon", "squares", "ekf"
 

@@ -18,8 +18,8 @@ from cosim.errors import CertificateError
 from cosim.network.chance import Chance
 from cosim.network.intervals import BY_ERROR, longest_interval, sends_in_turn
 from cosim.network.settings import NetworkSettings, Node
-from cosim.scenario import certificates
-from cosim.scenario.gaps import ExpectedGap
+from cosim.run import certificates
+from cosim.run.expected_gaps import ExpectedGap
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.sampled import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal

@@ -13,7 +13,7 @@ from test_fmus.typed import expected, typed_fmu
 import cosim
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.folder import read_results
-from cosim.scenario.starts import start_values
+from cosim.run.starts import start_values
 
 FILE = """
 stop = 0.2

@@ -8,8 +8,8 @@ import pytest
 
 import cosim
 from cosim import Scenario
-from cosim.scenario.conditions import left_working_points
-from cosim.scenario.connections import parse_connections
+from cosim.run.conditions import left_working_points
+from cosim.run.connections import parse_connections
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.hybrid import scalar_names

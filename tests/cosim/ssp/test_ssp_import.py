@@ -10,7 +10,7 @@ import pytest
 from ssp_files import UNITS, array_fmu, connector, described_fmu, package, ramp_fmu, real, ssd, ssm, ssv, sum_fmu, wire
 
 from cosim import Scenario
-from cosim.scenario.tables import ConnectionTable
+from cosim.scenario.scenario_tables import ConnectionTable
 
 EXACT = 1e-13
 """A handful of roundings of numbers of size 100."""

@@ -14,7 +14,7 @@ from lxml import etree
 from small_scenarios import small
 
 from cosim import Scenario
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.ssp.document import NAMESPACES
 
 pytestmark = pytest.mark.compiler

@@ -12,7 +12,7 @@ from cosim import Scenario, shipped_scenarios
 from cosim.components import kept_libraries
 from cosim.components.loading import load_fmu
 from cosim.results.result import Result
-from cosim.scenario import models
+from cosim.run import component_models as models
 
 REPEATED = ("freight_profile_b_10_hz", "freight_profile_d", "freight_profile_d_10_hz", "freight_sc3", "freight_sc4")
 """Their components are those of others that are tried."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.replay import Replay, ReplayError
 from fmu_observer.observers.traction.motor_filter_presets import ROWS
 

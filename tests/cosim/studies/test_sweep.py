@@ -15,7 +15,7 @@ from cosim import Scenario
 from cosim.errors import ComparisonError, CosimError, OutputError, RunError, ScenarioError
 from cosim.master.master import Master
 from cosim.results.folder import read_results
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.studies.sampling import uniform
 from cosim.studies.seed_rows import seed_file
 from cosim.studies.seeds import seed_study

@@ -15,7 +15,7 @@ from cosim import Scenario
 from cosim.errors import ScenarioError
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
-from cosim.scenario.outcome import Outcome
+from cosim.run.outcome import Outcome
 from cosim.tuning.costs import LikelihoodCost, make_cost
 from cosim.tuning.evaluation import EARLIER, JOURNAL, Evaluator
 from cosim.tuning.parameters import tunable

@@ -17,12 +17,12 @@ from cosim.coupling.connection import Link
 from cosim.network.intervals import longest_interval, sends_in_turn
 from cosim.network.service import PacketListener
 from cosim.network.settings import NetworkSettings
-from cosim.scenario.balise_service import BALISE_EVENT
-from cosim.scenario.layouts import Layout
-from cosim.scenario.models import make_system, values_in_use
-from cosim.scenario.network import READINGS, ROUNDING, Network, is_wired
+from cosim.run.balise_service import BALISE_EVENT
+from cosim.run.component_models import make_system, values_in_use
+from cosim.run.layouts import Layout
+from cosim.run.network import READINGS, ROUNDING, Network, is_wired
+from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.tables import BalisesTable, ComponentTable
 
 
 @dataclass(frozen=True)

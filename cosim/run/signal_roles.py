@@ -10,8 +10,8 @@ from cosim.components.component import Component
 from cosim.coupling.connection import Connection, split_name
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.evaluation.spec import Phase, ReportSpec
+from cosim.scenario.scenario_tables import BalisesTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.tables import BalisesTable
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 ROLES = {

@@ -8,10 +8,10 @@ from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
 from cosim.coupling.graph import undeclared
-from cosim.scenario.models import make_system, values_in_use
+from cosim.run.component_models import make_system, values_in_use
+from cosim.run.starts import given_values
+from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.starts import given_values
-from cosim.scenario.tables import BalisesTable, ComponentTable
 
 ROUNDING = 1e-9  # of a period over a step
 CARRIED = {

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.balises.layout import InstantLayout, TrackLayout, aperiodic, by_positions, by_spacing, from_csv
 from cosim.balises.recorded import RecordedLayout, read_layout
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.tables import BalisesTable
+from cosim.scenario.scenario_tables import BalisesTable
 
 Layout = TrackLayout | InstantLayout | RecordedLayout
 TOLD_AS_RECORDED = (

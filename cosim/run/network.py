@@ -20,10 +20,10 @@ from cosim.network.outputs import NAME, NetworkOutputs, PacketReader, arrived_na
 from cosim.network.service import Field, NetworkService, PacketListener, ages
 from cosim.network.settings import NetworkSettings
 from cosim.results.data import PacketRecord
-from cosim.scenario.models import make_system, values_in_use
+from cosim.run.component_models import make_system, values_in_use
 from cosim.scenario.network_table import network_settings
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.tables import ComponentTable
 from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON
 
 READINGS = "measured_", "odometer"

@@ -13,7 +13,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged, judged_text
 from cosim.results.folder import write_results
 from cosim.results.result import Result
-from cosim.scenario.made_from import renewed
+from cosim.run.made_from import renewed
 
 if TYPE_CHECKING:
     from cosim.scenario.origin import Origin

@@ -31,9 +31,9 @@ from cosim.network.service import NetworkService
 from cosim.results.data import SignalInfo
 from cosim.results.recorder import Recorder
 from cosim.results.stream import Stream
-from cosim.scenario.roles import switching_signals
+from cosim.run.signal_roles import switching_signals
+from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.tables import MasterTable
 
 
 def make_master(

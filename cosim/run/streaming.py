@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from cosim.errors import OutputError
 from cosim.results.folder import check_writable
-from cosim.scenario.made_from import renewed
+from cosim.run.made_from import renewed
 
 if TYPE_CHECKING:
+    from cosim.run.outcome import Outcome
+    from cosim.run.scenario_run import Streaming
     from cosim.scenario.origin import Origin
-    from cosim.scenario.outcome import Outcome
-    from cosim.scenario.run import Streaming
 
 
 def streaming_to(directory: str | Path, origin: Origin) -> Streaming:

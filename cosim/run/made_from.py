@@ -18,10 +18,10 @@ import tomli_w
 from cosim.errors import OutputError
 from cosim.results.folder import check_writable
 from cosim.results.summary_file import jsonable
-from cosim.scenario.manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
+from cosim.run.results_manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
 from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
-from cosim.scenario.save import plain
+from cosim.scenario.saving import plain
 from fmus.versions import versions
 from plant_models.hybrid.noise import RUN_SEED
 from plant_models.user_file import names_code

@@ -17,16 +17,16 @@ from cosim.coupling.instants import settle_recordings
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.network.outputs import NAME as NETWORK
-from cosim.scenario.backends import intended
-from cosim.scenario.balise_service import find_receivers, watched_plant
-from cosim.scenario.connections import parse_connections
-from cosim.scenario.master import stepping_groups
-from cosim.scenario.models import filter_component, make_system, open_recording, python_component
-from cosim.scenario.movement import movement_chains
-from cosim.scenario.network import Network, connect_over, make_network
+from cosim.run.backends import intended
+from cosim.run.balise_service import find_receivers, watched_plant
+from cosim.run.component_models import filter_component, make_system, open_recording, python_component
+from cosim.run.connections import parse_connections
+from cosim.run.master_setup import stepping_groups
+from cosim.run.movement import movement_chains
+from cosim.run.network import Network, connect_over, make_network
+from cosim.run.starts import given_values
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.starts import given_values
-from cosim.scenario.tables import ComponentTable
 from cosim.structure.inspect import group_index, make_links, make_part, rate_text
 from cosim.structure.structure import Structure
 from cosim.structure.structure_data import Balises, Link, Packets

@@ -14,7 +14,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import FmuLoadError
-from cosim.scenario.tables import Backend, ComponentTable
+from cosim.scenario.scenario_tables import Backend, ComponentTable
 from fmus.cache import CacheEntry, cache_entry
 from fmus.toolchain.compile import CompilerMissing, find_compiler
 from fmus.toolchain.platforms import Platform

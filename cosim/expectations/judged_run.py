@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import given
-from cosim.expectations.window import TimeWindow, window_of
+from cosim.expectations.time_window import TimeWindow, window_of
 from cosim.results.result import Result
 
 

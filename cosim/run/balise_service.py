@@ -18,8 +18,8 @@ from cosim.components.recording import KIND as RECORDING
 from cosim.coupling.connection import SOURCES, split_name
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError, ScenarioError
-from cosim.scenario.layouts import Layout
-from cosim.scenario.tables import BalisesTable
+from cosim.run.layouts import Layout
+from cosim.scenario.scenario_tables import BalisesTable
 from fmus.check.probe import ProbeReport, probe
 from plant_models.disk_cache.entries import keep, recall
 from plant_models.disk_cache.identity import identity

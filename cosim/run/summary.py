@@ -15,8 +15,8 @@ from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
 from cosim.results.result import Result
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
-from cosim.scenario.tables import ComponentTable
 from fmus.versions import versions
 
 MESSAGES_SHOWN = 20

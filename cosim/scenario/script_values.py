@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.scenario.model_name import named, settings_of
 from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file
-from cosim.scenario.save import plain
+from cosim.scenario.saving import plain
 
 
 def given_component(table: Mapping[str, Any]) -> Any:

@@ -25,7 +25,7 @@ from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
 from cosim.evaluation.result_warnings import result_warnings
-from cosim.expectations.check import check_expectations
+from cosim.expectations.check_expectations import check_expectations
 from cosim.expectations.judge import judge
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
@@ -38,31 +38,31 @@ from cosim.process.sentinel import limited_calls
 from cosim.results.result import Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
 from cosim.results.stream import Stream
-from cosim.scenario.after_run import missed_samples, warnings_after
-from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
-from cosim.scenario.balise_summary import all_telegrams, balise_summary
-from cosim.scenario.certificates import check_certificates
-from cosim.scenario.conditions import check_conditions, deaf_receivers, left_working_points, other_plants
-from cosim.scenario.connections import parse_connections
-from cosim.scenario.coupling_warnings import (
+from cosim.run.after_run import missed_samples, warnings_after
+from cosim.run.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
+from cosim.run.balise_summary import all_telegrams, balise_summary
+from cosim.run.certificates import check_certificates
+from cosim.run.component_models import component_factories, protocol_parameters
+from cosim.run.conditions import check_conditions, deaf_receivers, left_working_points, other_plants
+from cosim.run.connections import parse_connections
+from cosim.run.coupling_warnings import (
     coupling_warnings,
     interpolation_note,
     late_telegram_warnings,
     recording_notes,
 )
-from cosim.scenario.gaps import Sources
-from cosim.scenario.instances import check_instances
-from cosim.scenario.layouts import Layout, make_layout
-from cosim.scenario.master import idle_settings, make_master, make_recorder, stepping_groups
-from cosim.scenario.models import component_factories, protocol_parameters
-from cosim.scenario.network import Network, connect_over, make_network, network_summary, network_warnings
-from cosim.scenario.outcome import INTERRUPTED, Outcome
-from cosim.scenario.premises import premise_findings
-from cosim.scenario.roles import check_roles, inferred_roles, report_spec, signals_to_record, with_roles
+from cosim.run.expected_gaps import Sources
+from cosim.run.layouts import Layout, make_layout
+from cosim.run.master_setup import idle_settings, make_master, make_recorder, stepping_groups
+from cosim.run.network import Network, connect_over, make_network, network_summary, network_warnings
+from cosim.run.once_per_process import check_instances
+from cosim.run.outcome import INTERRUPTED, Outcome
+from cosim.run.premises import premise_findings
+from cosim.run.run_seeds import component_seed, with_seeds
+from cosim.run.signal_roles import check_roles, inferred_roles, report_spec, signals_to_record, with_roles
+from cosim.run.starts import start_values
+from cosim.run.summary import first_summary, judged_summary, run_summary
 from cosim.scenario.schema import ScenarioTable, step_count
-from cosim.scenario.seeds import component_seed, with_seeds
-from cosim.scenario.starts import start_values
-from cosim.scenario.summary import first_summary, judged_summary, run_summary
 from cosim.structure.divergence import explained_failure
 from fmus.fmi.capabilities import tool_warning
 from fmus.fmi.sense import doubled_names

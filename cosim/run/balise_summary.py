@@ -9,7 +9,7 @@ from typing import Any
 
 from cosim.balises.service import BaliseService
 from cosim.results.result import BaliseRecord
-from cosim.scenario.balise_service import Choice
+from cosim.run.balise_service import Choice
 
 
 def all_telegrams(service: BaliseService) -> list[BaliseRecord]:

@@ -7,10 +7,10 @@ from typing import Any
 
 from cosim.coupling.connection import Link
 from cosim.errors import CertificateError
-from cosim.scenario.balise_service import BALISE_EVENT
-from cosim.scenario.models import given_parameters, make_system, values_in_use
-from cosim.scenario.network import is_wired
-from cosim.scenario.tables import ComponentTable
+from cosim.run.balise_service import BALISE_EVENT
+from cosim.run.component_models import given_parameters, make_system, values_in_use
+from cosim.run.network import is_wired
+from cosim.scenario.scenario_tables import ComponentTable
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
 
@@ -126,7 +126,7 @@ def other_plants(components: Mapping[str, ComponentTable], where: str) -> list[s
 def _known_doubts(name: str, table: ComponentTable, system: Any) -> list[str]:
     """What `_doubts` says, from the cache where it was asked before."""
     asked = name, system, table.preset, given_parameters(table, system)
-    key = identity(asked, code=("fmu_observer", "cosim/scenario/conditions.py"))
+    key = identity(asked, code=("fmu_observer", "cosim/run/conditions.py"))
     return remembered("condition", key, lambda: _doubts(table, system))  # type: ignore[no-any-return]
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from cosim.coupling.connection import Connection
-from cosim.scenario.models import make_system, values_in_use
-from cosim.scenario.tables import ComponentTable
+from cosim.run.component_models import make_system, values_in_use
+from cosim.scenario.scenario_tables import ComponentTable
 
 COUNT, TIME = "premise_violations", "premise_outside_time"
 ADVICE = (

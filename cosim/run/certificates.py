@@ -8,9 +8,9 @@ from math import inf
 from typing import Any
 
 from cosim.errors import CertificateError
-from cosim.scenario.gaps import ExpectedGap
-from cosim.scenario.models import given_parameters, make_system, values_in_use
-from cosim.scenario.tables import ComponentTable
+from cosim.run.component_models import given_parameters, make_system, values_in_use
+from cosim.run.expected_gaps import ExpectedGap
+from cosim.scenario.scenario_tables import ComponentTable
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
 
@@ -64,7 +64,7 @@ def check_certificates(
 def _known_judgement(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> Sequence[Any]:
     """What `_judge` says, from the cache where it was asked before."""
     asked = name, system, table.preset, given_parameters(table, system), astuple(gap)
-    key = identity(asked, code=("fmu_observer", "cosim/scenario/certificates.py"))
+    key = identity(asked, code=("fmu_observer", "cosim/run/certificates.py"))
     return remembered("certificate", key, lambda: _judge(name, table, system, gap))  # type: ignore[no-any-return]
 
 

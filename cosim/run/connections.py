@@ -8,7 +8,7 @@ from cosim.coupling.connection import Link
 from cosim.coupling.transformation import Transformation
 from cosim.errors import ScenarioError
 from cosim.scenario.merging import BETWEEN_TARGETS
-from cosim.scenario.tables import ConnectionTable
+from cosim.scenario.scenario_tables import ConnectionTable
 
 
 def parse_connections(items: Iterable[str | ConnectionTable], where: str) -> list[Link]:

@@ -19,9 +19,9 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.backends import FAULTS, Request, Tell, cannot_build, realise
+from cosim.run.backends import FAULTS, Request, Tell, cannot_build, realise
 from cosim.scenario.model_name import ModelName
-from cosim.scenario.tables import Backend, ComponentTable
+from cosim.scenario.scenario_tables import Backend, ComponentTable
 from fmu_observer.event_protocol import EventProtocol
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import HybridSystem
