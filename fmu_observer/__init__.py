@@ -16,11 +16,15 @@ if TYPE_CHECKING:
 
 ROOMS = (
     "fmu_observer.observers.train",
-    "fmu_observer.observers.sampled",
-    "fmu_observer.observers.continuous",
-    "fmu_observer.observers.discrete",
-    "fmu_observer.observers.traction",
-    "fmu_observer.observers.signature",
+    "fmu_observer.observers.generic.continuous",
+    "fmu_observer.observers.generic.discrete",
+    "fmu_observer.observers.generic.sampled",
+    "fmu_observer.observers.generic.adaptive",
+    "fmu_observer.observers.generic.delayed",
+    "fmu_observer.observers.generic.differentiators",
+    "fmu_observer.observers.generic.signature",
+    "fmu_observer.observers.motors",
+    "fmu_observer.observers.exhibits",
     "fmu_observer.detection",
 )
 

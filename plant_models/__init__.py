@@ -26,8 +26,8 @@ ROOMS = (
     "plant_models.railway.network",
     "plant_models.railway.control",
     "plant_models.signals",
-    "plant_models.benchmarks",
-    "plant_models.benchmarks.wind_turbine",
+    "plant_models.exhibits",
+    "plant_models.exhibits.wind_turbine",
 )
 SYSTEM = "plant_models.hybrid.system:HybridSystem"
 

@@ -12,7 +12,7 @@ from cosim.cli.model_info import declared_model, in_own_words
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import CosimError
 from cosim.results.summary_file import jsonable
-from fmu_observer.bounds import ErrorBounds, bound_data, bound_text
+from fmu_observer.certificates.bounds import ErrorBounds, bound_data, bound_text
 
 KEPT, EXCEEDED = 0, 1
 KINDS = ("carried", "exact")

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import ScenarioError
-from fmu_observer.filtering.consistency import Consistency, judge
-from fmu_observer.filtering.kalman import integrated_noise
-from fmu_observer.filtering.smoothing import extended_pass, smooth
+from fmu_observer.formulas.filtering.consistency import Consistency, judge
+from fmu_observer.formulas.filtering.kalman import integrated_noise
+from fmu_observer.formulas.filtering.smoothing import extended_pass, smooth
 
 JERK = 0.1  # spectral density of the train's jerk [m2/s5] [ours]
 SCALE = 0.02  # how far the odometer's wheel radius may be off, relative [1] [ours]

@@ -1,5 +1,5 @@
 """What a filter believes, and what moves it: prediction and correction with an FMU as the model. Formulas come from
-`fmu_observer.filtering`.
+`fmu_observer.formulas.filtering`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from scipy.linalg.lapack import dpotrf
 from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.linearise import right_slopes
 from cosim.fmu_model.sealed import SealedModel
-from fmu_observer.filtering import kalman, unscented
-from fmu_observer.filtering.square_root import factor
+from fmu_observer.formulas.filtering import kalman, unscented
+from fmu_observer.formulas.filtering.square_root import factor
 
 Array = NDArray[np.float64]
 SHARE = 1e-4

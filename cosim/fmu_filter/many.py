@@ -1,5 +1,5 @@
 """Filters of many members over an FMU: an ensemble whose states are moved, and particles whose saved states are only
-selected. Formulas come from `fmu_observer.filtering`.
+selected. Formulas come from `fmu_observer.formulas.filtering`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cosim.fmu_filter.belief import FmuBelief, FmuFilter, Noises
 from cosim.fmu_model.sealed import SealedModel
-from fmu_observer.filtering import ensemble, particles
+from fmu_observer.formulas.filtering import ensemble, particles
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.optimisers.search_space import SearchSpace
+from fmu_observer.design.optimisers.search_space import SearchSpace
 
 STEP = 0.1  # relative, of a parameter that is not zero; of its range, of one that may be
 NOTHING = 1e-6  # of the largest change: such a parameter changes nothing

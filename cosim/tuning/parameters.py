@@ -15,7 +15,7 @@ from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.run.scenario_structure import describe_component
 from cosim.scenario.override import COMPONENT_KEYS, INNER, TABLES
 from cosim.simulation.scenario import Scenario
-from fmu_observer.optimisers.search_space import Bounded, SearchSpace
+from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
 
 ENTRY = re.compile(r"(.+)\[(\d+)(?:,(\d+))?\]")
 Bounds = tuple[float, float] | tuple[float, float, bool] | Bounded

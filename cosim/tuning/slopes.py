@@ -12,8 +12,8 @@ from cosim.studies.replay import Replay
 from cosim.tuning.costs import Cost, LikelihoodCost
 from cosim.tuning.parameters import Tunable
 from cosim.tuning.replays import Replays
-from fmu_observer.optimisers.search_space import SearchSpace
-from fmu_observer.tuning.likelihood import LIKELIHOOD, AccumulatedOutput
+from fmu_observer.design.likelihood import LIKELIHOOD, AccumulatedOutput
+from fmu_observer.design.optimisers.search_space import SearchSpace
 from plant_models.hybrid import PeriodicEvent
 
 Array = np.ndarray

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from fmu_observer import OBSERVERS
-from fmu_observer.bounds import improved_dmo_bound
+from fmu_observer.certificates.bounds import improved_dmo_bound
 from fmus import Batch
 
 PIECE = 0.05  # [s]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fmu_observer.bounds import improved_dmo_bound
+from fmu_observer.certificates.bounds import improved_dmo_bound
 from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver
 from plant_models.hybrid import Runtime, scalar_names
 

@@ -20,12 +20,12 @@ from cosim import Outcome, Scenario
 from cosim.evaluation.balise_gaps import gap_errors, largest, root_mean_square
 from cosim.evaluation.numbers import error_number, number
 from cosim.observer_benchmark.observers import benchmark_observers
-from fmu_observer.filtering.square_root import factor
+from fmu_observer.formulas.filtering.square_root import factor
+from fmu_observer.formulas.moving_horizon.real_time_iteration import TOLD, WINDOW_MEMORY, Iterated
+from fmu_observer.formulas.moving_horizon.robust_loss import SCALES
 from fmu_observer.models.filter_model import FilterModel, Known
-from fmu_observer.moving_horizon.real_time_iteration import TOLD, WINDOW_MEMORY, Iterated
-from fmu_observer.moving_horizon.robust_loss import SCALES
-from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon
+from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, _moved, _seen
 from fmu_observer.observers.train.balise_odometer_ekf import ORDER, TUNABLE
 from plant_models.hybrid import input_signal, state, vector

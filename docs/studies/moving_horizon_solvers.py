@@ -19,12 +19,12 @@ import numpy as np
 import scipy.optimize
 import scipy.sparse
 
-from fmu_observer.filtering.square_root import factor
-from fmu_observer.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
-from fmu_observer.moving_horizon.full_solver import Effort, FullSolution, FullSolver
-from fmu_observer.moving_horizon.gauss_newton import passed
-from fmu_observer.moving_horizon.window import WindowRow
-from fmu_observer.moving_horizon.window_program import Programme, WindowProgram
+from fmu_observer.formulas.filtering.square_root import factor
+from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
+from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolution, FullSolver
+from fmu_observer.formulas.moving_horizon.gauss_newton import passed
+from fmu_observer.formulas.moving_horizon.window import WindowRow
+from fmu_observer.formulas.moving_horizon.window_program import Programme, WindowProgram
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, Shared
 
 PAGE = Path(__file__).parents[1] / "moving_horizon.md"

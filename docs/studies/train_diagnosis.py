@@ -33,7 +33,13 @@ from turned_faults import NONE, Error
 
 from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_isolation import FAULTS
-from fmu_observer.diagnosis.thresholds import alarm_rate, checked, count_alarms, proportion_interval, rate_threshold
+from fmu_observer.formulas.diagnosis.thresholds import (
+    alarm_rate,
+    checked,
+    count_alarms,
+    proportion_interval,
+    rate_threshold,
+)
 
 PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
 PER_HOUR = 0.05  # alarms that each residual may raise [1/h]

@@ -23,7 +23,7 @@ from turned_faults import Error
 
 from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_isolation import FAULTS
-from fmu_observer.diagnosis.thresholds import alarm_rate, count_alarms, rate_threshold
+from fmu_observer.formulas.diagnosis.thresholds import alarm_rate, count_alarms, rate_threshold
 
 PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
 DRY = (Journey(33.0, 800.0, 0.4, 0.35, mass=1.01), Journey(48.0, 1150.0, 0.4, grade=0.0005))

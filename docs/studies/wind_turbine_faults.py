@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from wind_turbine_loop import ALARM_NAMES, DIAGNOSIS, INTERVALS, PEAKS, SPEED_SENSORS, Outcome, run_members
 
-from fmu_observer.diagnosis.thresholds import alarm_rate, proportion_interval
+from fmu_observer.formulas.diagnosis.thresholds import alarm_rate, proportion_interval
 
 PAGE = Path(__file__).resolve().parents[1] / "wind_turbine.md"
 STOP = 4400.0  # [s]

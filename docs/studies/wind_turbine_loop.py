@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 import fmus
-from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
-from plant_models.benchmarks.wind_turbine import Wind, WindTurbine, WindTurbineController
+from fmu_observer.observers.exhibits.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
+from plant_models.exhibits.wind_turbine import Wind, WindTurbine, WindTurbineController
 from plant_models.hybrid import HybridSystem, PeriodicEvent, memory, output_signal, parameter, vector
 from plant_models.hybrid.signal import Signal
 from plant_models.hybrid.state_layout import StateLayout

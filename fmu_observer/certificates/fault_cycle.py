@@ -13,7 +13,7 @@ from math import isfinite, log
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.matrix_exponential import small_exponential
 
 SCAN_POINTS = 300  # over seven decades of time
 THIRDS = 60

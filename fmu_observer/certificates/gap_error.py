@@ -13,7 +13,7 @@ from math import inf
 
 import numpy as np
 
-from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.matrix_exponential import small_exponential
 
 SCAN_POINTS = 4000
 DECADES, DECADE_POINTS = (1000.0, 100.0, 10.0), 400  # parts of the horizon that are scanned finer before it

@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix_powers
+from fmu_observer.certificates.matrix_exponential import small_exponential
 
 NEGLIGIBLE = 1e-12  # relative: a smaller pivot of the reset is rounding
 

@@ -10,9 +10,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import GapError, matrix_powers
 from fmu_observer.certificates.impulsive_error import Rows, rows_of
+from fmu_observer.certificates.matrix_exponential import small_exponential
 
 DOUBLINGS = 40
 SETTLED = 1e-12  # relative change of a doubling step

@@ -15,7 +15,7 @@ import scipy
 
 from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
     common_quadratic_form,

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.certificates.decaying_error import DecayingError
-from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.decaying_innovation_error import DecayingError
 from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix_powers
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.certificates.matrix_exponential import small_exponential
 
 POINTS = 300  # of the quadrature over the longest gap
 QUADRATURE = 1.01  # on what the trapezoidal rule finds: a hundred times its error where a rate acts ten times in a gap

@@ -12,8 +12,9 @@ from math import inf, isfinite, sqrt
 import numpy as np
 import scipy
 
-from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
-from fmu_observer.certificates.aperiodic import aperiodic_limit
+from fmu_observer.certificates.aperiodic import aperiodic_limit, certify_sampled_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sampled_error import SampledError
 
 ORDER = 4
 # [ours] real, geometric mean -1; unequal ones bear longer gaps than four equal ones

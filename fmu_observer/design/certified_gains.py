@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from fmu_observer.certificates import Certificate
+from fmu_observer.certificates.certificate import Certificate
 
 Gains = dict[str, float]
 

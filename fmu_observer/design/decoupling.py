@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.condition import Condition
+from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.suitability import require_unknown_inputs

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import matrix_powers
+from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.detection.jam_rules import doubt_limit, settled_limit
 
 NEGLIGIBLE, LONGEST = 1e-9, 5000  # of what is left of an error; periods until then at most

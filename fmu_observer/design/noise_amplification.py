@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from fmu_observer.certificates import SampledError
+from fmu_observer.certificates.sampled_error import SampledError
 
 POINTS = 16  # of time in a gap at which the error is judged
 

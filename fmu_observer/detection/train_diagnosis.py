@@ -30,7 +30,7 @@ from fmu_observer.detection.train_verdict import (
     stuck_sensors,
     wheels,
 )
-from fmu_observer.diagnosis.isolation_table import largest
+from fmu_observer.formulas.diagnosis.isolation_table import largest
 from plant_models.hybrid import HybridSystem, vector
 from plant_models.hybrid.event import IGNORED, USED
 from plant_models.hybrid.option import require_whole

@@ -1,6 +1,6 @@
 """How much of the traction and of the brake reaches the train: window inversion on the train as one point.
 
-Pure functions that trace; the formulas of the inversion are those of `fmu_observer.diagnosis`.
+Pure functions that trace; the formulas of the inversion are those of `fmu_observer.formulas.diagnosis`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.diagnosis.window_inversion import Inverted, grid_around, invert, smoothed
+from fmu_observer.formulas.diagnosis.window_inversion import Inverted, grid_around, invert, smoothed
 from plant_models.hybrid.scan import Arrays, enclosed, scan
 from plant_models.hybrid.system import Array, vector
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fmu_observer.diagnosis.isolation_table import IsolationTable
+from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable
 
 NONE, SUSPECTED, WHEEL, SENSOR, STUCK, LOSS = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 """Fault codes: none; detected and not isolated; the wheel slips or jams; the reading is wrong; it stands still; an

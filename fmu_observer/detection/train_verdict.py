@@ -23,8 +23,8 @@ from fmu_observer.detection.train_isolation import (
     WHEEL,
 )
 from fmu_observer.detection.train_residuals import Readings, tolerance
-from fmu_observer.diagnosis.isolation_table import IsolationTable, IsolationVerdict, largest
-from fmu_observer.diagnosis.windowed_residual import Alarm, judge
+from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable, IsolationVerdict, largest
+from fmu_observer.formulas.diagnosis.windowed_residual import Alarm, judge
 from plant_models.hybrid.system import Array, vector
 
 GROUPS = (MOTION, BRAKE, TRACTION)

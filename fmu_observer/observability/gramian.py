@@ -11,7 +11,7 @@ from math import ceil, log2
 
 import numpy as np
 
-from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import (
     ROUNDING,

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.condition import Condition
+from fmu_observer.certificates.condition import Condition
 from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values

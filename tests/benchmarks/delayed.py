@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 
-from fmu_observer.observers.sampled import DelayedStateObserver
+from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from fmus import Batch
 
 STEPS = 100_000

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import polytope_stability
+from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.augmented_gains import design_for_gap, position_gains
 from fmu_observer.design.decoupling import decoupled_gain
 from fmu_observer.design.extended_disturbance import extended_gain
@@ -26,7 +26,7 @@ from fmu_observer.design.takagi_sugeno_luenberger import designed_gains
 from fmu_observer.design.theorem7 import design_theorem7, largest_eta
 from fmu_observer.design.uio_design import UioCovariances, uio_gains
 from fmu_observer.models import coupled_vehicles, find_takagi_sugeno_model
-from fmu_observer.tuning.gap_aware import design_adaptive, design_high_gain, design_takagi_sugeno
+from fmu_observer.observers.train.gains.gap_aware import design_adaptive, design_high_gain, design_takagi_sugeno
 
 REPETITIONS = 5
 TRACK: dict[str, Any] = {"spacing": 100.0, "speeds": (5.0, 14.0)}

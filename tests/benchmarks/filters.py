@@ -18,10 +18,10 @@ import numpy as np
 
 from cosim.fmu_filter.component import FmuFilterModel
 from cosim.fmu_filter.settings import FilterTable
-from fmu_observer.observers.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
-from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
-from fmu_observer.observers.discrete.particle_filter import ParticleFilter
-from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
+from fmu_observer.observers.generic.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
+from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
+from fmu_observer.observers.generic.discrete.particle_filter import ParticleFilter
+from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.train.balise_odometer_ekf import ODOMETER_ROW, BaliseOdometerEkf, transition
 from fmus import Batch, cached_fmu
 from plant_models import PLANTS

@@ -13,7 +13,7 @@ import time
 import numpy as np
 import scipy
 
-from fmu_observer.observers.signature import ReactionSignature
+from fmu_observer.observers.exhibits import ReactionSignature
 from fmus import Batch
 
 MEMBERS, PERIOD, TRUE = 200, 0.1, np.array([2.5, 0.5, 0.15])

@@ -17,10 +17,10 @@ from observer_bench import SteadyMotion
 from scipy.integrate import solve_ivp
 
 from fmu_observer import OBSERVERS
+from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
+from fmu_observer.observers.generic.differentiators.signal_differentiator import SignalDifferentiator
+from fmu_observer.observers.generic.sampled import GeneralTakagiSugenoCdo
 from fmu_observer.observers.model_observer import ModelObserver
-from fmu_observer.observers.sampled import GeneralTakagiSugenoCdo
-from fmu_observer.observers.sampled.adaptive_observer import AdaptiveObserver
-from fmu_observer.observers.signal_differentiator import SignalDifferentiator
 from fmu_observer.observers.train import TrainObserver
 from plant_models.hybrid import HybridSystem, Runtime, Signal, scalar_names
 

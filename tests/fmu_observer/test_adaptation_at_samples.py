@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fmu_observer.observers.adaptation_at_samples import (
+from fmu_observer.formulas.adaptation.adaptation_at_samples import (
     AtSample,
     Since,
     constants_now,
@@ -18,7 +18,7 @@ from fmu_observer.observers.adaptation_at_samples import (
     since_flow,
     state_covariance,
 )
-from fmu_observer.observers.adaptive_law import Adaptation, Plant, Sizes, error_drift, gains_of
+from fmu_observer.formulas.adaptation.adaptive_law import Adaptation, Plant, Sizes, error_drift, gains_of
 
 SIZES = Sizes(2, 3, 2, sampled=True)
 A, C = np.array([[0.0, 1.0], [-0.2, -0.1]]), np.array([[0.5, 0.0], [0.1, 1.0]])

@@ -9,11 +9,11 @@ import pytest
 from adaptive_runs import Samples, motion
 from scipy.integrate import solve_ivp
 
-from fmu_observer.design.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
+from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
+from fmu_observer.formulas.adaptation.adaptive_law import smallest_eigenvalue, told_excitation
 from fmu_observer.models import find_state_affine_model
-from fmu_observer.observers.adaptive_certificate import errors_left
-from fmu_observer.observers.adaptive_law import smallest_eigenvalue, told_excitation
-from fmu_observer.observers.sampled import AdaptiveHold, AdaptivePredictor
+from fmu_observer.observers.generic.adaptive import AdaptiveHold, AdaptivePredictor
+from fmu_observer.observers.generic.adaptive.adaptive_certificate import errors_left
 from plant_models.hybrid import state
 
 PERIODS = {"adaptive_predictor": 0.1, "adaptive_hold": 0.09}

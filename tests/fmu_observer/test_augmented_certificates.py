@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from fmu_observer.certificates import first_unstable_gap
 from fmu_observer.certificates.aperiodic import aperiodic_limit
+from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.design.augmented_gains import (
     UNIT_POLES,
     augmented_matrix,

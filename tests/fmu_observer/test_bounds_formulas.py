@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from fmu_observer.bounds import (
+from fmu_observer.certificates.bounds import (
     cdo_bound,
     comparison_bound,
     dmo_bound,
@@ -24,7 +24,14 @@ from fmu_observer.bounds import (
     printed_cdo_bound,
     worst_case,
 )
-from fmu_observer.bounds.carried import decay_proven, first_component, level, level_of_box, packed, unpacked
+from fmu_observer.certificates.bounds.carried import (
+    decay_proven,
+    first_component,
+    level,
+    level_of_box,
+    packed,
+    unpacked,
+)
 
 SET_D_GAIN = np.array([3.4, -3.4, -1.5])
 PRINTED_NORM = 5.0407  # of [3.4 + w1, -3.4, -1.5], as the independent implementation has it

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.design.bounds import (
+from fmu_observer.certificates.printed_bounds.sampled_bounds import (
     bound_table,
     bound_text,
     gain_matrix,

@@ -9,17 +9,19 @@ from hypothesis import strategies as st
 from sampled_bench import SampledBench, chain, true_motion
 from scipy.linalg import expm, solve_discrete_are
 
-from fmu_observer.certificates import ImpulsiveError, RiccatiError, SampledError, certify_sampled_error
-from fmu_observer.certificates.impulsive_error import row_echelon
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.impulsive_error import ImpulsiveError, row_echelon
+from fmu_observer.certificates.riccati_error import RiccatiError
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
-from fmu_observer.observers.sampled import (
+from fmu_observer.observers.generic.sampled import (
     ExponentialGain,
     HeldInnovation,
     HybridImpulsive,
     MultirateSylvester,
     OutputPredictor,
 )
-from fmu_observer.observers.sampled.hybrid_impulsive import hybrid_gains
+from fmu_observer.observers.generic.sampled.hybrid_impulsive import hybrid_gains
 
 BISECTION = 5e-4  # relative: twice the tolerance of the search for the aperiodic limit, and the grid of the check
 SHIFT = np.array([[0.0, 1.0], [0.0, 0.0]])

@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu_observer.certificates import SampledError, certify_sampled_error, first_unstable_gap
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo
 
 READING = 0.01  # relative: the independent measurement is given to two or three digits

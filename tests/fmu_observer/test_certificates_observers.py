@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from observer_bench import TRAIN_OBSERVERS
 
-from fmu_observer.certificates import Certificate, TwoRateError, certify_two_rate_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, TakagiSugenoCdo, TrainObserver
 
 

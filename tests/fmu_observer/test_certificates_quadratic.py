@@ -8,16 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from fmu_observer.certificates import (
-    QuadraticForm,
-    SampledError,
-    aperiodic,
-    certify_sampled_error,
-    common_quadratic_form,
-    decrease,
-)
-from fmu_observer.certificates.exponential import small_exponential
-from fmu_observer.certificates.quadratic import transition_condition
+from fmu_observer.certificates import aperiodic
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.matrix_exponential import small_exponential
+from fmu_observer.certificates.quadratic import QuadraticForm, common_quadratic_form, decrease, transition_condition
+from fmu_observer.certificates.sampled_error import SampledError
 
 MODEL = SampledError.of([[0.0, 1.0], [0.0, -0.01]], (16.0, 64.0), 16.0)
 

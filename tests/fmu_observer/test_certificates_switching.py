@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates import ImpulsiveError, SampledError, certify_sampled_error
-from fmu_observer.certificates.aperiodic import MARGIN, common_decrease
+from fmu_observer.certificates.aperiodic import MARGIN, certify_sampled_error, common_decrease
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.riccati_error import RiccatiError
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.switching import SwitchingError
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo

@@ -11,15 +11,17 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
-from fmu_observer.certificates import ImpulsiveError, SampledError, certify_sampled_error
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.model import shift_matrix
 from fmu_observer.observability import MeasuredSystem, SamplePattern, observability
-from fmu_observer.observers.continuous import HighGain, Thau
-from fmu_observer.observers.discrete import ExtendedLuenberger
-from fmu_observer.observers.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, RiccatiHighGain
+from fmu_observer.observers.generic.continuous import HighGain, Thau
+from fmu_observer.observers.generic.discrete import ExtendedLuenberger
+from fmu_observer.observers.generic.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, RiccatiHighGain
 from fmu_observer.observers.train import AdaptiveGainCdo
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array

@@ -15,17 +15,17 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 from fmu_observer.block import make_block
-from fmu_observer.certificates import certify_sampled_error, decaying_error, first_unstable_gap
-from fmu_observer.certificates.aperiodic import common_decrease
-from fmu_observer.certificates.decaying_error import DecayingError
+from fmu_observer.certificates.aperiodic import certify_sampled_error, common_decrease
+from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
 from fmu_observer.certificates.switching import SwitchingError
-from fmu_observer.design.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
+from fmu_observer.formulas.correction.innovation_decay import innovation_left
 from fmu_observer.models import find_model, tanh_system
 from fmu_observer.models.model import shift_matrix
-from fmu_observer.observers.innovation_decay import innovation_left
-from fmu_observer.observers.sampled import DecayingInnovation, DynamicHighGain, ExponentialGain, HeldInnovation
+from fmu_observer.observers.generic.sampled import DecayingInnovation, DynamicHighGain, ExponentialGain, HeldInnovation
 from fmu_observer.observers.train import AdaptiveGainCdo, DecayingInnovationCdo, DynamicGainCdo
-from plant_models.benchmarks import TanhSystem
+from plant_models.exhibits import TanhSystem
 from plant_models.hybrid import Runtime, scalar_names
 
 EXPONENTS = (0.0, 0.25, 0.5, 1.0)

@@ -11,17 +11,17 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from fmu_observer.design.network_bounds import (
+from fmu_observer.certificates.printed_bounds.network_bounds import (
     NetworkBounds,
     cycle_radius,
     exact_predictor_delay,
     largest_gain,
 )
+from fmu_observer.formulas.delay.delay_memory import at_age, integral_weights, weighted
 from fmu_observer.models import find_model
-from fmu_observer.observers.delay_memory import at_age, integral_weights, weighted
-from fmu_observer.observers.sampled.delayed_state_observer import DelayedStateObserver
-from fmu_observer.observers.sampled.output_predictor import OutputPredictor
-from plant_models.benchmarks.flexible_joint_arm import FlexibleJointArm
+from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
+from fmu_observer.observers.generic.sampled.output_predictor import OutputPredictor
+from plant_models.exhibits.flexible_joint_arm import FlexibleJointArm
 from plant_models.hybrid import Runtime, scalar_names
 
 ARM = "flexible_joint_arm"

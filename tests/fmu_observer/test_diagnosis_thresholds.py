@@ -8,8 +8,8 @@ import pytest
 import scipy
 
 from fmu_observer.detection import TrainDiagnosis
-from fmu_observer.diagnosis.finite_window_observer import finite_window_observer, sampled
-from fmu_observer.diagnosis.thresholds import (
+from fmu_observer.formulas.diagnosis.finite_window_observer import finite_window_observer, sampled
+from fmu_observer.formulas.diagnosis.thresholds import (
     alarm_rate,
     checked,
     count_alarms,

@@ -17,8 +17,8 @@ from observer_bench import SteadyMotion
 from situations import Follower, Situation, observers
 
 from fmu_observer import OBSERVERS
+from fmu_observer.observers.motors.motor_filter import MotorFilter
 from fmu_observer.observers.parameter_values import parameter_values
-from fmu_observer.observers.traction.motor_filter import MotorFilter
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 MADE: dict[str, HybridSystem] = {name: OBSERVERS[name]() for name in OBSERVERS}
@@ -29,7 +29,8 @@ MODELS = [case for case in CASES if case[0] in KNOWN and case not in TRAINS]
 MOTORS = [case for case in CASES if isinstance(MADE[case[0]], MotorFilter)]
 NOTHING_CARRIED = {
     "detection": "says what is wrong, and estimates no motion that could be lost",
-    "observers.signature": "inverts each window anew by a table; its tests follow its plant with every preset",
+    "observers.exhibits": "inverts each window anew by a table; its tests follow its plant with every preset",
+    "observers.generic.signature": "reads a window anew at each sample; its tests follow its signal",
 }
 LONGEST, DURATION = 20.0, 60.0  # between balises; of a run behind the first of them [s]
 SPEED_LEFT, WAY_LEFT = 0.1, 1.0

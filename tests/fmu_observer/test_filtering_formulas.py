@@ -1,4 +1,4 @@
-"""The formulas of `fmu_observer.filtering`, against one another, filterpy, and the printed sums with their weights."""
+"""The formulas of Kalman filters, against one another, filterpy, and the printed sums with their weights."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy
 
-from fmu_observer.filtering import kalman, square_root, unscented
+from fmu_observer.formulas.filtering import kalman, square_root, unscented
 
 SX = ca.ArrayInterface.SX
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fmu_observer.block import make_block
-from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon, FullMovingHorizonObserver
+from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
 from fmu_observer.observers.train.balise_odometer_ekf import BaliseOdometerEkf
 from plant_models.hybrid import Runtime, scalar_names

@@ -14,11 +14,11 @@ from observer_bench import SteadyMotion, in_step
 from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates import SampledError
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import rounded_down
 from fmu_observer.design.noise_amplification import noise_amplification
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver
-from fmu_observer.tuning.gap_aware import (
+from fmu_observer.observers.train.gains.gap_aware import (
     GainDesign,
     balise_gaps,
     design_adaptive,

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.observers.continuous import FilteringDifferentiator, LevantDifferentiator
-from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS
-from fmu_observer.observers.signal_differentiator import SignalDifferentiator
+from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
+from fmu_observer.observers.generic.differentiators import FilteringDifferentiator, LevantDifferentiator
+from fmu_observer.observers.generic.differentiators.signal_differentiator import SignalDifferentiator
 from plant_models.hybrid import Runtime
 from plant_models.hybrid.units import parse_unit
 

@@ -10,13 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from fmu_observer.design.high_gain_theta import binomial_gain, lyapunov_size, theta_from_lipschitz, theta_from_slopes
+from fmu_observer.certificates.printed_bounds.high_gain_theta import (
+    binomial_gain,
+    lyapunov_size,
+    theta_from_lipschitz,
+    theta_from_slopes,
+)
+from fmu_observer.certificates.thau import best_thau_bound, thau_bound
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.design.scaled_slopes import scaled
-from fmu_observer.design.thau import best_thau_bound, thau_bound
 from fmu_observer.models import linear_pendulum, pendulum
+from fmu_observer.models.scaled_slopes import scaled
 from fmu_observer.observability import UnobservableError
-from fmu_observer.observers.continuous import HighGain, Luenberger, Thau
+from fmu_observer.observers.generic.continuous import HighGain, Luenberger, Thau
 from plant_models.hybrid import input_signal, vector
 
 CHAIN = np.diag(np.ones(1), 1)

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from fmu_observer.design.takagi_sugeno_luenberger import designed_gains, placed_gains, vertex_decrease, vertex_errors
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.observability import UnobservableError
-from fmu_observer.observers.continuous import TakagiSugenoLuenberger
+from fmu_observer.observers.generic.continuous import TakagiSugenoLuenberger
 
 POLES = np.array([-2.0, -2.5])
 

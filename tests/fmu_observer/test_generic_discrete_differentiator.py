@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
-from fmu_observer.observers.discrete import ImplicitDifferentiator
-from fmu_observer.observers.discrete import implicit_recursion as module
-from fmu_observer.observers.discrete.implicit_recursion import (
+from fmu_observer.formulas.differentiation import implicit_recursion as module
+from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
+from fmu_observer.formulas.differentiation.implicit_recursion import (
     equation_coefficients,
     implicit_step,
     solve_first_filter_equation,
 )
+from fmu_observer.observers.generic.differentiators import ImplicitDifferentiator
 from plant_models.hybrid import Runtime
 
 Signal = Callable[[Any], Any]

@@ -10,12 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from fmu_observer.design.discrete_bounds import centre_of, circle_distance, transition_lipschitz
-from fmu_observer.design.scaled_slopes import powers, scaled
+from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, circle_distance, transition_lipschitz
 from fmu_observer.models import find_model, freight_train, linear_pendulum, pendulum
 from fmu_observer.models.discretisation import transition, zero_order_hold
+from fmu_observer.models.scaled_slopes import powers, scaled
 from fmu_observer.observability import UnobservableError
-from fmu_observer.observers.discrete import DiscreteLuenberger, ExtendedKalmanFilter, ExtendedLuenberger, KalmanFilter
+from fmu_observer.observers.generic.discrete import (
+    DiscreteLuenberger,
+    ExtendedKalmanFilter,
+    ExtendedLuenberger,
+    KalmanFilter,
+)
 from plant_models.hybrid import vector
 
 T, COUNT = 0.1, 60

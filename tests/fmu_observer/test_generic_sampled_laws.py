@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sampled_bench import Motion, SampledBench, aperiodic_instants, true_motion
 
-from fmu_observer.certificates import Certificate
-from fmu_observer.design.high_gain_bounds import high_gain_bounds
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models import ObserverModel, find_model, pendulum
 from fmu_observer.observers.gap_certified import GapCertified
-from fmu_observer.observers.sampled import (
+from fmu_observer.observers.generic.sampled import (
     DecayingInnovation,
     DynamicHighGain,
     ExponentialGain,

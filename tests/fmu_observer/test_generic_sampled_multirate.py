@@ -13,7 +13,7 @@ from scipy.linalg import solve_continuous_are
 from fmu_observer.design.sylvester import sylvester_design, sylvester_residual, sylvester_transformation
 from fmu_observer.models import pendulum
 from fmu_observer.models.inverted_pendulum_cart import inverted_pendulum_cart
-from fmu_observer.observers.sampled import MultirateSylvester
+from fmu_observer.observers.generic.sampled import MultirateSylvester
 from plant_models.hybrid import NumpyKernel, Runtime, TracedSystem
 
 MODEL = inverted_pendulum_cart()

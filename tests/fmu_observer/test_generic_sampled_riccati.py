@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from fmu_observer.models import pendulum
-from fmu_observer.observers.sampled import RiccatiHighGain
+from fmu_observer.observers.generic.sampled import RiccatiHighGain
 
 TORQUE, THETA, R, T = 0.2, 1.5, 0.2, 0.1
 START = (1.0, 0.5)

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from fmu_observer.models import pendulum
 from fmu_observer.models.takagi_sugeno_registry import find_takagi_sugeno_model
-from fmu_observer.observers.sampled import TakagiSugenoAperiodic, TakagiSugenoPeriodic
+from fmu_observer.observers.generic.sampled import TakagiSugenoAperiodic, TakagiSugenoPeriodic
 
 TORQUE = 0.2
 SWING = true_motion(pendulum(), (1.0, 0.5), (TORQUE,), 20.0)

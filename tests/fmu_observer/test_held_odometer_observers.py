@@ -13,7 +13,7 @@ import pytest
 from observer_bench import Bench
 from scipy.integrate import solve_ivp
 
-from fmu_observer.bounds.carried import unpacked
+from fmu_observer.certificates.bounds.carried import unpacked
 from fmu_observer.observers.train import ContinuousDiscreteObserver, DiscreteMeasurementObserver
 from plant_models.hybrid.requirements import unfulfilled
 

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from observer_bench import MASS, Bench, SteadyMotion
 
 from fmu_observer import OBSERVERS
-from fmu_observer.filtering.kalman import correct
+from fmu_observer.formulas.filtering.kalman import correct
 from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.generic.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor
 from fmu_observer.observers.innovation_gate import (
     GATE_MEMORY,
     OFF,
@@ -29,7 +30,6 @@ from fmu_observer.observers.innovation_gate import (
     gate_limit,
     judge,
 )
-from fmu_observer.observers.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
 from plant_models.hybrid.event import DOUBTED, IGNORED, USED
 

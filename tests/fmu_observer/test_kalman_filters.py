@@ -13,11 +13,11 @@ from block_systems import Driven
 from fmu_observer.models import cart_pendulum, linear_pendulum
 from fmu_observer.models.filter_model import FilterModel, Known
 from fmu_observer.models.system_model import Steps, find_filter_model, system_model
-from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
-from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
-from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
-from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
-from fmu_observer.observers.traction.motor_ekf import MotorEkf
+from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
+from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
+from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
+from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
+from fmu_observer.observers.motors.motor_ekf import MotorEkf
 from fmu_observer.observers.train.balise_odometer_ekf import BaliseOdometerEkf
 from plant_models import PLANTS
 from plant_models.hybrid import (

@@ -11,7 +11,7 @@ import pytest
 from observer_bench import Bench
 
 from fmu_observer import OBSERVERS
-from fmu_observer.bounds.worst_case import worst_case
+from fmu_observer.certificates.bounds.worst_case import worst_case
 from fmu_observer.observers.gap_certified import GapCertified
 
 STEP = 0.01  # [s] for which the effort is held

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fmu_observer import OBSERVERS
-from fmu_observer.tuning.likelihood import AccumulatedOutput
+from fmu_observer.design.likelihood import AccumulatedOutput
 from plant_models.hybrid import Runtime, scalar_names
 
 NAMES = ("process_covariance[1]", "process_covariance[4]", "measurement_covariance[1]")

@@ -5,14 +5,14 @@ import pytest
 from generic_bench import sampled_run
 from scipy import stats
 
-from fmu_observer.filtering import ensemble, particles
-from fmu_observer.filtering.consistency import judge
-from fmu_observer.filtering.smoothing import extended_pass
+from fmu_observer.formulas.filtering import ensemble, particles
+from fmu_observer.formulas.filtering.consistency import judge
+from fmu_observer.formulas.filtering.smoothing import extended_pass
 from fmu_observer.models import linear_pendulum
 from fmu_observer.models.discretisation import zero_order_hold
 from fmu_observer.models.system_model import system_model
-from fmu_observer.observers.discrete import EnsembleKalmanFilter, ParticleFilter
-from plant_models.benchmarks import Pendulum
+from fmu_observer.observers.generic.discrete import EnsembleKalmanFilter, ParticleFilter
+from plant_models.exhibits import Pendulum
 
 F, H = np.array([[1.0, 0.1], [-0.2, 0.9]]), np.array([[1.0, 0.0]])
 Q, R = np.diag([1e-3, 4e-3]), np.array([[0.04]])

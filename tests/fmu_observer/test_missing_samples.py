@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from fmu_observer import OBSERVERS
 from fmu_observer.models.filter_model import FilterModel, Known
-from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
-from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
-from fmu_observer.observers.discrete.member_filter import MemberFilter
+from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
+from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
+from fmu_observer.observers.generic.discrete.member_filter import MemberFilter
 from fmus import Batch
 from plant_models.hybrid import Runtime, TracedSystem, scalar_names
 from plant_models.hybrid.missing import MISSED_SAMPLES, is_there, or_else

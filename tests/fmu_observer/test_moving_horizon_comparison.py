@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu_observer.moving_horizon import gauss_newton
-from fmu_observer.moving_horizon.arrival_cost import arrival_cost_at
-from fmu_observer.moving_horizon.window import WindowRow
+from fmu_observer.formulas.moving_horizon import gauss_newton
+from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_at
+from fmu_observer.formulas.moving_horizon.window import WindowRow
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, Shared
 from fmu_observer.observers.train.balise_odometer_ekf import ORDER
 from plant_models.hybrid import vector

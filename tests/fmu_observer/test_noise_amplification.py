@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import expm
 
-from fmu_observer.certificates import SampledError
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.noise_amplification import POINTS, noise_amplification
 
 

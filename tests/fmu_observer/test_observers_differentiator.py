@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from observer_bench import INERTIA, RADIUS, Bench, SteadyMotion
 
-from fmu_observer.observers.continuous.differentiator import (
+from fmu_observer.formulas.differentiation.differentiator import (
     differentiator_flow,
     filtering_differentiator_flow,
     signed_power,
 )
-from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS
+from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.observers.train import DifferentiatorCdo
 
 STEP, END = 1e-3, 10.0

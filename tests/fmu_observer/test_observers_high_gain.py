@@ -8,8 +8,8 @@ from observer_bench import DAVIS_A, DAVIS_B, DAVIS_C, MASS, SteadyMotion, in_ste
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
+from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo, TrainObserver
-from fmu_observer.observers.train.high_gain import HIGH_GAIN_K
 
 MOTION = SteadyMotion(speed=20.0)
 GAPS = (0.31, 0.48, 0.12, 0.5, 0.27, 0.44)

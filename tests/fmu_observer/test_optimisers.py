@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import scipy
 
-from fmu_observer.optimisers.methods.biogeography import Biogeography
-from fmu_observer.optimisers.methods.biogeography_printed import BiogeographyPrinted
-from fmu_observer.optimisers.methods.cma_es import CovarianceMatrixAdaptation
-from fmu_observer.optimisers.methods.genetic import Genetic
-from fmu_observer.optimisers.methods.likelihood_gradient import LikelihoodGradient
-from fmu_observer.optimisers.methods.particle_swarm import ParticleSwarm
-from fmu_observer.optimisers.optimiser import Optimiser
-from fmu_observer.optimisers.registry import OPTIMISERS, SHORT_NAMES, find_optimiser
-from fmu_observer.optimisers.search import minimise
-from fmu_observer.optimisers.search_space import Bounded, SearchSpace
+from fmu_observer.design.optimisers.methods.biogeography import Biogeography
+from fmu_observer.design.optimisers.methods.biogeography_printed import BiogeographyPrinted
+from fmu_observer.design.optimisers.methods.cma_es import CovarianceMatrixAdaptation
+from fmu_observer.design.optimisers.methods.genetic import Genetic
+from fmu_observer.design.optimisers.methods.likelihood_gradient import LikelihoodGradient
+from fmu_observer.design.optimisers.methods.particle_swarm import ParticleSwarm
+from fmu_observer.design.optimisers.optimiser import Optimiser
+from fmu_observer.design.optimisers.registry import OPTIMISERS, SHORT_NAMES, find_optimiser
+from fmu_observer.design.optimisers.search import minimise
+from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
 
 LOW, HIGH = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 2.0, 3.0])
 CENTRE, WEIGHTS = np.array([0.3, -0.2, 0.7]), np.array([1.0, 10.0, 100.0])

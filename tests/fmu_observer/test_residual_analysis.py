@@ -24,7 +24,7 @@ from fmu_observer.design.residual_analysis import (
 )
 from fmu_observer.design.residual_channel import ResidualChannel, decoupled_channel, residual_channel
 from fmu_observer.models import coupled_vehicles
-from fmu_observer.observers.continuous import DecouplingUio, ProportionalIntegralUio
+from fmu_observer.observers.generic.continuous import DecouplingUio, ProportionalIntegralUio
 from plant_models.hybrid import scalar_names
 
 LAG = ResidualChannel(np.array([[-2.0]]), np.array([[3.0]]), np.array([[1.0]]), np.array([[0.0]]))

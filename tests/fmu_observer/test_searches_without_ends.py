@@ -14,22 +14,23 @@ import pytest
 import scipy
 from test_robust_residual import chapter_5
 
-from fmu_observer.bounds import largest_gap
-from fmu_observer.certificates import SampledError, first_unstable_gap
 from fmu_observer.certificates.aperiodic import aperiodic_limit
+from fmu_observer.certificates.bounds import largest_gap
 from fmu_observer.certificates.fault_cycle import first_crossing, overshoot, smallest_effort
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, discrete_bound
+from fmu_observer.certificates.printed_bounds.high_gain_theta import binomial_gain, lyapunov_size, theta_from_slopes
+from fmu_observer.certificates.printed_bounds.network_bounds import largest_gain
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
+from fmu_observer.certificates.thau import best_thau_bound
 from fmu_observer.design import takagi_sugeno_luenberger
-from fmu_observer.design.discrete_bounds import centre_of, discrete_bound
-from fmu_observer.design.high_gain_theta import binomial_gain, lyapunov_size, theta_from_slopes
-from fmu_observer.design.network_bounds import largest_gain
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.design.proposition_4_1 import design as proposition_4_1
 from fmu_observer.design.robust_residual import design as robust_residual
-from fmu_observer.design.scaled_slopes import best_scale
-from fmu_observer.design.thau import best_thau_bound
 from fmu_observer.design.theorem7 import design as theorem7
 from fmu_observer.models import MODELS, ObserverModel, find_model, find_takagi_sugeno_model
+from fmu_observer.models.scaled_slopes import best_scale
 
 TRAIN = find_takagi_sugeno_model("takagi_sugeno_train")
 UNITS = [1e-6, 1e-3, 1.0, 1e3, 1e6]

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.signatures.envelope import best_envelope, envelope, envelope_areas, rotated
-from fmu_observer.signatures.envelope_distance import envelope_distance, line_distance
+from fmu_observer.formulas.signatures.envelope import best_envelope, envelope, envelope_areas, rotated
+from fmu_observer.formulas.signatures.envelope_distance import envelope_distance, line_distance
 
 LENGTH, THICKNESS, GAP = 4.0, 0.2, 0.5
 

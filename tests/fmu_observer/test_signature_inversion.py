@@ -10,19 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_observer import OBSERVERS
-from fmu_observer.observers.signature import (
-    CascadeSignature,
-    CultureSignature,
-    OscillatorSignature,
-    ReactionSignature,
-)
-from fmu_observer.observers.signature.signature_observer import SignatureObserver
-from fmu_observer.signatures import inversion
-from fmu_observer.signatures.blending import blended
-from fmu_observer.signatures.class_distance import class_distance, envelope_numbers, line_slopes
-from fmu_observer.signatures.dynamic_signature import dynamic_signature
-from fmu_observer.signatures.envelope import best_envelope
-from fmu_observer.signatures.envelope_distance import line_distance
+from fmu_observer.formulas.signatures import inversion
+from fmu_observer.formulas.signatures.blending import blended
+from fmu_observer.formulas.signatures.class_distance import class_distance, envelope_numbers, line_slopes
+from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
+from fmu_observer.formulas.signatures.envelope import best_envelope
+from fmu_observer.formulas.signatures.envelope_distance import line_distance
+from fmu_observer.observers.exhibits import CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature
+from fmu_observer.observers.generic.signature.signature_observer import SignatureObserver
 from plant_models.hybrid import Runtime, scalar_names
 from plant_models.hybrid.system import HybridSystem
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmu_observer.signatures.dynamic_signature import dynamic_signature
-from fmu_observer.signatures.pencil import pencil, pencil_point
+from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
+from fmu_observer.formulas.signatures.pencil import pencil, pencil_point
 
 TINY = 1e-13  # eps -> 0, as the check values are
 SAMPLES = st.lists(st.floats(-100.0, 100.0), min_size=3, max_size=9).filter(lambda v: max(map(abs, v[:-1])) > 1e-3)

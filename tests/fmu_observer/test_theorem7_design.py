@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.certificates import ImpulsiveError
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.design.theorem7 import (
     InfeasibleDesign,
     Theorem7Design,
@@ -22,7 +22,7 @@ from fmu_observer.design.theorem7 import (
     search_eta,
 )
 from fmu_observer.models import find_takagi_sugeno_model
-from fmu_observer.observers.sampled.takagi_sugeno_gains import (
+from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import (
     DESIGNS,
     E1_PUBLISHED,
     E2_PUBLISHED,
@@ -30,7 +30,7 @@ from fmu_observer.observers.sampled.takagi_sugeno_gains import (
     TRAIN_PUBLISHED,
 )
 from fmu_observer.observers.train import TakagiSugenoCdo
-from fmu_observer.tuning.theorem7_train import design_train_gains
+from fmu_observer.observers.train.gains.theorem7_train import design_train_gains
 
 READING = 0.005  # relative: the independent measurement gives three digits
 TRAIN, FIRST, SECOND = "takagi_sugeno_train", "triangularisable_example", "non_triangularisable_example"

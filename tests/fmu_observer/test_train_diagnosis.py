@@ -18,7 +18,7 @@ from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_diagnosis_signals import SHARES
 from fmu_observer.detection.train_efficiency import MotionWindow, brake_share, traction_share
 from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, SENSORS, isolability
-from fmu_observer.diagnosis.isolation_table import IsolationTable
+from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable
 from plant_models.hybrid import Runtime
 
 NONE, SUSPECTED, WHEEL, SENSOR, STUCK, LOSS = range(6)

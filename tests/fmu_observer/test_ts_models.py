@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, Premise, find_takagi_sugeno_model, pendulum, sector_nonlinearity
 from fmu_observer.models.triangularisable_example import triangularisable_chain, triangularisable_example
-from plant_models.benchmarks import NonTriangularisablePlant, TriangularisablePlant
+from plant_models.exhibits import NonTriangularisablePlant, TriangularisablePlant
 from plant_models.hybrid import HybridSystem, input_signal, state
 
 ROUNDING = 1e-12  # relative: sums of a handful of products

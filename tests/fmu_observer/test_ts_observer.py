@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from takagi_sugeno_runs import PLANTS, errors, final_quarter, sampling
 
-from fmu_observer.certificates import ImpulsiveError, first_unstable_gap
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.models.triangularisable_example import triangularisable_chain
-from fmu_observer.observers.sampled import ExponentialGain, GeneralTakagiSugenoCdo
-from fmu_observer.observers.sampled.takagi_sugeno_cdo import PREMISES
-from fmu_observer.observers.sampled.takagi_sugeno_gains import E2_PUBLISHED, GAINS, TakagiSugenoGains
+from fmu_observer.observers.generic.sampled import ExponentialGain, GeneralTakagiSugenoCdo
+from fmu_observer.observers.generic.sampled.takagi_sugeno_cdo import PREMISES
+from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import E2_PUBLISHED, GAINS, TakagiSugenoGains
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
 
 FIRST, SECOND, TRAIN = "triangularisable_example", "non_triangularisable_example", "takagi_sugeno_train"

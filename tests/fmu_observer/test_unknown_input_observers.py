@@ -16,7 +16,7 @@ from fmu_observer.design.decoupling import decoupled_gain, decoupling, decouplin
 from fmu_observer.design.extended_disturbance import decaying_gain, extended_gain, extended_matrices
 from fmu_observer.models import MODELS, ObserverModel, braked_train, coupled_vehicles, pendulum
 from fmu_observer.observability import UnobservableError
-from fmu_observer.observers.continuous import DecouplingUio, Luenberger, ProportionalIntegralUio
+from fmu_observer.observers.generic.continuous import DecouplingUio, Luenberger, ProportionalIntegralUio
 from plant_models.hybrid import Runtime, input_signal, scalar_names, state
 
 EXACT = 1e-9  # the solver works at 1e-12, over stiff couplers and disturbances that jump

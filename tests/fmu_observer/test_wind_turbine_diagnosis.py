@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import fmus
-from fmu_observer.detection.drive_train_residuals import torsion_gains
-from fmu_observer.detection.efficiency_inversion import BLOCKS, simulated_speed
-from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
-from fmu_observer.detection.wind_turbine_limits import WARNINGS
-from fmu_observer.diagnosis.finite_window_observer import sampled
-from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
-from plant_models.benchmarks.wind_turbine.rotor import Rotor
+from fmu_observer.formulas.diagnosis.finite_window_observer import sampled
+from fmu_observer.observers.exhibits.drive_train_residuals import torsion_gains
+from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS, simulated_speed
+from fmu_observer.observers.exhibits.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
+from fmu_observer.observers.exhibits.wind_turbine_limits import WARNINGS
+from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
+from plant_models.exhibits.wind_turbine.rotor import Rotor
 from plant_models.hybrid import scalar_names
 
 PERIOD = 0.01  # [s]

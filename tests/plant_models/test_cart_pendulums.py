@@ -7,16 +7,16 @@ import control
 import numpy as np
 import pytest
 
-from plant_models.benchmarks import CartDoublePendulum, CartPendulum, StateFeedback
-from plant_models.benchmarks.cart_double_pendulum import (
+from plant_models.exhibits import CartDoublePendulum, CartPendulum, StateFeedback
+from plant_models.exhibits.cart_double_pendulum import (
     SECTION_IV_2_2_3,
     accelerations,
     mass_matrix,
     right_hand_side,
 )
-from plant_models.benchmarks.cart_pendulum import TABLE_4_1
-from plant_models.benchmarks.cart_pendulum import accelerations as accelerations_of_one
-from plant_models.benchmarks.noisy_plant import NoisyPlant
+from plant_models.exhibits.cart_pendulum import TABLE_4_1
+from plant_models.exhibits.cart_pendulum import accelerations as accelerations_of_one
+from plant_models.exhibits.noisy_plant import NoisyPlant
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 

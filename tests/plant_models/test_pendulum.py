@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.special import ellipj, ellipk
 
-from plant_models.benchmarks import Pendulum
+from plant_models.exhibits import Pendulum
 from plant_models.hybrid import Runtime, scalar_names
 
 

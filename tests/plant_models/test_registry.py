@@ -64,7 +64,7 @@ def plugins(monkeypatch: pytest.MonkeyPatch) -> Registry[Any]:
     """A registry with what three installed packages announce."""
     entries = [
         announced("thau", "other.module:Thau", "clashing")[1],
-        announced("mine", "fmu_observer.observers.continuous.thau:Thau", "honest")[1],
+        announced("mine", "fmu_observer.observers.generic.continuous.thau:Thau", "honest")[1],
         announced("gone", "no_such_module:Gone", "broken")[1],
         announced("wrong", "math:pi", "odd")[1],
     ]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy
 
-from plant_models.benchmarks import BrakedOscillator, EcoliCulture, GasPhaseReaction, ThreeStateCascade
-from plant_models.benchmarks.braked_oscillator import Variant
-from plant_models.benchmarks.ecoli_culture import HOUR
-from plant_models.benchmarks.noisy_plant import NoisyPlant
+from plant_models.exhibits import BrakedOscillator, EcoliCulture, GasPhaseReaction, ThreeStateCascade
+from plant_models.exhibits.braked_oscillator import Variant
+from plant_models.exhibits.ecoli_culture import HOUR
+from plant_models.exhibits.noisy_plant import NoisyPlant
 from plant_models.hybrid.integration import rk4_step
 
 

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import cosim
-from plant_models.benchmarks.wind_turbine import Wind, WindTurbine, WindTurbineController
-from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
-from plant_models.benchmarks.wind_turbine.rotor import Rotor, optimal_torque_gain, power_coefficient
+from plant_models.exhibits.wind_turbine import Wind, WindTurbine, WindTurbineController
+from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
+from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain, power_coefficient
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 EIGENVALUES = (  # of the specification, with as many digits as it has

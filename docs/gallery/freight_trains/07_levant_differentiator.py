@@ -8,8 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.observers.continuous import LevantDifferentiator
-from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS
+from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
+from fmu_observer.observers.generic.differentiators import LevantDifferentiator
 from plant_models.hybrid import Runtime
 
 STEP = 1e-3  # [s]

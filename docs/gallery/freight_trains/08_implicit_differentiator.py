@@ -6,9 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.observers.continuous import FilteringDifferentiator
-from fmu_observer.observers.discrete import ImplicitDifferentiator
-from fmu_observer.observers.signal_differentiator import SignalDifferentiator
+from fmu_observer.observers.generic.differentiators import FilteringDifferentiator, ImplicitDifferentiator
+from fmu_observer.observers.generic.differentiators.signal_differentiator import SignalDifferentiator
 from plant_models.hybrid import Runtime
 
 INDEPENDENT = {

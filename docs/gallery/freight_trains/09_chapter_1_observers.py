@@ -11,8 +11,8 @@ import numpy as np
 from shared.bench import Together, errors, sampling, unless_rounding
 from shared.sheet import Sheet
 
-from fmu_observer.observers.continuous import HighGain, TakagiSugenoLuenberger, Thau
-from fmu_observer.observers.sampled import (
+from fmu_observer.observers.generic.continuous import HighGain, TakagiSugenoLuenberger, Thau
+from fmu_observer.observers.generic.sampled import (
     ExponentialGain,
     HeldInnovation,
     HybridImpulsive,
@@ -21,7 +21,7 @@ from fmu_observer.observers.sampled import (
     TakagiSugenoAperiodic,
     TakagiSugenoPeriodic,
 )
-from plant_models.benchmarks import Pendulum
+from plant_models.exhibits import Pendulum
 
 TIMES = (2.0, 10.0)  # [s]
 # system, parameters, independent numbers where there are some

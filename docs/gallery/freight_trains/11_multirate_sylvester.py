@@ -10,7 +10,7 @@ from scipy.linalg import solve_continuous_are
 from shared.bench import ModelPlant, Together, errors, unless_rounding
 from shared.sheet import Sheet
 
-from fmu_observer.observers.sampled import MultirateSylvester
+from fmu_observer.observers.generic.sampled import MultirateSylvester
 
 START = (0.3, 0.05, 0.2, 0.4, 0.1)
 GAPS = {"position_sample": 0.1, "angle_sample": 0.15}  # [s]

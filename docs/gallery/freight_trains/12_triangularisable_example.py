@@ -11,7 +11,7 @@ from shared.bench import Together, errors, sampling, unless_rounding
 from shared.sheet import Sheet
 
 from fmu_observer.models.triangularisable_example import triangularisable_chain
-from fmu_observer.observers.sampled import ExponentialGain
+from fmu_observer.observers.generic.sampled import ExponentialGain
 
 NAME = "triangularisable_example"
 CHAIN_GAINS = {"theta": 1.0, "high_gain": (0.4034, 0.0, 0.0, 0.4020, 0.0407, 0.0, 0.0, 0.0404)}  # printed, row by row

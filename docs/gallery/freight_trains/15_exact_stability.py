@@ -8,8 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.certificates import first_unstable_gap
-from fmu_observer.observers.sampled import GeneralTakagiSugenoCdo
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.observers.generic.sampled import GeneralTakagiSugenoCdo
 from fmu_observer.observers.train import TakagiSugenoCdo
 
 EXAMPLES = {  # gap of the thesis [s], independent: contraction by vertex, first unstable gap

@@ -6,7 +6,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.design.bounds import bound_table, lipschitz_constant, smallest_theta_1_51, smallest_theta_3_31
+from fmu_observer.certificates.printed_bounds.sampled_bounds import (
+    bound_table,
+    lipschitz_constant,
+    smallest_theta_1_51,
+    smallest_theta_3_31,
+)
 
 CHAPTER_3 = {"mass": 90e3, "davis_b": 32.0, "davis_c": 1.7}
 PUBLISHED_GAP = 0.5  # [s], with theta = 8 1/s

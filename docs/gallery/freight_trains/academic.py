@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from shared.bench import Together, errors, sampling
 
-from fmu_observer.observers.sampled import GeneralTakagiSugenoCdo
-from plant_models.benchmarks import NonTriangularisablePlant, TriangularisablePlant
+from fmu_observer.observers.generic.sampled import GeneralTakagiSugenoCdo
+from plant_models.exhibits import NonTriangularisablePlant, TriangularisablePlant
 
 EXAMPLES = {  # plant, longest gap [s], instant of the first drop-outs [s]
     "triangularisable_example": (TriangularisablePlant, 0.2, 6.7),

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.certificates import polytope_stability
+from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.quasi_lpv_published import PUBLISHED, SEEN, QuasiLpvDesign
 from fmu_observer.design.residual_analysis import h_infinity_norm
 from fmu_observer.design.robust_residual import ResidualProblem, gain_size, proven_attenuation

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 from shared.sheet import Sheet
 
-from fmu_observer.bounds import improved_dmo_bound
+from fmu_observer.certificates.bounds import improved_dmo_bound
 from fmu_observer.observers.train import DiscreteMeasurementObserver
 
 XI, BETA, M = 1.7, 1.90937, 0.1

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.bounds import cdo_bound, improved_dmo_bound, printed_cdo_bound, worst_case
+from fmu_observer.certificates.bounds import cdo_bound, improved_dmo_bound, printed_cdo_bound, worst_case
 from fmu_observer.observers.train import DiscreteMeasurementObserver
 
 XI, TAU = 1.7, 0.2

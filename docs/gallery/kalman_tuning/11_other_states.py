@@ -7,7 +7,7 @@ import numpy as np
 from recordings import SEEDS, STATES, current_cost, drive, errors, in_run, of_rows, recording, replay
 from shared.sheet import Sheet
 
-from fmu_observer.observers.traction import MotorEkf, MotorEkfStator
+from fmu_observer.observers.motors import MotorEkf, MotorEkfStator
 
 FINALS = {"hand": (612.0, 57.0), "pso_20": (8.1, 5.3), "ga_20": (8.0, 5.4), "bbo_20": (9.2, 6.0)}
 CURVES = "curves only; ten seeds here and there, not the same noise"

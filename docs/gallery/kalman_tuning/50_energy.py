@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from plant_models.benchmarks import CartDoublePendulum
+from plant_models.exhibits import CartDoublePendulum
 from plant_models.hybrid import Runtime, scalar_names
 
 INDEPENDENT = {"repaired": 14.77998, "as_published": 26.17, "as_published_4_11": 335.2}

@@ -12,10 +12,10 @@ import casadi as ca
 import numpy as np
 from scipy import stats
 
-from fmu_observer.observers.discrete import ExtendedKalmanFilter, UnscentedKalmanFilter
-from plant_models.benchmarks import CartDoublePendulum, CartPendulum, StateFeedback
-from plant_models.benchmarks.cart_double_pendulum import SECTION_IV_2_2_3
-from plant_models.benchmarks.cart_pendulum import TABLE_4_1
+from fmu_observer.observers.generic.discrete import ExtendedKalmanFilter, UnscentedKalmanFilter
+from plant_models.exhibits import CartDoublePendulum, CartPendulum, StateFeedback
+from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3
+from plant_models.exhibits.cart_pendulum import TABLE_4_1
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names
 
 ONE, TWO = CartPendulum(), CartDoublePendulum()

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.signatures.pencil import pencil, polygon
+from fmu_observer.formulas.signatures.pencil import pencil, polygon
 
 TINY = 1e-12  # eps -> 0, as the independent values are
 FIGURE_2_6 = np.array([0.0, 0.5, -0.5, 0.25, -0.25, 0.0])

@@ -9,10 +9,10 @@ import numpy as np
 from shared.sheet import Sheet
 
 import fmus
-from fmu_observer.observers.signature import SignatureTrack
-from fmu_observer.signatures.dynamic_signature import dynamic_signature
-from fmu_observer.signatures.properties import branch_tips, printed_branches, printed_tip
-from plant_models.benchmarks import VanDerPol
+from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
+from fmu_observer.formulas.signatures.properties import branch_tips, printed_branches, printed_tip
+from fmu_observer.observers.generic.signature import SignatureTrack
+from plant_models.exhibits import VanDerPol
 
 NOMINAL = (1.5, 2.25, 0.0)
 SWEEPS = ((1.0, 1.2, 1.4, 1.6, 1.8, 2.0), (1.5, 1.8, 2.1, 2.4, 2.7, 3.0), (0.0, 0.02, 0.04, 0.06, 0.08, 0.1))

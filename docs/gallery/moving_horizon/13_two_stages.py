@@ -7,8 +7,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.signatures.classification import PencilSpace
-from fmu_observer.signatures.conditional_estimate import train_conditional
+from fmu_observer.formulas.signatures.classification import PencilSpace
+from fmu_observer.formulas.signatures.conditional_estimate import train_conditional
 
 SPACE = PencilSpace((8, 12, 20), eps=(0.01, 0.1, 1.0), margin=0.02, draws=120)
 WORDS = "the thesis states in words that x is told by four clouds apart; field, tank, probe and noise are ours"

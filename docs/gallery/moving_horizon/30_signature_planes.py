@@ -7,8 +7,8 @@ import numpy as np
 from shared.sheet import Sheet
 from windows import recorded
 
-from fmu_observer.observers.signature import OscillatorSignature
-from plant_models.benchmarks import BrakedOscillator
+from fmu_observer.observers.exhibits import OscillatorSignature
+from plant_models.exhibits import BrakedOscillator
 
 SHAPE = "the figure is lost and eps, p1 and p2 are not printed; counted is whether no two cells of the network overlap"
 RANGE = "the grid is coarse where signatures change fast: extremes of the plane lie between its nodes"

@@ -7,8 +7,8 @@ import numpy as np
 from shared.sheet import Sheet
 from windows import driven, recorded, rms
 
-from fmu_observer.observers.signature import OscillatorSignature
-from plant_models.benchmarks import BrakedOscillator
+from fmu_observer.observers.exhibits import OscillatorSignature
+from plant_models.exhibits import BrakedOscillator
 
 START = {"estimated_x1": 0.3, "estimated_x2": -0.5}
 PICKED = (

@@ -8,10 +8,10 @@ import numpy as np
 from shared.sheet import Sheet
 from windows import driven, recorded, rms
 
-from fmu_observer.observers.signature import CascadeSignature
-from fmu_observer.signatures.dynamic_signature import dynamic_signature
-from fmu_observer.signatures.pencil import NextScaling
-from plant_models.benchmarks import ThreeStateCascade
+from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
+from fmu_observer.formulas.signatures.pencil import NextScaling
+from fmu_observer.observers.exhibits import CascadeSignature
+from plant_models.exhibits import ThreeStateCascade
 
 RULE = "norm form, and literal form with eps of 0.1 and more, have the rule, here and there"
 LITERAL = "8 fail, all of x2 < 0: 94.6 % of these have the rule, as the independent implementation found"

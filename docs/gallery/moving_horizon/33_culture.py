@@ -7,9 +7,9 @@ import numpy as np
 from shared.sheet import Sheet
 from windows import driven, recorded, rms
 
-from fmu_observer.observers.signature import CultureSignature
-from plant_models.benchmarks import EcoliCulture
-from plant_models.benchmarks.ecoli_culture import HOUR
+from fmu_observer.observers.exhibits import CultureSignature
+from plant_models.exhibits import EcoliCulture
+from plant_models.exhibits.ecoli_culture import HOUR
 
 SAMPLE = 0.1 * HOUR
 SEEDS = 6

@@ -7,8 +7,8 @@ import numpy as np
 from shared.sheet import Sheet
 from windows import driven, recorded, rms
 
-from fmu_observer.observers.signature import ReactionSignature
-from plant_models.benchmarks import GasPhaseReaction
+from fmu_observer.observers.exhibits import ReactionSignature
+from plant_models.exhibits import GasPhaseReaction
 
 AXIS = "printed without the factor 0.001 of the lost axis; -b x1^2 tau / 2 gives the same"
 STARTS = ((2.5, 0.5), (1.5, 1.0), (1.0, 2.0))

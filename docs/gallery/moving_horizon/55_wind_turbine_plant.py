@@ -9,8 +9,8 @@ import numpy as np
 from shared.sheet import Sheet
 
 from cosim import Outcome, Scenario
-from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
-from plant_models.benchmarks.wind_turbine.rotor import Rotor, optimal_torque_gain
+from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
+from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain
 
 DRIVES = (
     ("efficiency 0.97", DriveTrain(), (-0.00724, -0.0550, 28.163)),

@@ -7,9 +7,9 @@ import numpy as np
 from arm import LINK_ANGLE, PRINTED, Cell, arm_errors
 from shared.sheet import Sheet
 
-from fmu_observer.design.network_bounds import exact_predictor_delay
+from fmu_observer.certificates.printed_bounds.network_bounds import exact_predictor_delay
 from fmu_observer.models import find_model
-from fmu_observer.observers.sampled.delayed_state_observer import DelayedStateObserver
+from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
 
 SURVIVED = {1: (0.19, 0.20), 2: (0.36, 0.39), 3: (0.54, 0.57)}  # independent: last that works, first that fails
 NOT_PRINTED = "the thesis prints no limit; the independent number is the last of a grid that works"

@@ -7,7 +7,8 @@ import numpy as np
 from held import DECAYS, GAINS, GRID, Run, pair
 from shared.sheet import Sheet
 
-from fmu_observer.certificates import decaying_error, first_unstable_gap
+from fmu_observer.certificates.decaying_innovation_error import decaying_error
+from fmu_observer.certificates.gap_error import first_unstable_gap
 
 PUBLISHED = {"constant": 0.19, "a = 1": 0.9, "a = 0.5": 1.5, "a = 0.25": 1.8}
 INDEPENDENT = {

@@ -7,7 +7,7 @@ import numpy as np
 from learning import RHO, learn, settled
 from shared.sheet import Sheet
 
-from fmu_observer.observers.sampled import AdaptiveHold, AdaptivePredictor
+from fmu_observer.observers.generic.adaptive import AdaptiveHold, AdaptivePredictor
 
 SHOWN = "the thesis shows curves, no numbers; last instant beyond the bound, looked at every 10 ms"
 LATE = "not within 5 % at the end: the excitation of rho2 fades with 1/t^2, it is found by a gain that grows with e^t"

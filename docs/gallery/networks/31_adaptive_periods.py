@@ -7,8 +7,8 @@ import numpy as np
 from learning import RHO, learn
 from shared.sheet import Sheet
 
-from fmu_observer.certificates import first_unstable_gap
-from fmu_observer.observers.sampled import AdaptiveHold, AdaptivePredictor
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.observers.generic.adaptive import AdaptiveHold, AdaptivePredictor
 
 PERIODS = np.round(np.arange(0.08, 0.5001, 0.002), 3)
 CRITERION = "state within 0.1 and rho1 within 5 % from 28 s to 30 s; looked for in steps of 2 ms"

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 from learning import learn
 from shared.sheet import Sheet
 
-from fmu_observer.observers.sampled import AdaptivePredictor
+from fmu_observer.observers.generic.adaptive import AdaptivePredictor
 
 OUTPUTS = ("rho1", "rho2", "rho2_learnt", "smallest_excitation", "rho2_deviation")
 OURS = "ours"

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from fmu_observer.models import find_model
-from fmu_observer.observers.sampled.delayed_state_observer import Between, DelayedStateObserver
+from fmu_observer.observers.generic.delayed.delayed_state_observer import Between, DelayedStateObserver
 from fmus import Batch
 
 LINK_ANGLE, PRINTED = "flexible_joint_arm", "flexible_joint_arm_as_printed"

@@ -10,8 +10,8 @@ from shared.bench import Together
 
 from fmu_observer.models import tanh_system
 from fmu_observer.models.tanh_system import Reading
-from fmu_observer.observers.sampled import DecayingInnovation
-from plant_models.benchmarks import TanhSystem
+from fmu_observer.observers.generic.sampled import DecayingInnovation
+from plant_models.exhibits import TanhSystem
 from plant_models.hybrid import Runtime
 
 HORIZON, LAST, FOUND = 80.0, 10.0, 1e-2  # [s], [s]; an observer works where its error stays below this at the end

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
-from fmu_observer.models.model import named_as
-from fmu_observer.observers.adaptation_at_samples import (
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.formulas.adaptation.adaptation_at_samples import (
     AtSample,
     Constants,
     Since,
@@ -21,11 +22,12 @@ from fmu_observer.observers.adaptation_at_samples import (
     since_flow,
     state_covariance,
 )
-from fmu_observer.observers.adaptive_law import (
+from fmu_observer.formulas.adaptation.adaptive_law import (
     gentle_gain,
     learnt_constants,
     smallest_eigenvalue,
 )
+from fmu_observer.models.model import named_as
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation

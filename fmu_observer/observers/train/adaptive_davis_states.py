@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.observers.adaptation_at_samples import AtSample, Since, first_covariance
-from fmu_observer.observers.adaptive_law import Sizes
+from fmu_observer.formulas.adaptation.adaptation_at_samples import AtSample, Since, first_covariance
+from fmu_observer.formulas.adaptation.adaptive_law import Sizes
 from fmu_observer.observers.train.train_observer import POSITION, SPEED
 from plant_models.hybrid import matrix, memory, state, vector
 from plant_models.hybrid.system import Array

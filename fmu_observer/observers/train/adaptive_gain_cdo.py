@@ -10,11 +10,12 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, SampledError
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import certified_gains, rounded_down
+from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_observer import TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
-from fmu_observer.observers.adaptive_law import (
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.formulas.adaptation.adaptive_law import (
     Plant,
     Sizes,
     adaptation_flow,

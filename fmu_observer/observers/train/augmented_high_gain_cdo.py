@@ -8,10 +8,11 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, SampledError
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.augmented_gains import augmented_matrix
+from fmu_observer.formulas.correction.decaying_gain import correction
 from fmu_observer.observers.train.augmented_observer import ORDER, WAYS_OF_FIXES, AugmentedTrainObserver, Fixes
-from fmu_observer.observers.train.high_gain import correction
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, MultirateStage

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
-from fmu_observer.moving_horizon.real_time_iteration import (
+from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
+from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     MOST_PASSES,
     MOST_ROWS,
     TOLD,
@@ -19,8 +19,8 @@ from fmu_observer.moving_horizon.real_time_iteration import (
     told_outputs,
     window_memory,
 )
-from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
-from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
+from fmu_observer.formulas.moving_horizon.window import RowLayout, WindowRow
 from fmu_observer.observers.innovation_gate import OFF, known_accuracy, place_deviation
 from fmu_observer.observers.train.balise_odometer_ekf import (
     BALISE_ROW,
@@ -100,9 +100,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
 
     States, transition and noises are those of `BaliseOdometerEkf`. The last `window` rows, readings and balises at
     their stamps, are kept; at every row `passes` Gauss-Newton passes minimise the arrival cost, the process noise
-    between rows and the loss of the residuals, see `fmu_observer.moving_horizon`. Between rows the estimate flows with
-    the effort as it is; a row keeps what the flow made of the estimate before, so that the window knows every change
-    of the effort.
+    between rows and the loss of the residuals, see `fmu_observer.formulas.moving_horizon`. Between rows the estimate
+    flows with the effort as it is; a row keeps what the flow made of the estimate before, so that the window knows
+    every change of the effort.
 
     Speed is within `speed_limit` either way, the unknown acceleration within `disturbance_limit`. The loss
     ``geman_mcclure`` doubts a false balise, and readings of a wheel that slides, by what the other rows of the window

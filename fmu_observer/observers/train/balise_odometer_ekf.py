@@ -8,17 +8,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate
-from fmu_observer.filtering.kalman import (
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.formulas.filtering.kalman import (
     correct,
     integrated_noise,
     log_likelihood,
     normalised_square,
     predicted_covariance,
 )
-from fmu_observer.observers.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.generic.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.innovation_gate import place_deviation
 from fmu_observer.observers.made_for import MadeFor
 from fmu_observer.observers.train.standstill import stands

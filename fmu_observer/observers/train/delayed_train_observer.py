@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from fmu_observer.certificates import Certificate, independent_gap_limit, with_independent_samples
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
 from fmu_observer.models.networked_train import networked_train
-from fmu_observer.observers.sampled.delayed_state_observer import (
+from fmu_observer.observers.generic.delayed.delayed_state_observer import (
     BETWEEN,
     MEMORY_PLACES,
     Between,

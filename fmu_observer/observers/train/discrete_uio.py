@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, TwoRateError, certify_two_rate_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.design.uio_design import uio_matrices
 from fmu_observer.models.model import named_as, stacked_of
 from fmu_observer.observers.train.train_observer import POSITION, Estimate, TrainObserver

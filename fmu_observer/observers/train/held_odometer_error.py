@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.bounds.carried import decay_proven, level_squared
-from fmu_observer.certificates import ImpulsiveError
+from fmu_observer.certificates.bounds.carried import decay_proven, level_squared
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from plant_models.hybrid.system import Array
 
 

@@ -12,16 +12,17 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.bounds import ErrorBounds
-from fmu_observer.bounds.carried import (
+from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
+from fmu_observer.certificates.bounds import ErrorBounds
+from fmu_observer.certificates.bounds.carried import (
     PACKED,
     first_component,
     level,
     level_of_box,
     unpacked,
 )
-from fmu_observer.bounds.formulas import improved_dmo_bound
-from fmu_observer.certificates import Certificate, certify_sampled_error, with_switching_noted
+from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
+from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.held_odometer_error import (

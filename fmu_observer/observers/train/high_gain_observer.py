@@ -10,10 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, GapError, SampledError, certify_sampled_error, with_switching_noted
+from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import GapError
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import certified_gains
+from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from plant_models.hybrid import Signal, parameter

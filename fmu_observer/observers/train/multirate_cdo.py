@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from fmu_observer.certificates import Certificate, SampledError
-from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sampled_error import SampledError
+from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from fmu_observer.observers.train.wheel_stage import MultirateStage
 from plant_models.hybrid.system import Array

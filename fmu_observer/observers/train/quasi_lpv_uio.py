@@ -9,7 +9,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, first_unstable_gap
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.periodic import PeriodicStability, periodic_stability
 from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.jam_recovery import estimate_noise

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates import Certificate
+from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,

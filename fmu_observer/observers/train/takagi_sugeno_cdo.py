@@ -7,7 +7,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import balise_family, certified_gains
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate
+from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.detection.slip_indicator import (
     FILTERED_SLIP,
     SLIP_OUTPUTS,

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
+from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
 from fmu_observer.models.model import named_as, stacked_of
-from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
-from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
 from plant_models.hybrid import PeriodicEvent, Signal, parameter, state
 from plant_models.hybrid.system import Array
 

@@ -16,8 +16,8 @@ from cosim.fmu_filter import component
 from cosim.fmu_filter.component import FmuFilterModel, legal_names
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.sealed import FmuModelError
-from fmu_observer.filtering import kalman, unscented
-from fmu_observer.filtering.square_root import factor
+from fmu_observer.formulas.filtering import kalman, unscented
+from fmu_observer.formulas.filtering.square_root import factor
 from plant_models import PLANTS
 from plant_models.hybrid import Runtime
 

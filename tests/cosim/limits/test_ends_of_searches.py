@@ -15,11 +15,13 @@ from test_limits import trial
 from cosim.limits import LimitRow, limit_rows, limit_text, practical_limit
 from cosim.limits.search import reach
 from fmu_observer import OBSERVERS
-from fmu_observer.bounds import bound_text
-from fmu_observer.certificates import Certificate, ImpulsiveError, first_unstable_gap
-from fmu_observer.observers.adaptive_certificate import SHORTEST, _longest_kept
+from fmu_observer.certificates.bounds import bound_text
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.observers.generic.adaptive.adaptive_certificate import SHORTEST, _longest_kept
+from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from fmu_observer.observers.parameter_values import parameter_values
-from fmu_observer.observers.sampled import DelayedStateObserver
 
 WITH_LIMITS = [name for name, observer in OBSERVERS.items() if hasattr(observer, "limits")]
 

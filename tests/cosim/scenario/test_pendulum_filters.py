@@ -6,7 +6,7 @@ import scipy.linalg
 import scipy.signal
 
 from cosim import Scenario
-from plant_models.benchmarks import CartDoublePendulum, CartPendulum, StateFeedback
+from plant_models.exhibits import CartDoublePendulum, CartPendulum, StateFeedback
 from plant_models.hybrid import HybridSystem
 from plant_models.interop import to_state_space
 

@@ -21,7 +21,7 @@ from cosim.network.settings import NetworkSettings, Node
 from cosim.run import certificates
 from cosim.run.expected_gaps import ExpectedGap
 from fmu_observer import OBSERVERS
-from fmu_observer.observers.sampled import DelayedStateObserver
+from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal
 
 CERTIFIED = [name for name, observer in OBSERVERS.items() if hasattr(observer, "certify")]

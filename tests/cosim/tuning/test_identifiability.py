@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cosim.tuning.identifiability import Directions, directions, neighbours
-from fmu_observer.optimisers.search_space import Bounded, SearchSpace
+from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
 
 VALUES = {"f.process_covariance[1]": 0.1, "f.process_covariance[4]": 2.0, "f.measurement_covariance": 0.5}
 SPACE = SearchSpace([Bounded(name, 1e-6, 20.0, True) for name in VALUES])

@@ -26,7 +26,7 @@ from cosim.tuning.tune import tune
 from cosim.tuning.tuning_files import convergence_figure
 from cosim.tuning.tuning_result import Tuning
 from fmu_observer import OBSERVERS
-from fmu_observer.optimisers.search_space import Bounded, SearchSpace
+from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
 from plant_models.hybrid import scalar_names
 
 CURRENTS = "state:current_d=motor.current_d,current_q=motor.current_q"

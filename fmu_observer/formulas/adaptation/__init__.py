@@ -1,0 +1,1 @@
+"""The law of the adaptive observers, in flight and from sample to sample."""

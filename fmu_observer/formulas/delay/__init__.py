@@ -1,0 +1,1 @@
+"""What a delayed measurement needs: a memory of the recent past, and the prediction over the delay."""

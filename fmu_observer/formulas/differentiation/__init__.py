@@ -1,0 +1,1 @@
+"""Sliding-mode differentiators of any order, explicit and implicit, and their gains."""

@@ -1,0 +1,189 @@
+"""The quadratic programme of one Gauss-Newton step over a window, handed to PIQP as it comes with CasADi.
+
+Unknowns are the changes of the states and the noises of all rows. It knows matrices and no model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from fmu_observer.formulas.moving_horizon.free_sweep import free_sweep
+from fmu_observer.formulas.moving_horizon.window_stages import BufferedCall
+
+SOLVER, OPTIONS = "piqp", {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100}
+SOLVED = "SOLVER_RET_SUCCESS"
+FREE = 1e6  # standard deviations, so many that they are no bound of a disturbance
+
+
+class Step(NamedTuple):
+    """Where the quadratic programme leads.
+
+    Attributes:
+        change: of the states, shape (N, n). noises: of the transitions, in standard deviations, shape (N, n).
+        prices: multipliers of the transitions, shape (N, n). status: of the solver.
+    """
+
+    change: np.ndarray
+    noises: np.ndarray
+    prices: np.ndarray
+    status: str
+
+    @property
+    def solved(self) -> bool:
+        """Whether the solver says that it is solved."""
+        return self.status == SOLVED
+
+
+class Programme(NamedTuple):
+    """``min z' H z / 2 + g' z`` with ``A z`` between two sides, and bounds of z.
+
+    Attributes:
+        h: nonzeros of H as in `WindowProgram.cost`. g: shape (2 N n,). a: nonzeros of A as in its `transitions`.
+        sides: of the transitions, equal, then of the noises with bounds, shape (N n + N d,).
+        lower, upper: bounds of z, shape (2 N n,).
+    """
+
+    h: np.ndarray
+    g: np.ndarray
+    a: np.ndarray
+    sides: tuple[np.ndarray, np.ndarray]
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+class WindowProgram:
+    """Quadratic programmes of one size: ``min sum (dx' A dx + w' w) / 2 + b' dx`` with ``dx = F dx_before + G w + c``.
+
+    Args:
+        count: N, rows of the window. order: n, states.
+        solver: name of a solver of quadratic programmes that CasADi knows. options: of it.
+        disturbed: rows of ``G w`` that have bounds, d of them.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        order: int,
+        solver: str = SOLVER,
+        options: Mapping[str, Any] = MappingProxyType(OPTIONS),
+        disturbed: tuple[int, ...] = (),
+    ) -> None:
+        self.count, self.order, self.disturbed = count, order, list(disturbed)
+        size, within = count * order, np.arange(order)
+        rows = np.repeat(np.arange(count) * order, order * order) + np.tile(within, size)
+        self.cost = _sparsity([np.full(size, order), np.ones(size)], [rows, size + np.arange(size)])
+        columns = np.full((count, order), order + 1)
+        columns[-1] = 1
+        place = np.full((count, order, order + 1), -1)
+        first = np.arange(count)[:, None] * order
+        place[:, :, 0] = first + within
+        place[:-1, :, 1:] = (first[1:] + within)[:, None, :]
+        self._kept = (place >= 0).ravel()
+        bounds = np.arange(len(disturbed))
+        of_noise = np.hstack([first + within, size + np.arange(count)[:, None] * len(disturbed) + bounds])
+        self.transitions = _sparsity(
+            [columns.ravel(), np.full(size, of_noise.shape[1])],
+            [place.ravel()[self._kept], np.repeat(of_noise, order, axis=0).ravel()],
+            size + count * len(disturbed),
+        )
+        told: dict[str, Any] = {"print_time": False, "error_on_fail": False, solver: dict(options)}
+        self._solver = ca.conic("window", solver, {"h": self.cost, "a": self.transitions}, told)
+        self._call = BufferedCall(self._solver)
+        self._rest = [np.zeros(self._solver.nnz_in(i)) for i in range(10, self._solver.n_in())]
+
+    def solve(
+        self,
+        A: np.ndarray,
+        b: np.ndarray,
+        F: np.ndarray,
+        G: np.ndarray,
+        c: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        noise: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> Step:
+        """Solve one.
+
+        Args:
+            A: cost of the changes, shape (N, n, n), symmetric. b: likewise, shape (N, n).
+            F: transitions into each row, that of the first is not read, shape (N, n, n). G: of the noises, shape
+                (N, n, n). c: what is missing, shape (N, n).
+            lower, upper: bounds of the changes, infinite for none, shape (N, n).
+            noise: bounds of ``G w`` where it has some, infinite for none, shape (N, d) each; None for none.
+        """
+        N, n = self.count, self.order
+        columns = np.empty((N, n, n + 1))
+        columns[:, :, 0] = -1.0
+        columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
+        of_noise = np.concatenate([G, G[:, self.disturbed]], axis=1).transpose(0, 2, 1)
+        coupling = np.concatenate([columns.ravel()[self._kept], of_noise.ravel()])
+        none = FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without sides
+        low, high = (-none, none) if noise is None else (np.maximum(noise[0], -none), np.minimum(noise[1], none))
+        free, zero = np.full(N * n, np.inf), np.zeros(N * n)
+        given = Programme(
+            h=np.concatenate([A.ravel(), zero + 1.0]),
+            g=np.concatenate([b.ravel(), zero]),
+            a=coupling,
+            sides=(np.concatenate([-c.ravel(), low.ravel()]), np.concatenate([-c.ravel(), high.ravel()])),
+            lower=np.concatenate([lower.ravel(), -free]),
+            upper=np.concatenate([upper.ravel(), free]),
+        )
+        found, prices, status = self.handed(given)
+        changes, noises = found.reshape(2, N, n)
+        return Step(changes, noises, prices[: N * n].reshape(N, n), status)
+
+    def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
+        """Solve one without bounds.
+
+        Args:
+            A, b, F, G, c: as in `solve`.
+        """
+        free = np.full((self.count, self.order), np.inf)
+        return self.solve(A, b, F, G, c, -free, free)
+
+    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
+        """What the solver finds.
+
+        Args:
+            given: the programme.
+
+        Returns:
+            z, the multipliers of the rows of A, and the solver's status.
+        """
+        h, g, a, (least, most), lower, upper = given
+        nothing, none = np.zeros(len(g)), np.zeros(len(least))
+        told = self._call(h, g, a, least, most, lower, upper, nothing, nothing, none, *self._rest)
+        status = str(self._solver.stats(self._call.memory)["unified_return_status"])
+        return told[0].copy(), told[2].copy(), status
+
+
+class SweptProgram(WindowProgram):
+    """One that sweeps over the rows where no bound counts, which is quicker; the solver has the rest."""
+
+    def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
+        """See `WindowProgram.solve_free`."""
+        found = free_sweep(self.count, self.order).solve(A, b, F, G, c)
+        return Step(*found, SOLVED if all(np.isfinite(part).all() for part in found) else "numbers that are not finite")
+
+
+@lru_cache(maxsize=64)
+def window_program(count: int, order: int, disturbed: tuple[int, ...] = ()) -> WindowProgram:
+    """The programme of a size, made once.
+
+    Args:
+        count: N, rows. order: n, states. disturbed: states whose noises have bounds.
+    """
+    return SweptProgram(count, order, disturbed=disturbed)
+
+
+def _sparsity(counts: list[np.ndarray], rows: list[np.ndarray], height: int | None = None) -> Any:
+    """Compressed columns: how many entries each has, and their rows; square unless a height is given."""
+    ends = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(int)
+    width = len(ends) - 1
+    return ca.Sparsity(height or width, width, ends.tolist(), np.concatenate(rows).astype(int).tolist())

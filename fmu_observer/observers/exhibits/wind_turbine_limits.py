@@ -1,0 +1,139 @@
+"""What the diagnosis of a wind turbine refuses before it runs, and what it warns of after: settings with which its
+verdict means nothing. Pure functions on its states by name.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.observers.exhibits.drive_train_residuals import GAINS, GAINS_PERIOD, WINDOW
+from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS
+from plant_models.hybrid import OutputWarning, output_signal
+from plant_models.hybrid.system import Array
+
+OUTSIDE_UPDATES = 12.0
+"""Updates in a row without a bracket that are too many: the default grid moves from 0.97 to 0.05 in eleven."""
+REPEATED_SHARE = 0.25
+"""Share of samples without a new reading that is too large; sensors read half as often repeat every second one."""
+
+WARNINGS = (
+    output_signal(
+        "efficiency_unknown",
+        "1",
+        "1 until the window of the efficiency is full",
+        variability="discrete",
+        warning=OutputWarning(
+            f"never estimated the efficiency: the run is shorter than the {BLOCKS + 1} times update_period that its "
+            "window needs, and no loss can be seen; lower update_period, or let the run go on",
+            at_end=True,
+        ),
+    ),
+    output_signal(
+        "efficiency_outside",
+        "1",
+        "1 where the grid has long not bracketed the efficiency",
+        variability="discrete",
+        warning=OutputWarning(
+            f"took the end of its grid for the efficiency: for {OUTSIDE_UPDATES:g} updates and more the grid bracketed "
+            "no measurement; widen it (grid_lowest, grid_highest, least_efficiency, most_efficiency), and check "
+            "wind_bias",
+            shows=("efficiency_estimate",),
+        ),
+    ),
+    output_signal(
+        "efficiency_impossible",
+        "1",
+        "1 where the efficiency is above 1 by more than its limit",
+        variability="discrete",
+        warning=OutputWarning(
+            "estimated an efficiency that no drive train has, more than efficiency_limit above 1: the torque of the "
+            "wind is estimated wrongly, and the alarm of the efficiency means nothing; check wind_bias and rotor data",
+            shows=("efficiency_estimate",),
+        ),
+    ),
+    output_signal(
+        "readings_repeated",
+        "1",
+        "1 where many samples brought no new reading",
+        variability="discrete",
+        warning=OutputWarning(
+            "found speeds and torque unchanged at more than a quarter of its samples: sensors are read less often than "
+            "its sample_period, or nothing moves and there is no noise; limits and gains hold for sensors that are "
+            "read at every sample",
+            at_end=True,
+        ),
+    ),
+)
+
+
+def grid_requirements(p: Any) -> dict[str, Array]:
+    """Grids of the efficiency that rise.
+
+    Args:
+        p: parameters with `EFFICIENCY_PARAMETERS`.
+
+    Returns:
+        By text: 1 where it is fulfilled, else 0.
+    """
+    return {
+        "grid_highest must be above grid_lowest: the grid of the efficiency rises": np.where(
+            p.grid_highest > p.grid_lowest, 1.0, 0.0
+        ),
+        "most_efficiency must be above least_efficiency: the grid lies between them": np.where(
+            p.most_efficiency > p.least_efficiency, 1.0, 0.0
+        ),
+    }
+
+
+def period_requirements(p: Any) -> dict[str, Array]:
+    """Gains of the torsion that belong to the sample period.
+
+    Args:
+        p: parameters with `DRIVE_PARAMETERS` and `sample_period`.
+
+    Returns:
+        By text: 1 where it is fulfilled, else 0.
+    """
+    own: Array = 0.0  # 1 where gains other than the default ones were given
+    for i in range(WINDOW):
+        own = np.maximum(own, np.where(np.abs(p.rotor_speed_gain[i] - GAINS[0, i]) > 1e-9 * abs(GAINS[0, i]), 1.0, 0.0))
+    fits = np.where(np.abs(p.sample_period - GAINS_PERIOD) <= 1e-9, 1.0, 0.0)
+    text = (
+        f"sample_period must be {GAINS_PERIOD:g} s, for which the default gains of the torsion are made; for another "
+        "one give rotor_speed_gain, generator_speed_gain, rotor_torque_gain, generator_torque_gain of torsion_gains()"
+    )
+    return {text: np.maximum(own, fits)}
+
+
+def repeats(m: Any, u: Any, starts: Array) -> Array:
+    """1 where a sample brings no new reading of first rotor speed, first generator speed and torque.
+
+    Args:
+        m: named tuple with `DRIVE_MEMORY`, as it was before. u: inputs of the diagnosis.
+        starts: 1 at the first sample, else 0.
+    """
+    pairs = (
+        (u.rotor_speed[0], m.rotor_first[WINDOW - 2]),
+        (u.generator_speed[0], m.generator_first[WINDOW - 2]),
+        (u.torque, m.torques[WINDOW - 2]),
+    )
+    same: Array = 1.0 - starts
+    for now, before in pairs:
+        same = np.where(now == before, same, 0.0)
+    return same
+
+
+def warned(m: Any, p: Any) -> dict[str, Array]:
+    """Values of `WARNINGS` by name.
+
+    Args:
+        m: states of the diagnosis. p: its parameters.
+    """
+    return {
+        "efficiency_unknown": np.where(m.full_blocks > BLOCKS + 0.5, 0.0, 1.0),
+        "efficiency_outside": np.where(m.outside_updates >= OUTSIDE_UPDATES, 1.0, 0.0),
+        "efficiency_impossible": np.where(m.held_efficiency_estimate > 1.0 + p.efficiency_limit, 1.0, 0.0),
+        "readings_repeated": np.where(m.repeated > REPEATED_SHARE * np.maximum(m.samples, 1.0), 1.0, 0.0),
+    }

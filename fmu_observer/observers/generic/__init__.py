@@ -1,0 +1,1 @@
+"""Observers of any model, in rooms by what they share. The model is an option: ``model="pendulum"``."""

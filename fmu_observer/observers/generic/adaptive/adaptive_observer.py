@@ -1,0 +1,331 @@
+"""Base of the adaptive observers of state-affine models: their signals, their outputs and what all of them do between
+samples.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.certificates.limits import Limit, PrintedBound
+from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
+from fmu_observer.formulas.adaptation.adaptive_law import (
+    Adaptation,
+    Gains,
+    Plant,
+    Sizes,
+    adaptation_flow,
+    adaptation_of,
+    adaptation_states,
+    covariance_after,
+    error_drift,
+    gains_of,
+    learnt_constants,
+    smallest_eigenvalue,
+    start_covariance,
+)
+from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
+from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.generic.adaptive.adaptive_certificate import (
+    HORIZON,
+    LEFT,
+    adaptation_limit,
+    errors_left,
+    shortest_tried,
+)
+from fmu_observer.observers.generic.adaptive.adaptive_trials import adaptive_trial
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, scalar_names, state
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+
+LATER, EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
+LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
+NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
+LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
+ADAPTIVE_PARAMETERS = (
+    parameter("mu", "1/s", 10.0, "Decay of S: the state's gain forgets measurements at this rate", min=1e-9),
+    parameter("forgetting", "1/s", 1.0, "Rate at which the adaptation gain forgets; 1 as published", min=0.0),
+    parameter("gain_floor", "1", 0.0, "One over the largest adaptation gain; 0 for no limit, as published", min=0.0),
+    parameter("least_excitation", "1", 0.0, "Mean excitation below which a constant is held; 0 for never", min=0.0),
+    parameter("excitation_time", "s", 1.0, "Window of the mean excitation", min=1e-9),
+)
+
+
+class AdaptiveObserver(GatedObserver, GapCertified):
+    """Base of the observers of state and unknown constants at once: Hann 2014, chapter 4.
+
+    States are the estimates, the constants, the adaptation (`adaptive_law.adaptation_states`), and what a subclass
+    keeps of the measurements, q numbers. Outputs are the estimates and the constants under their names, for each
+    constant `<name>_deviation`, the standard deviation of its error, and `<name>_learnt`, 1 where it is learnt and 0
+    where it is held for want of excitation; `smallest_excitation`, the smallest eigenvalue of the mean of
+    ``chi' chi``; and `innovation`.
+
+    The covariance is exact for the model with white noise of `noise_deviation` at each measurement, whatever the
+    instants: the errors obey a linear equation that the observer knows. It begins at `NOTHING_KNOWN` for all.
+
+    Args:
+        model: a state-affine model or the name of one. sampled: whether the sensitivity of the output is sampled like
+            it. options: of the subclass.
+
+    Raises:
+        ValueError: the model is unknown, or has more than three unknown constants.
+    """
+
+    internal_step = 5e-3
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
+    predicts: ClassVar[bool]
+
+    def __init__(self, model: str | StateAffineModel, sampled: bool, **options: Any) -> None:
+        self.model = chosen = find_state_affine_model(model)
+        self.sizes = Sizes(chosen.order, len(chosen.unknowns), len(chosen.measurements), sampled)
+        if self.sizes.m not in (1, 2, 3):
+            raise ValueError(
+                f"{self.name}: the model {chosen.name!r} has {self.sizes.m} unknown constants; 1 to 3 can be learnt."
+            )
+        believed = (*chosen.states, *chosen.unknowns)
+        first = start_covariance(chosen.C, (NOTHING_KNOWN,) * len(believed), self.sizes, self.predicts)
+        self.states = (
+            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in believed),
+            *adaptation_states(self.sizes, first),
+            self.kept_signal(),
+        )
+        self.inputs = chosen.inputs
+        self.outputs = adaptive_outputs(chosen)
+        self.parameters = (
+            *ADAPTIVE_PARAMETERS,
+            parameter("noise_deviation", "1", 0.0, "Standard deviation of the noise of a measurement", min=0.0),
+        )
+        payload = tuple(
+            input_signal(f"{chosen.event}_{s.name}", s.unit, s.start, s.description, variability="discrete")
+            for s in chosen.measurements
+        )
+        read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
+        self.events = (TriggeredEvent(chosen.event, payload, text, samples=read),)
+        super().__init__(model=chosen.name, **options)
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def kept_signal(self) -> Signal:
+        """What is kept of the measurements: q predicted outputs (a state), or q held innovations (memory)."""
+
+    @abstractmethod
+    def acting(self, x: Any) -> Array:
+        """The innovation that acts, shape (q,)."""
+
+    @abstractmethod
+    def kept_after(self, x: Any, y: Array) -> dict[str, Array]:
+        """What is kept once the measurements y are known, by name."""
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The parameters lie within their bounds."""
+        return super().requirements(p) | within_bounds(self.parameters[: len(ADAPTIVE_PARAMETERS) + 1], p)
+
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, constants, adaptation, and predicted outputs where they are predicted."""
+        estimate, rho, adaptation = self._parts(x)
+        known = stacked_of(u, self.model.inputs)
+        plant = Plant(
+            self.model.drift(t, known), self.model.drive(t, known), self.model.regressor(t, known), self.model.C
+        )
+        gains = self._gains(adaptation, p)
+        c = self.acting(x)
+        predicted = plant.A @ estimate + plant.B + plant.Phi @ rho
+        drift = error_drift(plant, gains, self.sizes, self.predicts)
+        return {
+            **named_as(self.model.states, predicted - gains.total @ c, "estimated_"),
+            **named_as(self.model.unknowns, -(gains.constants @ c), "estimated_"),
+            **adaptation_flow(adaptation, plant, gains, drift, p.mu, p, self.sizes),
+            **({"predicted_output": self.model.C @ predicted - gains.output @ c} if self.predicts else {}),
+        }
+
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """What is kept is set by the measurements, and the covariance with it; all else stays continuous."""
+        V, variance = x.error_covariance, p.noise_deviation**2
+        for row in range(self.sizes.q):
+            V = covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
+        seen = {"seen_sensitivity": self.model.C @ x.sensitivity} if self.sizes.sampled else {}
+        y = stacked_of(u, self.model.measurements, f"{self.model.event}_")
+        return seen | {"error_covariance": V} | self.kept_after(x, y)
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, constants with their uncertainty, excitation and innovation."""
+        n, m = self.sizes[:2]
+        estimate, rho, adaptation = self._parts(x)
+        learnt = learnt_constants(adaptation.excitation, p.least_excitation, m)
+        found = named_as(self.model.states, estimate)
+        for j, s in enumerate(self.model.unknowns):
+            variance = adaptation.covariance[n + j, n + j]
+            found |= {
+                s.name: rho[j],
+                f"{s.name}_deviation": np.sqrt(np.maximum(variance, LEAST_VARIANCE)),
+                f"{s.name}_learnt": learnt[j],
+            }
+        innovation = self.acting(x)
+        return found | {
+            "smallest_excitation": smallest_eigenvalue(adaptation.excitation, m),
+            "innovation": innovation[0] if self.sizes.q == 1 else innovation,
+        }
+
+    # -- certificate ------------------------------------------------------------------------------------------------
+
+    def known_error(self, mu: float) -> ImpulsiveError:
+        """Error of the observer that knows the constants, its gain settled, A as it is at time 0.
+
+        Args:
+            mu: decay of S [1/s].
+        """
+        K = settled_gain(self.model, mu)
+        decay = self.model.C @ K if self.predicts else np.zeros((self.sizes.q, self.sizes.q))
+        u = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        return ImpulsiveError.with_innovation(np.asarray(self.model.drift(0.0, u)), K, decay, self.model.C)
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of the state's error with the constants known, and what the adaptation leaves at `max_gap`."""
+        found = certify_sampled_error(
+            (self.known_error(float(p.mu)),),
+            max_gap,
+            "errors of the states with the constants known, the gain settled and A as it is at time 0; those of the "
+            "adaptation by their linear equation, which no measurement enters, from the start on and at a constant gap "
+            "only; noise is left out",
+        )
+        values = np.concatenate([np.ravel(np.asarray(getattr(p, s.name), float)) for s in self.parameter_signals])
+        left = errors_left(self, values, max_gap)
+        of_constants = ", ".join(
+            f"{s.name} {share:.2g}" for s, share in zip(self.model.unknowns, left.constants, strict=True)
+        )
+        note = (
+            f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
+            f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
+        )
+        known = first_unstable_gap([self.known_error(float(p.mu))], LONGEST_PERIOD)
+        longest = adaptation_limit(self, values, min(known, LONGEST_PERIOD))
+        return replace(
+            found,
+            holds=found.holds and max_gap <= longest and left.states < LEFT,
+            spectral_radius=max(found.spectral_radius, left.states ** (max_gap / HORIZON)),
+            constant_limit=min(found.constant_limit, longest),
+            aperiodic_limit=min(found.aperiodic_limit, longest),
+            notes=(*found.notes, note),
+        )
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or has another size.
+        """
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        early, late = (adaptive_bounds(self.model, float(p.mu), begin=begin) for begin in (0.5 * LATER, LATER))
+        alpha0 = late.alpha0
+        values = {"alpha0": alpha0, "least_alpha0": EXCITED * early.alpha0}
+        statement = (
+            f"excitation that lasts, alpha0 >= least_alpha0: at {LATER:g} s at least {EXCITED:g} of that at "
+            f"{0.5 * LATER:g} s"
+        )
+        excited = alpha0 > 0.0 and alpha0 >= values["least_alpha0"]
+        if not self.predicts:
+            return Condition(excited, values, statement, "Hann 2014, (4.8); theorem 4.6 prints no period")
+        longest = late.longest_period
+        return Condition(
+            excited and self.model.sample_period <= longest,
+            values
+            | {
+                "smallest_inverse_R": gain_bound(late.window, alpha0),
+                "period": self.model.sample_period,
+                "longest_period": longest,
+            },
+            f"{statement}; period <= longest_period [s], sufficient and ten orders of magnitude too careful",
+            "Hann 2014, (4.8), Lemma 4.3, (4.63)",
+        )
+
+    # -- limits -----------------------------------------------------------------------------------------------------
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Between two samples: (4.63) beside the exact limit of the linear error equations, and trials.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or has another size.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        mu = float(self.unpack_parameters(values).mu)
+        bounds = adaptive_bounds(self.model, mu)
+        trial = adaptive_trial(self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True)))
+        known = min(first_unstable_gap([self.known_error(mu)], LONGEST_PERIOD), LONGEST_PERIOD)
+        adapted = adaptation_limit(self, values, known, trial.left)
+        return (
+            Limit(
+                "period of the samples",
+                printed=(
+                    PrintedBound(
+                        bounds.longest_period,
+                        f"tau_MASP for a vanishing rate, {bounds.explain()}; from time 0 on, later alpha0 is smaller",
+                        "Hann 2014, (4.63)",
+                    ),
+                )
+                if self.predicts
+                else (),
+                exact=adapted if known == LONGEST_PERIOD else min(adapted, known),
+                looked=LONGEST_PERIOD,
+                tried=shortest_tried(known),
+                exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
+                f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",
+                trial=trial,
+            ),
+        )
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def estimates(self, x: Any) -> Array:
+        """The estimated state, shape (n,)."""
+        return stacked_of(x, self.model.states, "estimated_")
+
+    def _parts(self, x: Any) -> tuple[Array, Array, Adaptation]:
+        rho = stacked_of(x, self.model.unknowns, "estimated_")
+        return self.estimates(x), rho, adaptation_of(x, self.model.C, self.sizes)
+
+    def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
+        learnt = learnt_constants(adaptation.excitation, p.least_excitation, self.sizes.m)
+        return gains_of(adaptation, self.model.C, learnt)
+
+
+def adaptive_outputs(model: StateAffineModel) -> tuple[Signal, ...]:
+    """Outputs of an adaptive observer of a model.
+
+    Args:
+        model: state-affine.
+    """
+    of_constants: list[Signal] = []
+    for s in model.unknowns:
+        of_constants += [
+            output_signal(s.name, s.unit, f"Estimate: {s.description}"),
+            output_signal(f"{s.name}_deviation", s.unit, f"Standard deviation of its error: {s.description}"),
+            output_signal(f"{s.name}_learnt", "1", f"1 where it is learnt, 0 where it is held: {s.description}"),
+        ]
+    q = len(model.measurements)
+    return (
+        *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in model.states),
+        *of_constants,
+        output_signal("smallest_excitation", "1", "Smallest eigenvalue of the mean Gramian of the excitation"),
+        output_signal("innovation", "1", "Innovation that acts", size=None if q == 1 else q),
+    )

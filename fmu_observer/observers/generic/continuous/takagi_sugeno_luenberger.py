@@ -1,0 +1,125 @@
+"""O7: the Takagi-Sugeno Luenberger observer, all measurements continuous."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.certificates.condition import Condition
+from fmu_observer.design.takagi_sugeno_luenberger import placed_gains, vertex_decrease
+from fmu_observer.models import TAKAGI_SUGENO_MODELS, TakagiSugenoModel, find_takagi_sugeno_model
+from fmu_observer.models.checks import checked_matrix
+from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+from plant_models.hybrid.system import Array
+
+Premise = Literal["measured", "estimated"]
+PREMISES: tuple[Premise, ...] = ("measured", "estimated")
+SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, ... [ours]
+
+
+class TakagiSugenoLuenberger(HybridSystem):
+    """Takagi-Sugeno Luenberger observer ``dxh = sum_i h_i [A_i xh + B_i u - K_i (C xh - y)]``: Bouchama 2024,
+    (1.19)-(1.28).
+
+    All measurements of the model, those it calls sampled too, are continuous inputs here. The premises are read from
+    the state nearest to the estimate that agrees with the measurements (``measured``), or from the estimate as printed
+    in (1.19) (``estimated``). Where the measurements give all premises the error obeys
+    ``de = sum h_i (A_i - K_i C) e``, and the inequalities of (1.26) decide: ``A_i' P + P A_i - L_i C - C' L_i' < 0``,
+    ``K_i = inv(P) L_i``. Repaired: the print has ``L_i' C'``. `condition` seeks P for the gains in use and recomputes
+    the inequalities.
+
+    Default gains [ours]: the same poles at every vertex, from -2 1/s on;
+    `design.takagi_sugeno_luenberger.designed_gains` solves the inequalities instead. Premises outside their bounds use
+    the nearer vertices; `premise_outside_time` says for how long.
+
+    Args:
+        model: a Takagi-Sugeno model or the name of one. premise: see above.
+        gains: K_i, shape (N, n, q), for the starts of the parameter; None for the default.
+
+    Raises:
+        ValueError: model or premise is unknown, gains are of another shape, or a vertex is not observable.
+    """
+
+    name = "takagi_sugeno_luenberger"
+    description = "Takagi-Sugeno Luenberger observer, continuous measurements"
+    source = "Bouchama 2024, (1.19)-(1.28), inequality (1.26) repaired"
+    internal_step = 5e-3
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
+
+    def __init__(
+        self,
+        model: str | TakagiSugenoModel = "pendulum",
+        premise: Premise = "measured",
+        gains: np.ndarray | None = None,
+    ) -> None:
+        self.model = chosen = find_takagi_sugeno_model(model)
+        if premise not in PREMISES:
+            raise ValueError(f"{self.name}: unknown premise {premise!r}; use {', '.join(map(repr, PREMISES))}.")
+        self.premise = premise
+        n, shape = chosen.order, (chosen.vertices, chosen.order, len(chosen.measurements))
+        K = placed_gains(chosen, -SPEED * (1.0 + 0.25 * np.arange(n))) if gains is None else gains
+        K = checked_matrix(self.name, "gain", K, shape, "vertices, states, measurements")
+        self.states = (
+            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in chosen.states),
+            state("time_outside", "s", 0.0, "For how long a premise was outside its bounds"),
+        )
+        measured = (input_signal(f"measured_{s.name}", s.unit, s.start, s.description) for s in chosen.measurements)
+        self.inputs = (*chosen.inputs, *measured)
+        self.outputs = (
+            *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in chosen.states),
+            output_signal("premise_outside_time", "s", "For how long a premise was outside its bounds"),
+        )
+        text = "Gains K_i: by vertex, state, measurement, in SI units"
+        self.parameters = (parameter("gain", "1", tuple(map(float, K.ravel())), text, size=K.size),)
+        super().__init__(model=chosen.name, premise=premise)
+
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates and time outside the bounds."""
+        model = self.model
+        estimate, known = stacked_of(x, model.states, "estimated_"), stacked_of(u, model.inputs)
+        y = stacked_of(u, model.measurements, "measured_")
+        count = len(model.sampled)
+        seen = model.informed(estimate, y[:count], y[count:]) if self.premise == "measured" else estimate
+        values = model.premise_values(seen, known)
+        h, error = model.weights(values), model.C @ estimate - y
+        moved = model.blend(h, estimate, known)
+        for i, weight in enumerate(h):
+            moved = moved - weight * (self._gain_of(p, i) @ error)
+        return named_as(model.states, moved, "estimated_") | {"time_outside": model.outside(values)}
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The estimates, and how long premises were outside their bounds."""
+        estimate = stacked_of(x, self.model.states, "estimated_")
+        return named_as(self.model.states, estimate) | {"premise_outside_time": x.time_outside}
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """Whether one quadratic Lyapunov function covers all vertices for the gains in use.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        found = vertex_decrease(
+            self.model, np.stack([np.asarray(self._gain_of(p, i)) for i in range(self.model.vertices)])
+        )
+        hidden = len(self.model.unmeasured) if self.premise == "measured" else len(self.model.premises)
+        return Condition(
+            holds=found.margin > 0.0 and not hidden,
+            values={
+                "vertices": self.model.vertices,
+                "abscissa": found.abscissa,
+                "margin": found.margin,
+                "premises_not_measured": hidden,
+            },
+            statement="one P > 0 makes (A_i - K_i C)' P + P (A_i - K_i C) < 0 at every vertex (margin > 0), premises "
+            "measured",
+            source="Bouchama 2024, (1.26), repaired",
+        )
+
+    def _gain_of(self, p: Any, vertex: int) -> Array:
+        n, q = self.model.order, len(self.model.measurements)
+        return np.reshape(p.gain[vertex * n * q : (vertex + 1) * n * q], (n, q))

@@ -1,0 +1,104 @@
+"""How long between two packets, and how late, the delayed-state observer survives: printed, exact and by trials.
+
+It knows the observer by its type only; bounds come from `design.network_bounds`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.limits import Limit, PrintedBound, Trial, Varied
+from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, exact_predictor_delay
+from fmu_observer.observers.model_trial import WRONG_START, model_trial
+
+if TYPE_CHECKING:
+    from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
+
+MOST_PLACES = 60  # of a trial
+LONGEST_INTERVAL = 100.0  # [s] to which the exact limit of the packets is looked for
+LONGEST_TRIAL = 2.0  # [s] of trials, each predictor its own share
+THEOREM = "Hann 2014, (2.17)"
+
+
+def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
+    """Longest interval of the packets: (2.17), the spectral radius over a period of the protocol, trials.
+
+    Args:
+        observer: to judge. p: its parameters, as in `HybridSystem.flow`. named: the same by name. bounds: of Theorem
+            2.1.
+    """
+    text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
+    interval = _interval(observer, p)
+    high, trial = min(2.0 * interval, LONGEST_TRIAL), None
+    if interval > 0.0:
+        trial = _trial(observer, "period", high, named, delayed=True, delay=min(float(p.delay), 0.05))
+    return Limit(
+        "interval of the packets" + (", one node each" if _nodes(observer) else ""),
+        printed=(
+            PrintedBound(bounds.longest_interval, f"tau_MATI < 1/(gamma |H| N L), {text}", THEOREM),
+            PrintedBound(
+                bounds.strict_interval,
+                f"gamma |H| N L tau exp(sigma N tau) < 1, the factor left out of (2.17) kept, sigma = "
+                f"{bounds.decay:.3g} 1/s",
+                "proof of (2.45)",
+            ),
+        ),
+        exact=interval,
+        looked=LONGEST_INTERVAL,
+        exact_test="spectral radius over a period of the protocol, model linearised at its start",
+        trial=trial,
+    )
+
+
+def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
+    """Longest delay of an observer with predictors: (2.17) and (2.59), the roots of the linearised model, trials.
+
+    Args:
+        observer: to judge. p: its parameters, as in `HybridSystem.flow`. named: the same by name. bounds: of Theorem
+            2.1.
+    """
+    exact = exact_predictor_delay(observer.linearised_drift(), observer.predictors)
+    longest = min(1.5 * exact, LONGEST_TRIAL * observer.predictors)
+    places = int(np.ceil(longest / (observer.predictors * float(p.memory_period)) - 1e-9))
+    tried = observer.remembering(min(max(places, observer.memory_places), MOST_PLACES))
+    stretched = {
+        **named,
+        "memory_period": max(float(p.memory_period), longest / tried.total_places),
+        **{f"prediction[{i + 1}]": v + WRONG_START for i, v in enumerate(tried.prediction_starts)},
+    }
+    period = min(observer.model.sample_period, 0.5 * _interval(observer, p))
+    share = "" if observer.predictors == 1 else f" / {observer.predictors}"
+    return Limit(
+        f"delay, {observer.predictors} predictor{'s' if observer.predictors > 1 else ''}",
+        printed=(
+            PrintedBound(
+                bounds.longest_delay,
+                f"(L/sigma) (exp(sigma tau_MAD{share}) - 1) < 1, L = {bounds.lipschitz:.3g} 1/s, sigma = "
+                f"{bounds.decay:.3g} 1/s",
+                THEOREM if observer.predictors == 1 else "Hann 2014, (2.59)",
+            ),
+        ),
+        exact=exact,
+        exact_test="roots of s = l (1 - exp(-s tau)), l the eigenvalues of the model linearised at its start",
+        trial=_trial(tried, "delay", longest, stretched, period=period) if period > 0.0 else None,
+    )
+
+
+def _interval(observer: DelayedStateObserver, p: Any) -> float:
+    """First interval between packets at which the error grows from round to round [s]."""
+    return first_unstable_gap([observer.turned_error(observer.linearised_drift(), p, observer.turns)], LONGEST_INTERVAL)
+
+
+def _trial(
+    observer: DelayedStateObserver, what: Varied, high: float, named: Mapping[str, Any], **settings: Any
+) -> Trial:
+    settings |= {"nodes": _nodes(observer), "node_events": observer.node_events}
+    return model_trial(observer, what, high / 50.0, high, named, delay_parameter="delay", **settings)
+
+
+def _nodes(observer: DelayedStateObserver) -> int:
+    return len(observer.turns) if len(observer.turns) > 1 else 0

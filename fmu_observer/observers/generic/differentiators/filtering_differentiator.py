@@ -1,0 +1,54 @@
+"""O5: the filtering differentiator of a signal as a system. The equations are in `differentiator`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
+from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+
+
+class FilteringDifferentiator(SignalDifferentiator):
+    """Differentiation order n with nf filter states, m = n + nf: Bouchama 2024, (1.16), Theorem 4.
+
+    ``dW_i = -g_{m+1-i} L^(i/(m+1)) |W_1|^((m+1-i)/(m+1)) sgn(W_1) + W_{i+1}``, ``z_0 - f`` in place of ``W_{nf+1}``,
+    and ``dz_j = -g_{n-j} L^((nf+1+j)/(m+1)) |W_1|^((n-j)/(m+1)) sgn(W_1) + z_{j+1}``, g the row m of Table 1.1.
+    Repaired: the exponent nf + 1 + j is the general one, the print shows that of j = 0 in two places. It rejects noise
+    with a small integral of order up to nf, however large: a fast oscillation, a spike.
+
+    Args:
+        order: n. filtering_order: nf, at least 1; n + nf at most 5. unit: unit of the signal.
+    """
+
+    name = "filtering_differentiator"
+    description = "Filtering differentiator of a signal"
+    source = "Bouchama 2024, (1.16), Theorem 4, general exponent"
+    internal_step = 1e-3
+    method = "euler"  # Levant's discretisation; stages of a higher order see a signal that stands still while they move
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "order": (0, 1, 2),
+        "filtering_order": tuple(range(1, LARGEST)),
+    }
+
+    def __init__(self, order: int = 1, filtering_order: int = 3, unit: str = "1") -> None:
+        require_whole(self.name, 0, filtering_order=filtering_order)
+        if filtering_order < 1:
+            raise ValueError(
+                f"{self.name}: filtering order {filtering_order}, expected at least 1; use levant_differentiator "
+                f"without."
+            )
+        super().__init__(order, filtering_order, unit)
+
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of filter states and estimates."""
+        w, z = stacked_of(x, self.filters), stacked_of(x, self.estimates)
+        dw, dz = filtering_differentiator_flow(w, z, u.signal, p.bound)
+        return named_as((*self.filters, *self.estimates), (*dw, *dz))
+
+    def interval(self, p: Any) -> float:
+        """The internal step [s]."""
+        return float(p.internal_step)

@@ -1,0 +1,87 @@
+"""Whether a filter has a steady state: the Riccati equation of its model, linearised at the start. Plain NumPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.certificates.condition import Condition
+from fmu_observer.design.pole_placement import observability_matrix
+from fmu_observer.design.riccati import steady_filter
+from fmu_observer.formulas.filtering.kalman import through
+from fmu_observer.models.filter_model import FilterModel, Known
+from plant_models.hybrid.system import Array
+
+DOUBTED, WRONG = 1e-4, 1e-2  # differences at half the step: told, and too much for a filter to rest on [ours]
+INACCURATE = (
+    "its transition over a period is not accurate: steps of half the length change it by {error:.2g} of its size; set "
+    "a shorter sample_period or more substeps (option `substeps`), or leave that out and give the option `period`"
+)
+
+
+def steady_condition(
+    model: FilterModel, x: np.ndarray, known: Known, period: float, noise: np.ndarray, readings: np.ndarray, source: str
+) -> Condition:
+    """Detectability, stabilisability by the noise, and the stationary Riccati equation, as numbers.
+
+    Args:
+        model: the model. x: state that it is linearised at, shape (n,). known: time, inputs and parameters there.
+        period: of the measurements [s]. noise: covariance of the process noise in it, shape (r, r).
+        readings: covariance of the measurement noise, shape (s, s). source: of the filter.
+
+    Returns:
+        The condition: it holds where the Riccati equation has a stabilising solution.
+    """
+    (F, W), (H, V) = model.transition_jacobians(x, known, period), model.measurement_jacobians(x, known)
+    error = model.transition_error(x, known, period)
+    if not np.isfinite(np.asarray(F)).all():
+        return _inaccurate(error, source)
+    F, H, Q, R = (np.asarray(matrix) for matrix in (F, H, through(noise, W), through(readings, V)))
+    steady, matrix = steady_filter(F, H, Q, R), observability_matrix(F, H)
+    where = "" if model.linear else ", linearised at the start of the estimates"
+    driven = observability_matrix(F.T, Q)
+    rank, reached = int(np.linalg.matrix_rank(matrix)), int(np.linalg.matrix_rank(driven))
+    doubts = (INACCURATE.format(error=error),) if error > DOUBTED else ()
+    return Condition(
+        holds=steady is not None and error <= WRONG,
+        values={
+            "rank": rank,
+            "order": model.order,
+            "driven": reached,
+            "smallest_singular_value": float(np.linalg.svd(matrix)[1][-1]),
+            "spectral_radius": np.inf if steady is None else steady.spectral_radius,
+            "transition_error": error,
+        },
+        statement="the gain settles and errors die out: the stationary Riccati equation has a stabilising solution, "
+        f"with spectral_radius of A (I - K C) below 1{where}. Of {model.order} states the measurements observe {rank}, "
+        f"and the process noise drives {reached}; steps of half the length change the transition over a period by "
+        f"transition_error, at most {WRONG:g}",
+        source=source,
+        doubts=doubts,
+    )
+
+
+def within_steps(model: FilterModel, p: Any) -> dict[str, Array]:
+    """That the period is none in which steps are longer than those of the system that a model comes from.
+
+    Args:
+        model: the model. p: parameters of the filter.
+
+    Returns:
+        By text: 1 where it is fulfilled, else 0; nothing for a model of any period.
+    """
+    if not np.isfinite(model.longest_period):
+        return {}
+    text = (
+        f"sample_period must be at most {model.longest_period:.9g} s: in a longer one each step of the transition is "
+        "longer than the internal step of the plant; give the option period what sample_period is to be, or say by the "
+        "option substeps how many steps are enough"
+    )
+    return {text: np.where(p.sample_period <= model.longest_period, 1.0, 0.0)}
+
+
+def _inaccurate(error: float, source: str) -> Condition:
+    """Of a transition that gives no numbers."""
+    text = "the transition over a period is a number"
+    return Condition(False, {"transition_error": error}, text, source, (INACCURATE.format(error=error),))

@@ -1,0 +1,113 @@
+"""Held innovation that decays after its sample at a rate of its own, exponentially or to an end in finite time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.certificates.limits import PrintedBound
+from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DecayBounds, decay_bounds
+from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_parameters, innovation_left
+from fmu_observer.models import ObserverModel
+from fmu_observer.observers.generic.sampled.held_innovation import HeldInnovation
+from fmu_observer.observers.model_observer import as_matrix
+from plant_models.hybrid import Signal
+from plant_models.hybrid.system import Array
+
+DECAY_RATE, DECAY_EXPONENT = 10.0, 0.5  # [1/s], [1]; Hann 2014, section 3.4.3
+PUBLISHED_THETA, PUBLISHED_K = 10.0, (1.0, 2.0)
+
+
+class DecayingInnovation(HeldInnovation):
+    """High-gain observer with a held innovation that decays by ``phi' = -eta phi^a``: Hann 2014, (3.72).
+
+    ``dxh = A xh + psi(xh, u) - theta inv(Delta) K phi (C xh(t_k) - y(t_k))``, ``phi(t_k) = 1``. With a = 1 and
+    ``eta = theta K_1`` it is `exponential_gain`, and so `output_predictor`; with ``eta = 0`` it is `held_innovation`,
+    the constant gain of (3.112). phi is used in closed form, of the time since the sample. With a < 1 the innovation
+    ends after ``1/((1 - a) eta)``, whatever the gap: an old sample does nothing more. The model must be a chain with
+    its first block measured.
+
+    Presets, for chains of two blocks: `as_published` (theta = 10, K = (1, 2)), which contradicts every published number
+    and is unstable from 0.10 s on without decay; `repaired` (theta = 5, K = (2, 1)), which gives them. Both eta = 10
+    1/s; a = 0.5, of the printed 1, 0.5 and 0.25.
+    """
+
+    name = "decaying_innovation"
+    description = "High-gain observer at aperiodic samples, innovation held and decaying to an end"
+    source = "Hann 2014, (3.72)-(3.112)"
+    theta_start = 5.0
+
+    def __init__(self, model: str | ObserverModel = "pendulum") -> None:
+        super().__init__(model)
+        if self.model.order == 2 * self.outputs_count:
+            published = np.kron(np.array(PUBLISHED_K)[:, None], np.eye(self.outputs_count))
+            self.presets = {
+                "as_published": {"theta": PUBLISHED_THETA, "high_gain": tuple(map(float, published.ravel()))},
+                "repaired": {},
+            }
+            self.default_preset = "repaired"
+
+    def theta_parameters(self) -> tuple[Signal, ...]:
+        """Theta, rate and exponent of the decay."""
+        return (*super().theta_parameters(), *decay_parameters(DECAY_RATE, DECAY_EXPONENT))
+
+    def declare_sampled_part(self, model: ObserverModel) -> None:
+        """The innovation, in memory, and the time since it was set."""
+        super().declare_sampled_part(model)
+        self.extra_states = (ELAPSED,)
+
+    def acting(self, x: Any, p: Any) -> Array:
+        """What is left of the innovation, shape (q,)."""
+        return innovation_left(x.elapsed, p.decay_rate, p.decay_exponent) * self.sampled_part(x)
+
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Model and correction, and time goes on."""
+        return super().flow(t, x, u, p) | {"elapsed": 1.0}
+
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The innovation is set anew; the estimates stay continuous."""
+        return super().update(event, t, x, u, p) | {"elapsed": 0.0}
+
+    def vertex_error(self, drift: np.ndarray, p: Any) -> DecayingError | ImpulsiveError:
+        """``de = drift e - theta inv(Delta) K phi C e(t_k)``."""
+        gain, _ = self.gain_matrices(p)
+        return decaying_error(drift, gain, self.model.C, float(p.decay_rate), float(p.decay_exponent), self.levels())
+
+    def bounds(self, p: Any) -> DecayBounds:
+        """The sufficient bounds of Theorem 3.4, as printed and as its proof needs them."""
+        model = self.model
+        K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
+        return decay_bounds(model.A, K, model.C, float(p.theta), float(p.decay_rate), model.lipschitz)
+
+    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+        """(3.109), and (3.105) with the factor that it leaves out."""
+        bounds = self.bounds(p)
+        enough, sigma = float(p.theta) > max(1.0, bounds.smallest_theta), 0.25 * bounds.alpha
+        premise = "" if enough else f", if theta were above {bounds.smallest_theta:.3g} 1/s"
+        strict = f"sigma = {sigma:.3g} 1/s, the factor exp(sigma T) left out of (3.109) kept{premise}"
+        return (
+            PrintedBound(bounds.longest_gap, f"tau_MASP, sigma to zero{premise}", "Hann 2014, (3.109)"),
+            PrintedBound(bounds.strict_gap(sigma), f"gamma_0 < 1, {strict}", "Hann 2014, (3.105)"),
+        )
+
+    def condition_of(self, p: Any) -> Condition:
+        """Theorem 3.4: the smallest theta, and the longest gap, against the model's `sample_period`."""
+        bounds, theta, gap = self.bounds(p), float(p.theta), self.model.sample_period
+        return Condition(
+            holds=theta > max(1.0, bounds.smallest_theta) and gap <= bounds.longest_gap,
+            values={
+                "theta": theta,
+                "smallest_theta": bounds.smallest_theta,
+                "printed_smallest_theta": bounds.printed_smallest_theta,
+                "gap": gap,
+                "longest_gap": bounds.longest_gap,
+                "lipschitz": self.model.lipschitz,
+            },
+            statement="theta > smallest_theta [1/s], gap <= longest_gap [s]; sufficient, a thousand times too careful; "
+            "certify() is exact",
+            source="Hann 2014, Theorem 3.4, (3.109), theta_0 with the factor lmax/lmin that (3.89) needs",
+        )

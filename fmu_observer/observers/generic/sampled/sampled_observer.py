@@ -1,0 +1,169 @@
+"""Base of the observers that a sampled measurement corrects by way of an innovation held or decaying until the next
+one.
+
+It knows models and certificates; the chain form that high-gain observers ask for is checked here.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import GapError
+from fmu_observer.certificates.limits import Limit, PrintedBound
+from fmu_observer.models import ObserverModel
+from fmu_observer.models.model import shift_matrix
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.model_observer import ModelObserver
+from fmu_observer.observers.model_trial import model_trial
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Signal, scalar_names, state, vector
+from plant_models.hybrid.system import Array
+
+
+class SampledObserver(ModelObserver, GatedObserver, GapCertified):
+    """Base of the observers corrected at the model's own `event`, its payload the measurements, periodic or not.
+
+    A subclass writes `flow`, `update`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the
+    model. What it keeps of the measurements is the state `sampled_state`, declared by `per_measurement`: a vector by
+    `sampled_part`, and back by `named_part`.
+    """
+
+    timing = "event"
+    sampled_state: ClassVar[str] = "innovation"
+    internal_step = 5e-3
+
+    @abstractmethod
+    def vertex_error(self, drift: np.ndarray, p: Any) -> GapError:
+        """Error equations where the model's flow has the Jacobian `drift`, shape (n, n)."""
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate over the vertices of the model's Jacobian."""
+        vertices = tuple(self.vertex_error(drift, p) for drift in self.model.drifts)
+        certificate = certify_sampled_error(vertices, max_gap, self.error_model())
+        return with_switching_noted(certificate, vertices, "slopes") if len(vertices) > 1 else certificate
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """How long the observer may wait for a sample: printed bounds, the certificate, and a trial beside its model.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        certificate = self.certify(self.model.sample_period, parameters, preset)
+        longest = certificate.constant_limit
+        high = 4.0 * longest if np.isfinite(longest) else certificate.horizon
+        return (
+            Limit(
+                "period of the samples",
+                printed=self.printed_bounds(self.unpack_parameters(values)),
+                exact=longest,
+                looked=certificate.horizon,
+                exact_test="first period at which the error grows from sample to sample, at an extreme slope",
+                trial=model_trial(self, "period", high / 50.0, high, self.named_values(values)) if high > 0.0 else None,
+            ),
+        )
+
+    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+        """Bounds of the sampling period that the source prints; by default that of the condition, where it has one."""
+        condition = self.condition_of(p)
+        gap = condition.values.get("longest_gap")
+        return () if gap is None else (PrintedBound(float(gap), condition.statement, condition.source),)
+
+    def named_values(self, values: np.ndarray) -> dict[str, float]:
+        """Parameters by scalar name, those that another program sets left out.
+
+        Args:
+            values: of all parameters, shape (k,).
+        """
+        return dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
+
+    def error_model(self) -> str:
+        """The error equations of the certificate in words."""
+        linear = f"error equations of the model {self.model.name!r}"
+        if not self.model.slopes:
+            return f"{linear}, exact if it is linear; {self.remark()}"
+        count = len(self.model.slopes)
+        return (
+            f"{linear} at the {count} extreme slope(s) of its nonlinear part, the slope constant over a gap; "
+            f"{self.remark()}"
+        )
+
+    def remark(self) -> str:
+        """What else the certificate leaves out."""
+        return "noise and model errors, inputs to it, are left out"
+
+    @property
+    def outputs_count(self) -> int:
+        """Number of measurements, q."""
+        return len(self.model.measurements)
+
+    def levels(self) -> tuple[int, ...]:
+        """Place of every estimate in its chain of derivatives, for a model in chain form."""
+        return tuple(i // self.outputs_count for i in range(self.model.order))
+
+    def sampled_part(self, x: Any) -> Array:
+        """What is kept of the measurements, shape (q,)."""
+        value = getattr(x, self.sampled_state)
+        return vector(value) if self.outputs_count == 1 else value
+
+    def named_part(self, values: Array) -> dict[str, Array]:
+        """The way back: what is kept of the measurements, or its derivative, by name of the state.
+
+        Args:
+            values: shape (q,).
+        """
+        return {self.sampled_state: values[0] if self.outputs_count == 1 else values}
+
+
+def per_measurement(model: ObserverModel, name: str, description: str, kind: Callable[..., Signal] = state) -> Signal:
+    """A state (or memory, by `kind`) per measurement: a scalar with its unit, or a vector, with the unit if they share
+    one.
+
+    Args:
+        name: of the signal. description: one line.
+
+    Raises:
+        ValueError: the model has no measurement.
+    """
+    units = {s.unit for s in model.measurements}
+    if not units:
+        raise ValueError(f"Observer model {model.name!r} has no measurement; an observer needs at least one.")
+    unit = units.pop() if len(units) == 1 else "1"
+    return kind(name, unit, 0.0, description, size=None if len(model.measurements) == 1 else len(model.measurements))
+
+
+def check_chain(model: ObserverModel, who: str) -> int:
+    """Width of the chain of a model in the normal form that high-gain observers need.
+
+    Args:
+        who: name of the observer, for the message.
+
+    Returns:
+        Number of states in a block, which is the number of measurements.
+
+    Raises:
+        ValueError: A is no block shift matrix, or the measurements are not the first block.
+    """
+    n, q = model.order, len(model.measurements)
+    fits = q > 0 and n % q == 0
+    if fits:
+        fits = np.array_equal(model.A, shift_matrix(n // q, q)) and np.array_equal(model.C, np.eye(q, n))
+    if not fits:
+        raise ValueError(
+            f"{who} does not suit the model {model.name!r}: it needs A the block shift matrix and C = [I 0], each "
+            f"state the "
+            f"derivative of the one before and the first block measured; got A = {model.A.tolist()}, C = "
+            f"{model.C.tolist()}. "
+            "Put the rest into phi."
+        )
+    return q

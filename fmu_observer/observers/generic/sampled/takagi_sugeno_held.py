@@ -1,0 +1,204 @@
+"""Base of the Takagi-Sugeno observers whose innovation is held from sample to sample.
+
+It knows Takagi-Sugeno models and certificates.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from itertools import combinations
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.certificates.quadratic import QuadraticCondition as Inequalities
+from fmu_observer.certificates.quadratic import common_quadratic_form, decrease, flow_condition
+from fmu_observer.design.pole_placement import observer_gain
+from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
+from fmu_observer.models.takagi_sugeno_registry import find_takagi_sugeno_model
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Event, Signal, input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid.system import Array
+
+SPEED, SPEED_GAP = 2.0, 0.4  # default poles from -min(SPEED [1/s], SPEED_GAP / longest gap) on [ours]
+SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certified
+SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
+
+
+class TakagiSugenoHeld(GatedObserver, GapCertified):
+    """Base of ``dxh = sum_i h_i [A_i xh + B_i u - L_i eta]``, ``eta = C xh - y`` set at samples and held between them.
+
+    All measurements of the model are sampled together. A subclass says when (`sampling_event`), and from what the
+    weights come (`weights`).
+
+    Default L_i: poles of ``A_i - L_i C`` the same at every vertex, real from ``-min(2, 0.4 / longest gap)`` 1/s on
+    [ours].
+    """
+
+    internal_step = 5e-3
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": SUITED}
+    payload_in_event: ClassVar[bool] = True
+    extra_memory: tuple[Signal, ...] = ()
+
+    def __init__(self, model: str | TakagiSugenoModel = "pendulum") -> None:
+        self.model = find_takagi_sugeno_model(model)
+        self.parameters = (self._gain_parameter(), *self.timing_parameters())
+        self.states = (
+            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states),
+            *(
+                memory(f"innovation_{s.name}", s.unit, 0.0, f"Held error: {s.description}")
+                for s in self.model.measurements
+            ),
+            *self.weight_memory(),
+        )
+        measured = tuple(
+            _renamed(s, self.measurement_name(s.name), self.payload_in_event) for s in self.model.measurements
+        )
+        self.inputs = self.model.inputs if self.payload_in_event else (*self.model.inputs, *measured)
+        self.outputs = tuple(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in self.model.states)
+        self.events = (self.sampling_event(measured if self.payload_in_event else ()),)
+        super().__init__(model=self.model.name)
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
+        """The event at which the measurements are taken."""
+
+    @abstractmethod
+    def measurement_name(self, name: str) -> str:
+        """How the input of a measurement is called."""
+
+    @abstractmethod
+    def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
+        """Weights h_i in use now, N numbers."""
+
+    @abstractmethod
+    def premise_remark(self) -> str:
+        """What the certificate leaves out of the premises."""
+
+    def timing_parameters(self) -> tuple[Signal, ...]:
+        """Parameters besides the gains."""
+        return ()
+
+    def weight_memory(self) -> tuple[Signal, ...]:
+        """Memory of the weights, if they are frozen."""
+        return ()
+
+    def held_weights(self, estimate: Array, u: Any) -> dict[str, Array]:
+        """What goes into that memory at a sample, by name, of the estimate there."""
+        return {}
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Blended model and held correction."""
+        weights, eta = self.weights(x, u), stacked_of(x, self.model.measurements, "innovation_")
+        total = self.model.blend(weights, self.estimates(x), self.known(u))
+        for weight, L in zip(weights, self.gains(p), strict=True):
+            total = total - weight * (L @ eta)
+        return named_as(self.model.states, total, "estimated_")
+
+    def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The innovation is set anew, and the weights where they are frozen; the estimates stay continuous."""
+        estimate = self.estimates(x)
+        innovation = self.model.C @ estimate - self.measured(u)
+        return named_as(self.model.measurements, innovation, "innovation_") | self.held_weights(estimate, u)
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """The estimates."""
+        return named_as(self.model.states, self.estimates(x))
+
+    def estimates(self, x: Any) -> Array:
+        """The estimates within the state, shape (n,)."""
+        return stacked_of(x, self.model.states, "estimated_")
+
+    def known(self, u: Any) -> Array:
+        """The model's inputs, shape (m,)."""
+        return stacked_of(u, self.model.inputs)
+
+    def measured(self, u: Any) -> Array:
+        """The measurements at a sample, shape (q,)."""
+        return stacked_of(u, self.model.measurements, self.measurement_name(""))
+
+    def gains(self, p: Any) -> tuple[Array, ...]:
+        """L_i, N of them, each of shape (n, q)."""
+        size = self.model.order * len(self.model.measurements)
+        shape = (self.model.order, len(self.model.measurements))
+        return tuple(np.reshape(p.gain[i * size : (i + 1) * size], shape) for i in range(self.model.vertices))
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """One quadratic function for all ``A_i - L_i C``, and the unknown slope it tolerates: samples without gaps.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        closed = self._closed(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
+        inequalities = reduce(Inequalities.joined, (flow_condition(matrix) for matrix in closed))
+        candidate = common_quadratic_form(inequalities)
+        margin = -np.inf if candidate is None else -float(decrease(inequalities, candidate.P).max())
+        largest = np.nan if candidate is None else float(np.linalg.eigvalsh(candidate.P)[-1])
+        return Condition(
+            holds=margin > 0.0,
+            values={
+                "abscissa": max(float(np.linalg.eigvals(matrix).real.max()) for matrix in closed),
+                "margin": margin,
+                "tolerated_slope": max(0.0, 0.5 * margin / largest) if margin > 0.0 else 0.0,
+            },
+            statement="one P > 0 decreases for all A_i - L_i C (margin > 0) and an unknown f with |f| <= "
+            "tolerated_slope |e|; "
+            "gaps are judged by certify()",
+            source=self.source,
+        )
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate over the vertices and mixtures of every two: three mixtures if there are two vertices, else
+        one.
+        """
+        gains = [np.asarray(L, dtype=float) for L in self.gains(p)]
+        shares = SHARES if len(gains) == 2 else (0.5,)
+        mixtures = [(i, i, 1.0) for i in range(len(gains))]
+        mixtures += [(i, j, s) for i, j in combinations(range(len(gains)), 2) for s in shares]
+        vertices = tuple(
+            self._error(s * self.model.A[i] + (1.0 - s) * self.model.A[j], s * gains[i] + (1.0 - s) * gains[j])
+            for i, j, s in mixtures
+        )
+        model = (
+            f"error equations of the Takagi-Sugeno model {self.model.name!r} at its vertices and mixtures of every "
+            f"two, weights "
+            f"constant over a gap; {self.premise_remark()}, disturbances and noise are left out"
+        )
+        certificate = certify_sampled_error(vertices, max_gap, model)
+        return certificate if self.weight_memory() else with_switching_noted(certificate, vertices, "weights")
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _error(self, A: np.ndarray, L: np.ndarray) -> ImpulsiveError:
+        q = len(self.model.measurements)
+        return ImpulsiveError.with_innovation(A, L, np.zeros((q, q)), self.model.C)
+
+    def _closed(self, p: Any) -> list[np.ndarray]:
+        return [A - np.asarray(L, dtype=float) @ self.model.C for A, L in zip(self.model.A, self.gains(p), strict=True)]
+
+    def _gain_parameter(self) -> Signal:
+        model = self.model
+        poles = -min(SPEED, SPEED_GAP / model.max_gap) * (1.0 + 0.25 * np.arange(model.order))
+        states, who = tuple(s.name for s in model.states), f"{self.name} of {model.name}"
+        gains = np.concatenate([observer_gain(A, model.C, poles, states, who).ravel() for A in model.A])
+        text = "Gains L_i, vertex after vertex, each row by row"
+        return parameter("gain", "1", tuple(map(float, gains)), text, size=gains.size)
+
+
+def _renamed(signal: Signal, name: str, discrete: bool) -> Signal:
+    return input_signal(
+        name, signal.unit, signal.start, signal.description, variability="discrete" if discrete else "continuous"
+    )

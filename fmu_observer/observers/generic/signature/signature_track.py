@@ -1,0 +1,193 @@
+"""Signatures of a sampled signal while it comes: the properties of Omar 2012, section 2.5, and which parameter they say
+has changed. Uses the pencil map and the properties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
+from fmu_observer.formulas.signatures.printed_recursion import PRINTED_MEMORY, next_printed
+from fmu_observer.formulas.signatures.tip_recursion import CYCLES, TIP_MEMORY, next_tips
+from plant_models.hybrid import (
+    HybridSystem,
+    OutputWarning,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+
+Reading = Literal["repaired", "as_published"]
+LONG, SHORT = 100, 50  # orders of the properties that ship
+
+
+class SignatureTrack(HybridSystem):
+    """Two signatures of a signal, S1 of order `long_order` and S2 of order `short_order`, three properties of them, and
+    a verdict: Omar 2012, section 2.5.
+
+    r1 is the length of S1 from its left end to the middle between its right-hand branches, r2 the abscissa of the right
+    tip of S2, r3 the gap between those branches. For `van_der_pol` they tell the three parameters apart:
+
+    - r3 is off: p3 has changed, whatever p1 and p2 do;
+    - r2 is off, and r1 not by much: p2;
+    - r1 is off, and r2 not: p1; r1 is off by more than `strong_change`, and r2 too: both. A small change of p1 beside
+      one of p2 cannot be told.
+
+    Nominal properties are those of the shipped orders: with others measure them, or read the properties alone. The
+    signal has to oscillate: properties are taken over the last two ways from tip to tip, and held until the next
+    tip. `ready` is 0 until four tips are found, and where none has come for `patience`.
+
+    Args:
+        long_order: N of S1. short_order: N of S2, at most that of S1. next_scaling: ``norm``, which the independence of
+            the properties needs, or ``literal``. reading: ``repaired`` takes local maxima; ``as_published`` the printed
+            formulas, which find points far left of the branches and hop between tips of S2.
+
+    Raises:
+        ValueError: an order below 2, orders that are not in order, or an unknown scaling or reading.
+
+    Presets: `van_der_pol` (default): properties of the nominal `van_der_pol` at 100 Hz as measured, thresholds ours.
+    """
+
+    name = "signature_track"
+    description = "Signature properties of an oscillating signal, and which parameter has changed"
+    source = "Omar 2012, (2.3.1)-(2.3.6), section 2.5; detection of the tips ours"
+    internal_step = 1e-2
+    inputs = (input_signal("signal", "1", 0.0, "The signal"),)
+    outputs = (
+        output_signal("length", "1", "r1, length of S1 to the middle of its branches", variability="discrete"),
+        output_signal("short_tip", "1", "r2, abscissa of the right tip of S2", variability="discrete"),
+        output_signal("gap", "1", "r3, gap between the right-hand branches of S1", variability="discrete"),
+        output_signal("abscissa", "1", "Abscissa of the newest point of S1", variability="discrete"),
+        output_signal("ready", "1", "1 while the properties count, else 0", variability="discrete"),
+        output_signal("noise", "1", "Deviation of the signal's noise, by third differences", variability="discrete"),
+        output_signal(
+            "noisy",
+            "1",
+            "1 while the noise is above noise_limit",
+            variability="discrete",
+            warning=OutputWarning(
+                "found more noise than its verdict bears: with three times noise_limit most verdicts are wrong. "
+                "Filter the signal, or widen the changes that count",
+                ("noise",),
+            ),
+        ),
+        output_signal("p1_changed", "1", "1 while the first parameter is judged to have changed"),
+        output_signal("p2_changed", "1", "1 while the second parameter is judged to have changed"),
+        output_signal("p3_changed", "1", "1 while the third parameter is judged to have changed"),
+    )
+    parameters = (
+        parameter("sample_period", "s", 0.01, "Time between two samples, tau", min=1e-6),
+        parameter("eps", "1", 1e-3, "Regularisation in the unit of the signal", min=1e-12),
+        parameter("patience", "s", 3.0, "Time without a tip after which the properties no longer count", min=0.0),
+        parameter("nominal_length", "1", 0.3345, "r1 without a change"),
+        parameter("nominal_short_tip", "1", 0.052, "r2 without a change"),
+        parameter("nominal_gap", "1", 0.0021, "r3 without a change"),
+        parameter("length_change", "1", 0.01, "Change of r1 that counts", min=0.0),
+        parameter("strong_change", "1", 0.02, "Change of r1 that counts although r2 has changed", min=0.0),
+        parameter("short_tip_change", "1", 0.002, "Change of r2 that counts", min=0.0),
+        parameter("gap_change", "1", 0.006, "Change of r3 that counts", min=0.0),
+        parameter("noise_limit", "1", 0.003, "Noise up to which verdicts are right, unit of the signal", min=0.0),
+    )
+    events = (PeriodicEvent("sampling", "sample_period", description="The signal is read"),)
+    presets: Mapping[str, Mapping[str, Any]] = {"van_der_pol": {}}
+    default_preset = "van_der_pol"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "next_scaling": ("norm", "literal"),
+        "reading": ("repaired", "as_published"),
+    }
+
+    def __init__(
+        self,
+        long_order: int = LONG,
+        short_order: int = SHORT,
+        next_scaling: NextScaling = "norm",
+        reading: Reading = "repaired",
+    ) -> None:
+        require_whole(self.name, 2, long_order=long_order, short_order=short_order)
+        if short_order > long_order:
+            raise ValueError(f"{self.name}: short_order {short_order} is above long_order {long_order}; exchange them.")
+        for key, value in (("next_scaling", next_scaling), ("reading", reading)):
+            if value not in self.option_choices[key]:
+                raise ValueError(f"{self.name}: {key} is {value!r}; use one of {', '.join(self.option_choices[key])}.")
+        self.orders, self.next_scaling, self.reading = (long_order, short_order), next_scaling, reading
+        self.states = (
+            memory("samples", "1", 0.0, "The last samples, the oldest first", size=long_order),
+            memory("taken", "1", 0.0, "Samples taken, counted as far as is needed"),
+            *TIP_MEMORY,
+            *(PRINTED_MEMORY if reading == "as_published" else ()),
+        )
+        super().__init__(
+            long_order=long_order,
+            short_order=short_order,
+            next_scaling=next_scaling,
+            reading=reading,
+        )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Nominal properties are measured with the period and the regularisation in use."""
+        named = ("nominal_length", "nominal_short_tip", "nominal_gap", "sample_period", "eps")
+        start = {s.name: float(s.start_values[0]) for s in self.parameters if s.name in named}
+        own = np.stack([np.abs(getattr(p, name) - start[name]) for name in named[:3]])
+        same = np.abs(p.sample_period - start["sample_period"]) + np.abs(p.eps - start["eps"])
+        shipped = np.where(np.max(own) > 0.0, 0.0, 1.0)
+        other = np.where(same > 0.0, 1.0, 0.0)
+        text = (
+            f"nominal_length, nominal_short_tip and nominal_gap belong to samples each {start['sample_period']:g} s, "
+            f"eps = {start['eps']:g} and orders {LONG} and {SHORT}: measure them with yours on a run without a change"
+        )
+        return super().requirements(p) | {text: 1.0 - shipped * other}
+
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """A sample gives one point to each signature."""
+        count, short = self.orders
+        past = x.samples
+        long_point = pencil_point(past, u.signal, p.eps, self.next_scaling)
+        short_point = pencil_point(past[count - short :], u.signal, p.eps, self.next_scaling)
+        patience = p.patience / p.sample_period
+        if self.reading == "repaired":
+            found = next_tips(x, long_point[0], short_point[0], patience)
+        else:
+            points = ((long_point[0], long_point[1]), (short_point[0], short_point[1]))
+            found = next_printed(x, *points, patience)
+        full = x.taken > count - 0.5
+        return {
+            "samples": np.hstack([past[1:], vector(u.signal)]),
+            "taken": np.minimum(x.taken + 1.0, 1.0 * count),
+            **{name: np.where(full, new, getattr(x, name)) for name, new in found.items()},
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Properties and verdict."""
+        ready = np.where(x.tips > CYCLES - 0.5, 1.0, 0.0)
+        past = x.samples
+        third = past[3:] - 3.0 * past[2:-1] + 3.0 * past[1:-2] - past[:-3]  # white noise: 20 times its variance
+        noise = np.sqrt(np.sum(third * third) / (20.0 * max(self.orders[0] - 3, 1)))
+        return {
+            "length": x.held_length,
+            "short_tip": x.held_short_tip,
+            "gap": x.held_gap,
+            "abscissa": x.abscissa_before,
+            "ready": ready,
+            "noise": noise,
+            "noisy": np.where(noise > p.noise_limit, ready, 0.0),
+            **self._verdict(x, ready, p),
+        }
+
+    def _verdict(self, x: Any, ready: Array, p: Any) -> dict[str, Array]:
+        change = np.abs(x.held_length - p.nominal_length)
+        second = np.abs(x.held_short_tip - p.nominal_short_tip) > p.short_tip_change
+        first = np.where(second, change - p.strong_change, change - p.length_change) > 0.0
+        third = np.abs(x.held_gap - p.nominal_gap) > p.gap_change
+        return {
+            "p1_changed": ready * np.where(first, 1.0, 0.0),
+            "p2_changed": ready * np.where(second, 1.0, 0.0),
+            "p3_changed": ready * np.where(third, 1.0, 0.0),
+        }

@@ -1,0 +1,77 @@
+"""The printed extended Kalman filter of a synchronous motor: currents measured in the rotor frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_preset
+from fmu_observer.observers.motors.motor_filter_presets import ROWS, preset_of
+from fmu_observer.observers.motors.motor_jacobians import printed_jacobian, rotor_jacobian
+from plant_models.hybrid import matrix, vector
+from plant_models.hybrid.system import Array
+from plant_models.railway.traction.motor_equations import AXES, FRAMES, Frame, euler_step, rotor_voltages
+from plant_models.railway.traction.transforms import to_rotor
+
+Jacobian = Literal["exact", "as_published"]
+MEASURED = np.eye(2, 4)
+
+
+class MotorEkf(MotorFilter):
+    """Extended Kalman filter of a motor whose currents along d and q are measured: speed and angle are estimated.
+
+    Model: ``x(k+1) = x(k) + T_s f(x(k), v(k), C_r(k))``, ``y = (i_d, i_q)``, noise additive and diagonal, P(0) = I. The
+    torque of the load must be known.
+
+    **The angle is not observable**: no measured current depends on it, so its estimate is the integral of the estimated
+    speed, and its variance grows for ever (`condition()`: rank 3 of 4). A drive that turns its currents by it loses
+    synchronism; `motor_ekf_stator` holds. Only the ratios of the variances matter, but for the start.
+
+    Presets: the rows of the printed tables, ``hand``, ``pso_5`` ... ``bbo_20`` (default); ``hand_repaired`` and
+    ``ga_20_repaired`` with one entry changed, which give the printed errors; ``true_noise``: the variances of
+    the noise.
+
+    Args:
+        frame: ``rotor``, as printed; ``stator``: alpha-beta voltages and currents are turned into the rotor frame by
+            the filter's own angle, which is the sensorless drive as it is printed.
+        jacobian: ``exact``, or ``as_published``: with the misprints of its first two rows.
+
+    Raises:
+        ValueError: an option is unknown.
+    """
+
+    name = "motor_ekf"
+    description = "Extended Kalman filter of a synchronous motor, currents in the rotor frame"
+    source = 'Allaoui 2024, "3.39"-"3.45" (4.39-4.45), Tables 1-3'
+    presets: Mapping[str, Mapping[str, Any]] = {
+        **{row: preset_of(row) for row in ROWS},
+        "traction_200kw": traction_preset((0.01, 0.01, 1e-6, 1e-8), 1.0),
+    }
+    default_preset = "bbo_20"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES, "jacobian": ("exact", "as_published")}
+
+    def __init__(self, *, frame: Frame = "rotor", jacobian: Jacobian = "exact") -> None:
+        for option, value in (("frame", frame), ("jacobian", jacobian)):
+            if value not in self.option_choices[option]:
+                raise ValueError(
+                    f"Unknown {option} {value!r}; choose one of: {', '.join(self.option_choices[option])}."
+                )
+        self.jacobian = printed_jacobian if jacobian == "as_published" else rotor_jacobian
+        super().__init__(frame, True, (1.0, 1.0, 1.0, 1.0), jacobian=jacobian)
+        self.options["frame"] = frame
+
+    def predict(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
+        """Euler step of the motor, and its Jacobian in the rotor frame."""
+        current_d, current_q, speed, angle = estimate
+        voltages = rotor_voltages(self.frame, u, angle)
+        moved = euler_step((current_d, current_q, speed, angle), *voltages, u.load_torque, p.sample_period, p)
+        return vector(*moved), matrix(*self.jacobian(current_d, current_q, speed, p.sample_period, p))
+
+    def measure(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
+        """Measured less predicted currents in the rotor frame [A]."""
+        first, second = (getattr(u, f"measured_current_{axis}") for axis in AXES[self.frame])
+        current_d, current_q, _, angle = estimate
+        seen_d, seen_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, angle)
+        return vector(seen_d - current_d, seen_q - current_q), MEASURED

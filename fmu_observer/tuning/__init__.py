@@ -1,1 +1,0 @@
-"""Tuning: gains of whole observers for a track and its gaps, believed by the observers' own certificates."""
