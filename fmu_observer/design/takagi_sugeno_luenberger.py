@@ -14,8 +14,8 @@ import numpy as np
 from fmu_observer.certificates.quadratic import QuadraticCondition, common_quadratic_form, decrease, flow_condition
 from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.models import TakagiSugenoModel
 from fmu_observer.models.checks import check_numbers
+from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
 
 POSITIVE = 1e-6  # of P in the design, whose trace is bounded by the unknowns being free

@@ -25,7 +25,8 @@ from fmu_observer.design.robust_residual import ResidualProblem, design_robust_r
 from fmu_observer.design.takagi_sugeno_luenberger import designed_gains
 from fmu_observer.design.theorem7 import design_theorem7, largest_eta
 from fmu_observer.design.uio_design import UioCovariances, uio_gains
-from fmu_observer.models import coupled_vehicles, find_takagi_sugeno_model
+from fmu_observer.models.known_models import find_takagi_sugeno_model
+from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
 from fmu_observer.observers.train.gains.gap_aware import design_adaptive, design_high_gain, design_takagi_sugeno
 
 REPETITIONS = 5

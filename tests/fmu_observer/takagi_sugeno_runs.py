@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.models import TakagiSugenoModel
+from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.exhibits import NonTriangularisablePlant, TriangularisablePlant
 from plant_models.hybrid import HybridSystem, Runtime, TriggeredEvent, input_signal, output_signal, parameter, vector

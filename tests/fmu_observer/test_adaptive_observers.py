@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.formulas.adaptation.adaptive_law import smallest_eigenvalue, told_excitation
-from fmu_observer.models import find_state_affine_model
+from fmu_observer.models.known_models import find_state_affine_model
 from fmu_observer.observers.generic.adaptive import AdaptiveHold, AdaptivePredictor
 from fmu_observer.observers.generic.adaptive.adaptive_certificate import errors_left
 from plant_models.hybrid import state

@@ -18,7 +18,8 @@ from fmu_observer.certificates.printed_bounds.high_gain_theta import (
 )
 from fmu_observer.certificates.thau import best_thau_bound, thau_bound
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.models import linear_pendulum, pendulum
+from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
+from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.scaled_slopes import scaled
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.continuous import HighGain, Luenberger, Thau

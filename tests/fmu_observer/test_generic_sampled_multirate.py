@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from fmu_observer.design.sylvester import sylvester_design, sylvester_residual, sylvester_transformation
-from fmu_observer.models import pendulum
-from fmu_observer.models.inverted_pendulum_cart import inverted_pendulum_cart
+from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
+from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observers.generic.sampled import MultirateSylvester
 from plant_models.hybrid import NumpyKernel, Runtime, TracedSystem
 

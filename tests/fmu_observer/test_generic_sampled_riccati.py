@@ -6,7 +6,7 @@ from sampled_bench import SampledBench, chain, true_motion
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from fmu_observer.models import pendulum
+from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observers.generic.sampled import RiccatiHighGain
 
 TORQUE, THETA, R, T = 0.2, 1.5, 0.2, 0.1

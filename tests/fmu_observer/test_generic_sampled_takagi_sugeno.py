@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from sampled_bench import SampledBench, aperiodic_instants, true_motion
 from scipy.linalg import expm
 
-from fmu_observer.models import pendulum
-from fmu_observer.models.takagi_sugeno_registry import find_takagi_sugeno_model
+from fmu_observer.models.exhibits.pendulum_model import pendulum
+from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled import TakagiSugenoAperiodic, TakagiSugenoPeriodic
 
 TORQUE = 0.2

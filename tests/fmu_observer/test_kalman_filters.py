@@ -10,7 +10,8 @@ import pykalman
 import pytest
 from block_systems import Driven
 
-from fmu_observer.models import cart_pendulum, linear_pendulum
+from fmu_observer.models.exhibits.cart_pendulum_model import cart_pendulum
+from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.filter_model import FilterModel, Known
 from fmu_observer.models.system_model import Steps, find_filter_model, system_model
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter

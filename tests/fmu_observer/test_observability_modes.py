@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 
-from fmu_observer.models import pendulum
+from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observability import (
     MeasuredSystem,
     UnobservableError,

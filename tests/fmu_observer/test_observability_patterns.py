@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from fmu_observer.models import freight_train
+from fmu_observer.models.train.freight_train_model import freight_train
 from fmu_observer.observability import (
     MeasuredSystem,
     SamplePattern,

@@ -23,7 +23,7 @@ from fmu_observer.design.residual_analysis import (
     sudden_fault,
 )
 from fmu_observer.design.residual_channel import ResidualChannel, decoupled_channel, residual_channel
-from fmu_observer.models import coupled_vehicles
+from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
 from fmu_observer.observers.generic.continuous import DecouplingUio, ProportionalIntegralUio
 from plant_models.hybrid import scalar_names
 

@@ -29,7 +29,8 @@ from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.design.proposition_4_1 import design as proposition_4_1
 from fmu_observer.design.robust_residual import design as robust_residual
 from fmu_observer.design.theorem7 import design as theorem7
-from fmu_observer.models import MODELS, ObserverModel, find_model, find_takagi_sugeno_model
+from fmu_observer.models.known_models import MODELS, find_model, find_takagi_sugeno_model
+from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale
 
 TRAIN = find_takagi_sugeno_model("takagi_sugeno_train")

@@ -21,7 +21,7 @@ from fmu_observer.design.theorem7 import (
     largest_gap,
     search_eta,
 )
-from fmu_observer.models import find_takagi_sugeno_model
+from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import (
     DESIGNS,
     E1_PUBLISHED,

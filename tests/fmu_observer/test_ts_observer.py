@@ -13,8 +13,8 @@ from takagi_sugeno_runs import PLANTS, errors, final_quarter, sampling
 
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
-from fmu_observer.models.triangularisable_example import triangularisable_chain
+from fmu_observer.models.exhibits.four_state_example import triangularisable_chain
+from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled import ExponentialGain, GeneralTakagiSugenoCdo
 from fmu_observer.observers.generic.sampled.takagi_sugeno_cdo import PREMISES
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import E2_PUBLISHED, GAINS, TakagiSugenoGains

@@ -14,7 +14,11 @@ from scipy.linalg import eigvals, expm
 
 from fmu_observer.design.decoupling import decoupled_gain, decoupling, decoupling_condition
 from fmu_observer.design.extended_disturbance import decaying_gain, extended_gain, extended_matrices
-from fmu_observer.models import MODELS, ObserverModel, braked_train, coupled_vehicles, pendulum
+from fmu_observer.models.exhibits.pendulum_model import pendulum
+from fmu_observer.models.known_models import MODELS
+from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.train.braked_train_model import braked_train
+from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.continuous import DecouplingUio, Luenberger, ProportionalIntegralUio
 from plant_models.hybrid import Runtime, input_signal, scalar_names, state

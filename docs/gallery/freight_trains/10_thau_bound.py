@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.models import find_model
+from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.continuous import Thau
 
 UNSAFE = "(1.8) has the wrong eigenvalues; an independent implementation gave 7.12 for it and 0.438 for the valid bound"

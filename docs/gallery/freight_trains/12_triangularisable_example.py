@@ -10,7 +10,7 @@ from academic import EXAMPLES, STOP, final_quarter, followed
 from shared.bench import Together, errors, sampling, unless_rounding
 from shared.sheet import Sheet
 
-from fmu_observer.models.triangularisable_example import triangularisable_chain
+from fmu_observer.models.exhibits.four_state_example import triangularisable_chain
 from fmu_observer.observers.generic.sampled import ExponentialGain
 
 NAME = "triangularisable_example"

@@ -11,7 +11,7 @@ import numpy as np
 from shared.sheet import Sheet
 
 from fmu_observer.design.theorem7 import InfeasibleDesign, Theorem7Design, design_theorem7
-from fmu_observer.models import find_takagi_sugeno_model
+from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import E1_PUBLISHED, E2_PUBLISHED, TRAIN_PUBLISHED
 
 E1, E2, TRAIN = "triangularisable_example", "non_triangularisable_example", "takagi_sugeno_train"

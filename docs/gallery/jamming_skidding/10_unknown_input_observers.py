@@ -12,7 +12,7 @@ from shared.sheet import Sheet
 
 from fmu_observer.design.decoupling import decoupling_condition
 from fmu_observer.design.extended_disturbance import extended_gain
-from fmu_observer.models import coupled_vehicles
+from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
 from fmu_observer.observers.generic.continuous import DecouplingUio, Luenberger, ProportionalIntegralUio
 from plant_models.hybrid import HybridSystem, Runtime, input_signal, output_signal, vector
 

@@ -7,7 +7,7 @@ import numpy as np
 from arm import LINK_ANGLE, PRINTED, PUBLISHED_START, Cell, arm_errors
 from shared.sheet import Sheet
 
-from fmu_observer.models import find_model
+from fmu_observer.models.known_models import find_model
 
 STARTS = "the thesis shows a figure and prints no number; z(0) = 0, which it leaves open"
 REACHED = "the error falls below 0.05 before the last distance s is zero, at 2 sqrt|s_3(0)|, s_3(0) = 2 - 0.15 * 94.7"

@@ -8,7 +8,7 @@ from arm import LINK_ANGLE, PRINTED, Cell, arm_errors
 from shared.sheet import Sheet
 
 from fmu_observer.certificates.printed_bounds.network_bounds import exact_predictor_delay
-from fmu_observer.models import find_model
+from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
 
 SURVIVED = {1: (0.19, 0.20), 2: (0.36, 0.39), 3: (0.54, 0.57)}  # independent: last that works, first that fails

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fmu_observer.models import find_model
+from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.delayed.delayed_state_observer import Between, DelayedStateObserver
 from fmus import Batch
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from shared.bench import Together
 
-from fmu_observer.models import tanh_system
-from fmu_observer.models.tanh_system import Reading
+from fmu_observer.models.exhibits.tanh_model import Reading, tanh_system
 from fmu_observer.observers.generic.sampled import DecayingInnovation
 from plant_models.exhibits import TanhSystem
 from plant_models.hybrid import Runtime

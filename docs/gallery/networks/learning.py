@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fmu_observer.models import find_state_affine_model
+from fmu_observer.models.known_models import find_state_affine_model
 from fmus import Batch
 from plant_models.hybrid import HybridSystem
 

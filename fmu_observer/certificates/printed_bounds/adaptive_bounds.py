@@ -10,7 +10,7 @@ from math import exp
 
 import numpy as np
 
-from fmu_observer.models import StateAffineModel
+from fmu_observer.models.state_affine import StateAffineModel
 
 STEP = 2e-3  # [s], of the Riemann sums
 SETTLING = 20.0  # times 1 / mu, until S has forgotten its start

@@ -14,8 +14,9 @@ import numpy as np
 from fmu_observer.design.theorem7.check import margins
 from fmu_observer.design.theorem7.inequalities import Theorem7Problem
 from fmu_observer.design.theorem7.solve import Gains, Theorem7Candidate, candidates
-from fmu_observer.models import TakagiSugenoModel, find_takagi_sugeno_model
 from fmu_observer.models.checks import checked_matrix
+from fmu_observer.models.known_models import find_takagi_sugeno_model
+from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
 
 BISECTIONS = 7

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
-from fmu_observer.models.networked_train import networked_train
+from fmu_observer.models.train.networked_train_model import networked_train
 from fmu_observer.observers.generic.delayed.delayed_state_observer import (
     BETWEEN,
     MEMORY_PLACES,

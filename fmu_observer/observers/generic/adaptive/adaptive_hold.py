@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fmu_observer.models import StateAffineModel
+from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
 from fmu_observer.observers.generic.adaptive.adaptive_presets import ADAPTIVE_PRESETS
 from plant_models.hybrid import Signal, memory

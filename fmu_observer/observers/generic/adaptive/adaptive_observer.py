@@ -33,8 +33,9 @@ from fmu_observer.formulas.adaptation.adaptive_law import (
     smallest_eigenvalue,
     start_covariance,
 )
-from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
+from fmu_observer.models.known_models import STATE_AFFINE_MODELS, find_state_affine_model
 from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.adaptive.adaptive_certificate import (

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from fmu_observer.certificates.limits import Trial
-from fmu_observer.models import StateAffineModel
+from fmu_observer.models.state_affine import StateAffineModel
 from plant_models.hybrid import HybridSystem
 
 STOP = 35.0  # [s]; the error counts from 28 s on

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fmu_observer.certificates.polytope import polytope_stability
-from fmu_observer.models import MODELS
+from fmu_observer.models.known_models import MODELS
 
 NUMBERS: dict[str, tuple[()]] = {name: () for make in MODELS.values() for name in signature(make).parameters}
 """Numbers that models by name are made of, as options of an observer: any value is legal that the model takes."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from fmu_observer.formulas.filtering import kalman, square_root
 from fmu_observer.formulas.filtering.kalman import Corrected
-from fmu_observer.models import ObserverModel, find_model
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.registry import MODELS
+from fmu_observer.models.known_models import MODELS, find_model
+from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.system_model import Source
 from fmu_observer.observability import require_detectable_model
 from fmu_observer.observers.generic.discrete.belief import Belief

@@ -16,8 +16,7 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error, with_swit
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import GapError
 from fmu_observer.certificates.limits import Limit, PrintedBound
-from fmu_observer.models import ObserverModel
-from fmu_observer.models.model import shift_matrix
+from fmu_observer.models.model import ObserverModel, shift_matrix
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver

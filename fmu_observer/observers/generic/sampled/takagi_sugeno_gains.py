@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.models import TakagiSugenoModel
 from fmu_observer.models.checks import check_numbers
+from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fmu_observer.models.exhibits.pendulum_model import DAMPING, STIFFNESS, pendulum
 from fmu_observer.models.model import ObserverModel
-from fmu_observer.models.pendulum import DAMPING, STIFFNESS, pendulum
 
 
 def linear_pendulum() -> ObserverModel:

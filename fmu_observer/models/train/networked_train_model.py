@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.freight_train import MASS, freight_train
 from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.train.freight_train_model import MASS, freight_train
 from plant_models.hybrid import input_signal, vector
 from plant_models.hybrid.system import Array
 

@@ -1,0 +1,1 @@
+"""Models of the small plants on which the theses show an observer. Data only."""

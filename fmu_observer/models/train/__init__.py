@@ -1,0 +1,1 @@
+"""Models of a train, of one mass or several. Data only."""
