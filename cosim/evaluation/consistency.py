@@ -15,7 +15,7 @@ from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
-from fmu_observer.formulas.filtering.consistency import Consistency, judge, normalised_squares
+from fmu_observer.formulas.filtering.covariance_consistency import Consistency, judge, normalised_squares
 
 Kind = Literal["NIS", "NEES", "error"]
 STD = "_std"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import ScenarioError
-from fmu_observer.formulas.filtering.consistency import Consistency, judge
+from fmu_observer.formulas.filtering.covariance_consistency import Consistency, judge
 from fmu_observer.formulas.filtering.kalman import integrated_noise
 from fmu_observer.formulas.filtering.smoothing import extended_pass, smooth
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.limits import Trial
+from fmu_observer.certificates.observer_limits import Trial
 from fmus import Batch
 
 MEMBERS = 16

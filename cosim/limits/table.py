@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isinf
 
 from cosim.limits.search import MEMBERS, practical_limit, reach
-from fmu_observer.certificates.limits import Limit, Trial
+from fmu_observer.certificates.observer_limits import Limit, Trial
 from fmus.text_table import text_table
 
 

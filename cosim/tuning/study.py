@@ -15,9 +15,9 @@ from cosim.tuning.parameters import Tunable
 from cosim.tuning.progress import Bar, Progress
 from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
 from cosim.tuning.tuning_result import Searched, Tuning
+from fmu_observer.design.optimisers.known_optimisers import find_optimiser
 from fmu_observer.design.optimisers.methods.likelihood_gradient import LikelihoodGradient
 from fmu_observer.design.optimisers.optimiser import Optimiser
-from fmu_observer.design.optimisers.registry import find_optimiser
 from fmu_observer.design.optimisers.search_space import SearchSpace
 
 ITERATIONS = "iterations.jsonl"

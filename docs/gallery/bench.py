@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import (
     HybridSystem,

@@ -23,7 +23,7 @@ from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
 from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolution, FullSolver
 from fmu_observer.formulas.moving_horizon.gauss_newton import passed
-from fmu_observer.formulas.moving_horizon.window import WindowRow
+from fmu_observer.formulas.moving_horizon.row_window import WindowRow
 from fmu_observer.formulas.moving_horizon.window_program import Programme, WindowProgram
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, Shared
 

@@ -2,10 +2,10 @@
 
 from typing import Any, Literal
 
-from fmu_observer.block.fmi2 import FMI2Block
-from fmu_observer.block.fmi3 import FMI3Block
+from fmu_observer.block.block_variables import BlockError
+from fmu_observer.block.fmi2_block import FMI2Block
+from fmu_observer.block.fmi3_block import FMI3Block
 from fmu_observer.block.interface import BlockCallError, FMIInterface
-from fmu_observer.block.variables import BlockError
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import HybridSystem
 

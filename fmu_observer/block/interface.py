@@ -18,11 +18,11 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription
 
-from fmu_observer.block.instance import BlockInstance
+from fmu_observer.block.block_derivatives import BlockSensitivity
+from fmu_observer.block.block_instance import BlockInstance
+from fmu_observer.block.block_state import BlockState, deserialize, serialize
+from fmu_observer.block.block_variables import BlockError, Mode, Role, StepDiscarded
 from fmu_observer.block.policy import Counters
-from fmu_observer.block.sensitivity import BlockSensitivity
-from fmu_observer.block.state import BlockState, deserialize, serialize
-from fmu_observer.block.variables import BlockError, Mode, Role, StepDiscarded
 from fmu_observer.description import describe
 from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON, Announcement, EventProtocol, LatePolicy
 from plant_models.hybrid import HybridSystem

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.block.journal import Journal, Record, Stamped
+from fmu_observer.block.block_journal import Journal, Record, Stamped
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import Runtime, Snapshot
 from plant_models.hybrid.event import DOUBTED, IGNORED

@@ -21,7 +21,7 @@ from fmu_observer.certificates.quadratic import (
     inequalities,
     transition_condition,
 )
-from fmu_observer.certificates.switching import SwitchingError
+from fmu_observer.certificates.switching_error import SwitchingError
 
 # smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
 MARGIN = 1e-6

@@ -12,7 +12,7 @@ import numpy as np
 
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_unknown_inputs
 from fmu_observer.observability import MeasuredSystem, require_detectable, unobservable_modes
 from fmu_observer.observability.modes import unobservable_subspace

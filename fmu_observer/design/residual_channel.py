@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_observer.design.decoupling import decoupling
 from fmu_observer.models.checks import checked_matrix
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 
 
 @dataclass(frozen=True, eq=False)

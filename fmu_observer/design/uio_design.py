@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from fmu_observer.design.discretisation import process_covariance
+from fmu_observer.design.noise_covariance import process_covariance
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals
-from fmu_observer.models.discretisation import transition
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.discrete_model import transition
+from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid import Signal
 from plant_models.hybrid.exact_jacobian import exact_jacobian, is_affine
 from plant_models.hybrid.signal import width

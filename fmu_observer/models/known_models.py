@@ -18,7 +18,7 @@ from fmu_observer.models.exhibits.oscillator_models import time_varying_oscillat
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.exhibits.takagi_sugeno_pendulum_model import takagi_sugeno_pendulum
 from fmu_observer.models.exhibits.tanh_model import tanh_system
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.models.train.braked_train_model import braked_train

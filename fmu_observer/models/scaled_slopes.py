@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 
 FURTHEST = 1e8  # scale up to which is searched, and one over it: beyond it the powers leave the range of numbers
 PROGRESS = 1e-3  # relative; what grows less over a third of the grid tends to what it is

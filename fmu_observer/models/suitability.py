@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from plant_models.hybrid import input_signal
 
 POINTS = 5  # states at which the structure of the Jacobian is looked at

@@ -16,7 +16,7 @@ import numpy as np
 
 from fmu_observer.models.filter_model import FilterModel, Known, Measured, Transition, filter_model
 from fmu_observer.models.known_models import MODELS, find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem, Signal, TracedSystem, input_signal, scalar_names, state, vector, width
 from plant_models.hybrid.exact_jacobian import is_affine

@@ -13,7 +13,7 @@ from math import isfinite
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
-from fmu_observer.models.model import stacked
+from fmu_observer.models.observer_model import stacked
 from plant_models.hybrid import Signal
 from plant_models.hybrid.system import Array, vector
 

@@ -6,7 +6,7 @@ point.
 
 from fmu_observer.observability.gramian import Observability, observability, observability_gramian
 from fmu_observer.observability.measured_system import MeasuredSystem
-from fmu_observer.observability.models import require_detectable_model, require_detectable_vertices
+from fmu_observer.observability.model_detectability import require_detectable_model, require_detectable_vertices
 from fmu_observer.observability.modes import (
     Mode,
     UnobservableError,

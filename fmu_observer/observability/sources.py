@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observability.measured_system import MeasuredSystem
 from plant_models.hybrid import HybridSystem
 from plant_models.interop.continuous_part import ContinuousPart, Values, filled, known

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.limits import Limit
+from fmu_observer.certificates.observer_limits import Limit
 from fmu_observer.observers.gated_observer import is_gate_parameter
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, Signal

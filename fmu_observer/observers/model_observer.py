@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.models.known_models import MODELS, find_model
-from fmu_observer.models.model import ObserverModel, named_as, stacked_of
+from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
     HybridSystem,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.limits import Trial, Varied
+from fmu_observer.certificates.observer_limits import Trial, Varied
 from fmu_observer.observers.model_observer import ModelObserver
 
 WRONG_START = 0.5  # of every estimate, in its own unit

@@ -15,6 +15,7 @@ import numpy as np
 
 from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.augmented_gains import design_for_gap, position_gains
+from fmu_observer.design.continuous_takagi_sugeno import designed_gains
 from fmu_observer.design.decoupling import decoupled_gain
 from fmu_observer.design.extended_disturbance import extended_gain
 from fmu_observer.design.pole_placement import observer_gain
@@ -22,7 +23,6 @@ from fmu_observer.design.quasi_lpv_published import SECTION_5_3_1, SEEN
 from fmu_observer.design.residual_analysis import h_infinity_norm
 from fmu_observer.design.residual_channel import residual_channel
 from fmu_observer.design.robust_residual import ResidualProblem, design_robust_residual
-from fmu_observer.design.takagi_sugeno_luenberger import designed_gains
 from fmu_observer.design.theorem7 import design_theorem7, largest_eta
 from fmu_observer.design.uio_design import UioCovariances, uio_gains
 from fmu_observer.models.known_models import find_takagi_sugeno_model

@@ -14,8 +14,8 @@ import numpy as np
 from cosim import Scenario
 from cosim.studies.replay import Replay
 from fmu_observer.design.likelihood import AccumulatedOutput
-from fmu_observer.design.optimisers.registry import find_optimiser
-from fmu_observer.design.optimisers.search import minimise
+from fmu_observer.design.optimisers.known_optimisers import find_optimiser
+from fmu_observer.design.optimisers.optimiser_search import minimise
 
 CURRENTS = ["current_d", "current_q"]
 NAMES = [*(f"process_variance[{i}]" for i in range(1, 5)), "measurement_variance[1]", "measurement_variance[2]"]

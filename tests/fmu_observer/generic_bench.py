@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.model_observer import ModelObserver
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import Runtime, scalar_names

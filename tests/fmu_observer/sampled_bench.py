@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from plant_models.hybrid import HybridSystem, NumpyKernel, Runtime, input_signal, scalar_names, state
 
 Motion = Callable[[float], np.ndarray]

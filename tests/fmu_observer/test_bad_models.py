@@ -14,7 +14,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.design.theorem7 import InfeasibleDesign, design_theorem7
 from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
 from fmu_observer.models.known_models import find_model, find_takagi_sugeno_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import TakagiSugenoGains
 from plant_models.hybrid import input_signal, state, vector

@@ -15,7 +15,7 @@ from fmu_observer.certificates.aperiodic import MARGIN, certify_sampled_error, c
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sampled_error import SampledError
-from fmu_observer.certificates.switching import SwitchingError
+from fmu_observer.certificates.switching_error import SwitchingError
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo
 from plant_models.hybrid import Runtime

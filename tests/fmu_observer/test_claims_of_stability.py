@@ -16,7 +16,7 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from fmu_observer.observability import MeasuredSystem, SamplePattern, observability
 from fmu_observer.observers.generic.continuous import HighGain, Thau
 from fmu_observer.observers.generic.discrete import ExtendedLuenberger

@@ -19,11 +19,11 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error, common_de
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
-from fmu_observer.certificates.switching import SwitchingError
+from fmu_observer.certificates.switching_error import SwitchingError
 from fmu_observer.formulas.correction.innovation_decay import innovation_left
 from fmu_observer.models.exhibits.tanh_model import tanh_system
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import shift_matrix
+from fmu_observer.models.observer_model import shift_matrix
 from fmu_observer.observers.generic.sampled import DecayingInnovation, DynamicHighGain, ExponentialGain, HeldInnovation
 from fmu_observer.observers.train import AdaptiveGainCdo, DecayingInnovationCdo, DynamicGainCdo
 from plant_models.exhibits import TanhSystem

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fmu_observer.formulas.filtering.consistency import (
+from fmu_observer.formulas.filtering.covariance_consistency import (
     average_over_runs,
     chi_square_band,
     independent_count,

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from fmu_observer.certificates.lipschitz_condition import best_thau_bound, thau_bound
 from fmu_observer.certificates.printed_bounds.high_gain_theta import (
     binomial_gain,
     lyapunov_size,
     theta_from_lipschitz,
     theta_from_slopes,
 )
-from fmu_observer.certificates.thau import best_thau_bound, thau_bound
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.exhibits.pendulum_model import pendulum

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fmu_observer.design.takagi_sugeno_luenberger import designed_gains, placed_gains, vertex_decrease, vertex_errors
+from fmu_observer.design.continuous_takagi_sugeno import designed_gains, placed_gains, vertex_decrease, vertex_errors
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.continuous import TakagiSugenoLuenberger

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, circle_distance, transition_lipschitz
-from fmu_observer.models.discretisation import transition, zero_order_hold
+from fmu_observer.models.discrete_model import transition, zero_order_hold
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import find_model

@@ -11,8 +11,8 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
-from fmu_observer.design.discretisation import process_covariance
-from fmu_observer.models.discretisation import transition, transition_jacobian, zero_order_hold
+from fmu_observer.design.noise_covariance import process_covariance
+from fmu_observer.models.discrete_model import transition, transition_jacobian, zero_order_hold
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.train.freight_train_model import freight_train

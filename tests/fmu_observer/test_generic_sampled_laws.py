@@ -15,7 +15,7 @@ from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.generic.sampled import (
     DecayingInnovation,

@@ -6,9 +6,9 @@ from generic_bench import sampled_run
 from scipy import stats
 
 from fmu_observer.formulas.filtering import ensemble, particles
-from fmu_observer.formulas.filtering.consistency import judge
+from fmu_observer.formulas.filtering.covariance_consistency import judge
 from fmu_observer.formulas.filtering.smoothing import extended_pass
-from fmu_observer.models.discretisation import zero_order_hold
+from fmu_observer.models.discrete_model import zero_order_hold
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.system_model import system_model
 from fmu_observer.observers.generic.discrete import EnsembleKalmanFilter, ParticleFilter

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy
 
+from fmu_observer.design.optimisers.known_optimisers import OPTIMISERS, SHORT_NAMES, find_optimiser
 from fmu_observer.design.optimisers.methods.biogeography import Biogeography
 from fmu_observer.design.optimisers.methods.biogeography_printed import BiogeographyPrinted
 from fmu_observer.design.optimisers.methods.cma_es import CovarianceMatrixAdaptation
@@ -17,8 +18,7 @@ from fmu_observer.design.optimisers.methods.genetic import Genetic
 from fmu_observer.design.optimisers.methods.likelihood_gradient import LikelihoodGradient
 from fmu_observer.design.optimisers.methods.particle_swarm import ParticleSwarm
 from fmu_observer.design.optimisers.optimiser import Optimiser
-from fmu_observer.design.optimisers.registry import OPTIMISERS, SHORT_NAMES, find_optimiser
-from fmu_observer.design.optimisers.search import minimise
+from fmu_observer.design.optimisers.optimiser_search import minimise
 from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
 
 LOW, HIGH = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 2.0, 3.0])

@@ -18,19 +18,19 @@ from fmu_observer.certificates.aperiodic import aperiodic_limit
 from fmu_observer.certificates.bounds import largest_gap
 from fmu_observer.certificates.fault_cycle import first_crossing, overshoot, smallest_effort
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.lipschitz_condition import best_thau_bound
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, discrete_bound
 from fmu_observer.certificates.printed_bounds.high_gain_theta import binomial_gain, lyapunov_size, theta_from_slopes
 from fmu_observer.certificates.printed_bounds.network_bounds import largest_gain
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
-from fmu_observer.certificates.thau import best_thau_bound
-from fmu_observer.design import takagi_sugeno_luenberger
+from fmu_observer.design import continuous_takagi_sugeno
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.design.proposition_4_1 import design as proposition_4_1
-from fmu_observer.design.robust_residual import design as robust_residual
-from fmu_observer.design.theorem7 import design as theorem7
+from fmu_observer.design.proposition_4_1 import proposition_design as proposition_4_1
+from fmu_observer.design.robust_residual import residual_design as robust_residual
+from fmu_observer.design.theorem7 import theorem7_design as theorem7
 from fmu_observer.models.known_models import MODELS, find_model, find_takagi_sugeno_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale
 
 TRAIN = find_takagi_sugeno_model("takagi_sugeno_train")
@@ -129,7 +129,7 @@ def test_where_no_theta_is_enough_none_is_found(share: float, exists: bool) -> N
 @pytest.mark.parametrize(
     ("module", "proof", "answer", "ask"),
     [
-        (takagi_sugeno_luenberger, "_proven", None, lambda: takagi_sugeno_luenberger.designed_gains(TRAIN, 8.0)),
+        (continuous_takagi_sugeno, "_proven", None, lambda: continuous_takagi_sugeno.designed_gains(TRAIN, 8.0)),
         (theorem7, "_checked", None, lambda: theorem7.design_theorem7(TRAIN, 2.0, 8.0)),
         (proposition_4_1, "margins", {"": -1.0}, lambda: proposition_4_1.design_proposition_4_1(A, B[0], 8.0)),
         (robust_residual, "candidates", (), lambda: robust_residual.design_robust_residual(chapter_5(8.0))),

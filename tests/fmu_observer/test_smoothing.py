@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu_observer.formulas.filtering.consistency import judge, normalised_squares
+from fmu_observer.formulas.filtering.covariance_consistency import judge, normalised_squares
 from fmu_observer.formulas.filtering.smoothing import FilterPass, extended_pass, smooth, unscented_pass
 
 F = np.array([[1.0, 0.1, 0.005], [0.0, 1.0, 0.1], [0.0, 0.0, 0.97]])

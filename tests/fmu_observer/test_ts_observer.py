@@ -16,8 +16,8 @@ from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.exhibits.four_state_example import triangularisable_chain
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled import ExponentialGain, GeneralTakagiSugenoCdo
-from fmu_observer.observers.generic.sampled.takagi_sugeno_cdo import PREMISES
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import E2_PUBLISHED, GAINS, TakagiSugenoGains
+from fmu_observer.observers.generic.sampled.takagi_sugeno_general import PREMISES
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
 
 FIRST, SECOND, TRAIN = "triangularisable_example", "non_triangularisable_example", "takagi_sugeno_train"

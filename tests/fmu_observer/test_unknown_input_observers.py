@@ -16,7 +16,7 @@ from fmu_observer.design.decoupling import decoupled_gain, decoupling, decouplin
 from fmu_observer.design.extended_disturbance import decaying_gain, extended_gain, extended_matrices
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import MODELS
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.train.braked_train_model import braked_train
 from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
 from fmu_observer.observability import UnobservableError

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fmu_observer.block import make_block
-from fmu_observer.block.events import QUEUE_CAPACITY
+from fmu_observer.block.block_events import QUEUE_CAPACITY
 
 pytestmark = pytest.mark.compiler
 

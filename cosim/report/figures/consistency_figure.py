@@ -14,7 +14,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import curve, legend_above, logarithmic, mark_evaluation, time_axis
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
-from fmu_observer.formulas.filtering.consistency import chi_square_band
+from fmu_observer.formulas.filtering.covariance_consistency import chi_square_band
 
 AVERAGED = 50  # samples in the drawn mean, at most a quarter of all
 SMALLEST, LARGEST = 1e-2, 1e3  # of a drawn share; beyond it is cut

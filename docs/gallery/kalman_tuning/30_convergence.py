@@ -8,8 +8,8 @@ from shared.sheet import Sheet
 
 from cosim import Scenario
 from cosim.studies.replay import Replay
-from fmu_observer.design.optimisers.registry import find_optimiser
-from fmu_observer.design.optimisers.search import Search, minimise
+from fmu_observer.design.optimisers.known_optimisers import find_optimiser
+from fmu_observer.design.optimisers.optimiser_search import Search, minimise
 
 CURRENTS = ["current_d", "current_q"]
 STOP, SEEDS, RECORD = 0.12, 5, 3

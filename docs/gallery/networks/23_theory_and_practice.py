@@ -8,7 +8,7 @@ from held import GAINS, Run, pair
 from shared.sheet import Sheet
 
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
-from fmu_observer.models.model import shift_matrix
+from fmu_observer.models.observer_model import shift_matrix
 from fmu_observer.observers.generic.sampled import DynamicHighGain, OutputPredictor
 
 A, C = shift_matrix(2), np.eye(1, 2)

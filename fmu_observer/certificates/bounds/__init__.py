@@ -2,6 +2,7 @@
 exact worst case.
 """
 
+from fmu_observer.certificates.bounds.bounded_gaps import growth_over_missing_samples, largest_gap
 from fmu_observer.certificates.bounds.error_bounds import BoundRow, ErrorBounds, bound_data, bound_text
 from fmu_observer.certificates.bounds.formulas import (
     cdo_bound,
@@ -11,7 +12,6 @@ from fmu_observer.certificates.bounds.formulas import (
     improved_dmo_bound,
     printed_cdo_bound,
 )
-from fmu_observer.certificates.bounds.gaps import growth_over_missing_samples, largest_gap
 from fmu_observer.certificates.bounds.worst_case import WorstCase, worst_case
 
 __all__ = [

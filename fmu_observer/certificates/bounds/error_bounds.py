@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from fmu_observer.certificates.bounds.bounded_gaps import FIRST, HORIZON, growth_over_missing_samples, largest_gap
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
-from fmu_observer.certificates.bounds.gaps import FIRST, HORIZON, growth_over_missing_samples, largest_gap
 from fmu_observer.certificates.bounds.worst_case import worst_case
 
 EXACT_HORIZON = 1e3  # [s] to which gaps of the worst case are looked for

@@ -10,7 +10,7 @@ from math import pi, sin
 import numpy as np
 import scipy
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale, scaled, scaled_lipschitz
 
 POINTS, FEW = 2048, 128  # on the upper half of the unit circle, for the answer and for the choice of coordinates

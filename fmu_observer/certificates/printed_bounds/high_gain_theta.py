@@ -7,7 +7,7 @@ from math import ceil, inf, log, sqrt
 import numpy as np
 import scipy
 
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 
 THETAS = np.geomspace(1.0, 1e4, 4001)
 

@@ -16,7 +16,7 @@ import scipy
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import HighGainBounds, high_gain_bounds
 from fmu_observer.certificates.sampled_error import SampledError
-from fmu_observer.models.model import shift_matrix
+from fmu_observer.models.observer_model import shift_matrix
 
 SHAPE = (2.0, 1.0)  # K of the train observers, Bouchama 2024, (3.29)
 THETAS = (1.0, 2.0, 4.0, 5.0, 8.0)  # [1/s], those of the table

@@ -2,14 +2,14 @@
 matrix inequalities. Solving needs the extra `lmi`.
 """
 
-from fmu_observer.design.proposition_4_1.design import (
+from fmu_observer.design.proposition_4_1.proposition_design import (
     InfeasibleBounds,
     Proposition41Design,
     design_proposition_4_1,
     largest_decay,
     smallest_alpha,
 )
-from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, train_vertices
+from fmu_observer.design.proposition_4_1.proposition_inequalities import Proposition41Problem, train_vertices
 from fmu_observer.design.proposition_4_1.sharpest import BoundMatrix, bound_matrix
 
 __all__ = [

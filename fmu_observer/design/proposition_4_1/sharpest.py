@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.proposition_4_1.check import smallest_eigenvalue
-from fmu_observer.design.proposition_4_1.solve import sharpest
+from fmu_observer.design.proposition_4_1.proposition_recomputed import smallest_eigenvalue
+from fmu_observer.design.proposition_4_1.proposition_solver import sharpest
 
 
 @dataclass(frozen=True, eq=False)

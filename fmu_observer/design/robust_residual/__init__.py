@@ -5,15 +5,15 @@ Aguiar Cota 2019, (3.44)-(3.58), Algorithm 3-2, repaired: a decay rate in the fi
 second step with its signs.
 """
 
-from fmu_observer.design.robust_residual.design import (
+from fmu_observer.design.robust_residual.fault_sensitivity import ResidualSensitivity, common_bands, proven_sensitivity
+from fmu_observer.design.robust_residual.problem import ResidualProblem
+from fmu_observer.design.robust_residual.residual_design import (
     InfeasibleResidualDesign,
     RobustResidualDesign,
     design_robust_residual,
     gain_size,
     proven_attenuation,
 )
-from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.sensitivity import ResidualSensitivity, common_bands, proven_sensitivity
 
 __all__ = [
     "InfeasibleResidualDesign",

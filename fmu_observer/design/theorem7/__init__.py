@@ -1,6 +1,6 @@
 """Theorem 7: gains of Takagi-Sugeno observers by linear matrix inequalities. Solving needs the extra `lmi`."""
 
-from fmu_observer.design.theorem7.design import (
+from fmu_observer.design.theorem7.theorem7_design import (
     InfeasibleDesign,
     Theorem7Design,
     design_theorem7,

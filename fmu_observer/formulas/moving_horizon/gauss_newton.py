@@ -28,7 +28,7 @@ import numpy as np
 from fmu_observer.formulas.filtering.kalman import Form, correct, predicted_covariance, symmetric
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.formulas.moving_horizon.robust_loss import Loss, weight
-from fmu_observer.formulas.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
 from plant_models.hybrid.scan import Arrays, scan_table
 from plant_models.hybrid.system import Array, vector
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3, accelerations
 from plant_models.hybrid import input_signal, state
 from plant_models.hybrid.system import Array, vector

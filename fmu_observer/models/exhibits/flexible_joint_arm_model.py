@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from plant_models.exhibits.flexible_joint_arm import (
     DAMPING,
     DRIVE,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid import input_signal, state
 
 CART, BOB, LENGTH, GRAVITY = 4.0, 0.4, 5.0, 9.81  # [kg], [kg], [m], [m/s2]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fmu_observer.models.exhibits.pendulum_model import DAMPING, STIFFNESS, pendulum
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 
 
 def linear_pendulum() -> ObserverModel:

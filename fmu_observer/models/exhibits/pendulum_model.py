@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
 

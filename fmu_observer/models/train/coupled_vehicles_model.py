@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_mass
 from plant_models.hybrid import input_signal, state
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
-from fmu_observer.observers.generic.discrete.sampling import at_sample, primed_memory
+from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
     HybridSystem,

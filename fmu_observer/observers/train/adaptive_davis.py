@@ -27,7 +27,7 @@ from fmu_observer.formulas.adaptation.adaptive_law import (
     learnt_constants,
     smallest_eigenvalue,
 )
-from fmu_observer.models.model import named_as
+from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation

@@ -16,7 +16,7 @@ import numpy as np
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sampled_error import SampledError
-from fmu_observer.models.model import named_as
+from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import (

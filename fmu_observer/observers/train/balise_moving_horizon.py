@@ -20,7 +20,7 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     window_memory,
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
-from fmu_observer.formulas.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
 from fmu_observer.observers.innovation_gate import OFF, known_accuracy, place_deviation
 from fmu_observer.observers.train.balise_odometer_ekf import (
     BALISE_ROW,

@@ -10,12 +10,12 @@ import numpy as np
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.decaying_innovation_error import decaying_error
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
-from fmu_observer.certificates.limits import Limit, PrintedBound, Trial
+from fmu_observer.certificates.observer_limits import Limit, PrintedBound, Trial
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds
 from fmu_observer.design.certified_gains import certified_gains
 from fmu_observer.formulas.correction.decaying_gain import correction
 from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_parameters, innovation_left
-from fmu_observer.models.model import shift_matrix
+from fmu_observer.models.observer_model import shift_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_observer import POSITION, SPEED

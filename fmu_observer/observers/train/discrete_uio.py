@@ -9,7 +9,7 @@ import numpy as np
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.design.uio_design import uio_matrices
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.train.train_observer import POSITION, Estimate, TrainObserver
 from plant_models.hybrid import PeriodicEvent, memory, parameter, state
 from plant_models.hybrid.system import Array

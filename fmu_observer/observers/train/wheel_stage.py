@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from plant_models.hybrid import PeriodicEvent, Signal, parameter, state
 from plant_models.hybrid.system import Array
 

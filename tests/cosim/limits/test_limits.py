@@ -10,7 +10,7 @@ import pytest
 from cosim.cli import main
 from cosim.limits import limit_rows, limit_text, practical_limit, survives
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates.limits import Trial
+from fmu_observer.certificates.observer_limits import Trial
 from fmu_observer.observers.generic.sampled import OutputPredictor
 from fmu_observer.observers.train import DelayedTrainObserver, MultirateCdo
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector

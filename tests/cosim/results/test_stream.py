@@ -296,7 +296,7 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 CHILD = """
 import ctypes, os, signal, sys
 from cosim.results import stream
-from fmu_observer.block.fmi3 import FMI3Block
+from fmu_observer.block.fmi3_block import FMI3Block
 from small_scenarios import small
 
 folder, how = sys.argv[1:]

@@ -16,7 +16,7 @@ from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.limits import Limit, PrintedBound
+from fmu_observer.certificates.observer_limits import Limit, PrintedBound
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.formulas.adaptation.adaptive_law import (
     Adaptation,
@@ -34,7 +34,7 @@ from fmu_observer.formulas.adaptation.adaptive_law import (
     start_covariance,
 )
 from fmu_observer.models.known_models import STATE_AFFINE_MODELS, find_state_affine_model
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.limits import Trial
+from fmu_observer.certificates.observer_limits import Trial
 from fmu_observer.models.state_affine import StateAffineModel
 from plant_models.hybrid import HybridSystem
 

@@ -16,7 +16,7 @@ from fmu_observer.certificates.printed_bounds.high_gain_theta import (
     theta_from_slopes,
 )
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_triangular_chain
 from fmu_observer.observers.model_observer import ModelObserver
 from plant_models.hybrid import parameter

@@ -13,7 +13,7 @@ from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.extended_disturbance import check_rho, extended_gain, extended_matrices
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.models.known_models import MODELS, find_model
-from fmu_observer.models.model import ObserverModel, named_as, stacked_of
+from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.models.suitability import linear_part, with_unknown_inputs
 from fmu_observer.observers.generic.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.certificates.condition import Condition
-from fmu_observer.design.takagi_sugeno_luenberger import placed_gains, vertex_decrease
+from fmu_observer.design.continuous_takagi_sugeno import placed_gains, vertex_decrease
 from fmu_observer.models.checks import checked_matrix
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state

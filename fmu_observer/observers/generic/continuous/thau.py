@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.condition import Condition
-from fmu_observer.certificates.thau import best_thau_bound, scaled_thau_bound
+from fmu_observer.certificates.lipschitz_condition import best_thau_bound, scaled_thau_bound
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.continuous.luenberger import Luenberger
 
 SPEED = 2.0  # [1/s] of the default poles [ours]

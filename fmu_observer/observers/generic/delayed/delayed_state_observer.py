@@ -11,12 +11,12 @@ import numpy as np
 
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.limits import Limit
+from fmu_observer.certificates.observer_limits import Limit
 from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, network_bounds
 from fmu_observer.formulas.delay.delay_memory import at_age, integral_weights
 from fmu_observer.formulas.delay.finite_time_predictor import Prediction, moved_on
 from fmu_observer.models.known_models import MODELS, find_model
-from fmu_observer.models.model import ObserverModel, named_as
+from fmu_observer.models.observer_model import ObserverModel, named_as
 from fmu_observer.observers.generic.delayed.delayed_state_memory import declared_memory
 from fmu_observer.observers.generic.delayed.limits_by_trials import delay_limit, packet_limit
 from fmu_observer.observers.generic.delayed.measurement_nodes import nodes_of_measurements, turns_of_nodes

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.limits import Limit, PrintedBound, Trial, Varied
+from fmu_observer.certificates.observer_limits import Limit, PrintedBound, Trial, Varied
 from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, exact_predictor_delay
 from fmu_observer.observers.model_trial import WRONG_START, model_trial
 

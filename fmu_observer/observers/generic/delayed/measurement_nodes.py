@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid.option import require_whole
 
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from fmu_observer.formulas.differentiation.implicit_recursion import implicit_step
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
-from fmu_observer.observers.generic.discrete.sampling import at_sample, primed_memory
+from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
 from plant_models.hybrid import PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole

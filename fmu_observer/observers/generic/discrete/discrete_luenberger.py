@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_linear
 from fmu_observer.observers.generic.discrete.extended_luenberger import ExtendedLuenberger
 

@@ -11,10 +11,10 @@ from fmu_observer.formulas.filtering import kalman, square_root
 from fmu_observer.formulas.filtering.kalman import Corrected
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.known_models import MODELS, find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.system_model import Source
 from fmu_observer.observability import require_detectable_model
-from fmu_observer.observers.generic.discrete.belief import Belief
+from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.system import Array

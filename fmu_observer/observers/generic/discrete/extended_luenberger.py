@@ -11,11 +11,11 @@ import scipy
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, discrete_bound
 from fmu_observer.design.pole_placement import observability_matrix, observer_gain
-from fmu_observer.models.discretisation import transition
+from fmu_observer.models.discrete_model import transition
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import ObserverModel, named_as, stacked_of
+from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observability import MeasuredSystem, UnobservableError, require_observable
-from fmu_observer.observers.generic.discrete.sampling import at_sample, primed_memory
+from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.missing import or_else

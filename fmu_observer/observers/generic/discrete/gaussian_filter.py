@@ -15,17 +15,17 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.filtering.kalman import Corrected, log_likelihood, normalised_square
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import Source, Steps, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
 from fmu_observer.observers.generic.discrete.arrivals import PERIODIC, Arrivals
-from fmu_observer.observers.generic.discrete.belief import Belief, chosen
 from fmu_observer.observers.generic.discrete.covariance_requirements import is_positive, positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.generic.discrete.filter_signals import NOT_POSITIVE, SignalsOf
-from fmu_observer.observers.generic.discrete.sampling import PRIMED
+from fmu_observer.observers.generic.discrete.gaussian_belief import Belief, chosen
+from fmu_observer.observers.generic.discrete.sample_step import PRIMED
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values

@@ -22,14 +22,14 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     window_memory,
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
-from fmu_observer.formulas.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
 from fmu_observer.models.filter_model import Known
-from fmu_observer.models.model import named_as, stacked, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked, stacked_of
 from fmu_observer.models.system_model import Source
 from fmu_observer.observability.window_observability import window_observability
 from fmu_observer.observers.gated_observer import GATED_EVENT
-from fmu_observer.observers.generic.discrete.belief import Belief
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
+from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix

@@ -9,10 +9,10 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.limits import PrintedBound
+from fmu_observer.certificates.observer_limits import PrintedBound
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DecayBounds, decay_bounds
 from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_parameters, innovation_left
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.held_innovation import HeldInnovation
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal

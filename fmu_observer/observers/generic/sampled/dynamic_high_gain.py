@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.condition import Condition
-from fmu_observer.certificates.limits import PrintedBound
+from fmu_observer.certificates.observer_limits import PrintedBound
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DynamicThetaBounds, dynamic_theta_bounds
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.output_predictor import OutputPredictor
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal, output_signal, parameter, state

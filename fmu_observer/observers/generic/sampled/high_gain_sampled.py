@@ -11,7 +11,7 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.sampled_observer import SampledObserver, check_chain, per_measurement
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal, parameter, vector

@@ -10,7 +10,7 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.high_gain_sampled import THETA, chain_gain
 from fmu_observer.observers.generic.sampled.sampled_observer import SampledObserver, check_chain, per_measurement
 from fmu_observer.observers.model_observer import as_matrix

@@ -15,7 +15,7 @@ from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
 from fmu_observer.design.sylvester import sylvester_design, sylvester_residual
 from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
-from fmu_observer.models.model import ObserverModel, named_as, stacked_of
+from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values

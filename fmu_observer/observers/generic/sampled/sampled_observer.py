@@ -15,8 +15,8 @@ import numpy as np
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import GapError
-from fmu_observer.certificates.limits import Limit, PrintedBound
-from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.certificates.observer_limits import Limit, PrintedBound
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver

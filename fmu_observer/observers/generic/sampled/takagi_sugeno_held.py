@@ -21,7 +21,7 @@ from fmu_observer.certificates.quadratic import QuadraticCondition as Inequaliti
 from fmu_observer.certificates.quadratic import common_quadratic_form, decrease, flow_condition
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.known_models import find_takagi_sugeno_model
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver

@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.formulas.signatures.blending import blended
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.exhibits.noisy_plant import NoisyPlant
 from plant_models.hybrid import (

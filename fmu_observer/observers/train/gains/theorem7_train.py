@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fmu_observer.design.theorem7.design import Theorem7Design, design_theorem7
+from fmu_observer.design.theorem7.theorem7_design import Theorem7Design, design_theorem7
 from fmu_observer.models.train.takagi_sugeno_train_model import takagi_sugeno_train
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo

@@ -12,10 +12,9 @@ from math import inf, isfinite
 
 import numpy as np
 
-from fmu_observer.block.events import TIME_TOLERANCE, Events
-from fmu_observer.block.state import BlockState, Shape, check_owner
-from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
-from fmu_observer.block.variables import (
+from fmu_observer.block.block_events import TIME_TOLERANCE, Events
+from fmu_observer.block.block_state import BlockState, Shape, check_owner
+from fmu_observer.block.block_variables import (
     BEFORE_TIME,
     COMPUTED,
     BlockError,
@@ -25,6 +24,7 @@ from fmu_observer.block.variables import (
     Role,
     StepDiscarded,
 )
+from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
 

@@ -16,9 +16,9 @@ from typing import Any, get_args
 
 import numpy as np
 
-from fmu_observer.block.journal import Record, Stamped
+from fmu_observer.block.block_journal import Record, Stamped
+from fmu_observer.block.block_variables import BlockError, Mode
 from fmu_observer.block.policy import Counters
-from fmu_observer.block.variables import BlockError, Mode
 from fmu_observer.event_protocol import LATE_POLICIES
 from plant_models.hybrid import Snapshot
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.design.cvxpy_module import load_cvxpy, solved
-from fmu_observer.design.theorem7.inequalities import Theorem7Problem, Unknowns, inequalities
+from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Problem, Unknowns, inequalities
 
 Gains = tuple[np.ndarray, np.ndarray]
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.theorem7.check import margins
-from fmu_observer.design.theorem7.inequalities import Theorem7Problem
-from fmu_observer.design.theorem7.solve import Gains, Theorem7Candidate, candidates
+from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Problem
+from fmu_observer.design.theorem7.theorem7_recomputed import margins
+from fmu_observer.design.theorem7.theorem7_solver import Gains, Theorem7Candidate, candidates
 from fmu_observer.models.checks import checked_matrix
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel

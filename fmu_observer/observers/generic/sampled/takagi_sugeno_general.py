@@ -14,9 +14,9 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error, with_swit
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.limits import Limit
+from fmu_observer.certificates.observer_limits import Limit
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
-from fmu_observer.models.model import named_as, stacked_of
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
 from fmu_observer.observers.gap_certified import ASKED_GAP, limits_of

@@ -16,7 +16,7 @@ from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from plant_models.hybrid import HybridSystem, Runtime, Signal, scalar_names
 
 if TYPE_CHECKING:
-    from fmu_observer.block.events import Events
+    from fmu_observer.block.block_events import Events
 
 Mode = Literal["instantiated", "initialization", "event", "step", "terminated", "freed"]
 Role = Literal[

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fmu_observer.design.robust_residual.inequalities import Rows
+from fmu_observer.design.robust_residual.residual_inequalities import Rows
 
 ROUNDING = 1e-13  # of the largest number in a matrix: an eigenvalue smaller than this is not told from zero
 

@@ -13,7 +13,7 @@ from math import isfinite
 
 import numpy as np
 
-from fmu_observer.block.journal import Journal, Mark, Record, Stamped
+from fmu_observer.block.block_journal import Journal, Mark, Record, Stamped
 from fmu_observer.block.policy import Counters, advance, communicate, jump, replay
 from fmu_observer.description import STAMP_NOW, exposed_inputs
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol, LatePolicy

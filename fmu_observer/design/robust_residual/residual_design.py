@@ -13,10 +13,10 @@ import numpy as np
 
 from fmu_observer.design.residual_analysis import minimum_gain
 from fmu_observer.design.residual_channel import ResidualChannel
-from fmu_observer.design.robust_residual.check import least, margins
-from fmu_observer.design.robust_residual.inequalities import robustness
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.solve import ResidualCandidate, candidates
+from fmu_observer.design.robust_residual.residual_inequalities import robustness
+from fmu_observer.design.robust_residual.residual_recomputed import least, margins
+from fmu_observer.design.robust_residual.residual_solver import ResidualCandidate, candidates
 from fmu_observer.models.checks import check_numbers
 from fmu_observer.observability import MeasuredSystem, require_detectable
 

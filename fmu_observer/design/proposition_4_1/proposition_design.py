@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.proposition_4_1.check import margins
-from fmu_observer.design.proposition_4_1.inequalities import DECAY, GAIN, Proposition41Problem
-from fmu_observer.design.proposition_4_1.solve import Proposition41Candidate, least_alphas, least_condition
+from fmu_observer.design.proposition_4_1.proposition_inequalities import DECAY, GAIN, Proposition41Problem
+from fmu_observer.design.proposition_4_1.proposition_recomputed import margins
+from fmu_observer.design.proposition_4_1.proposition_solver import Proposition41Candidate, least_alphas, least_condition
 
 BISECTIONS = 14
 SMALLEST = 1e-3  # of the decay asked for: below it nothing is called feasible

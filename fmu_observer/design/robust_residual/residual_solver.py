@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 
 from fmu_observer.design.cvxpy_module import load_cvxpy, solved
-from fmu_observer.design.robust_residual.inequalities import robustness, sensitivity
 from fmu_observer.design.robust_residual.problem import ResidualProblem
+from fmu_observer.design.robust_residual.residual_inequalities import robustness, sensitivity
 
 Least = Literal["attenuation", "alpha"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 
 
 def start_of(model: ObserverModel) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.design.cvxpy_module import load_cvxpy, solved
-from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, inequalities
+from fmu_observer.design.proposition_4_1.proposition_inequalities import Proposition41Problem, inequalities
 
 STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
 

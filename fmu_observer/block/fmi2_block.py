@@ -7,8 +7,8 @@ from typing import Any
 
 from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 
+from fmu_observer.block.block_variables import BlockError, Role
 from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
-from fmu_observer.block.variables import BlockError, Role
 
 WHOLE: tuple[Role, ...] = ("count", "integer_output", "outcome", "policy")
 

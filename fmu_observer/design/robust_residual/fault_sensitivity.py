@@ -8,10 +8,10 @@ from math import sqrt
 import numpy as np
 
 from fmu_observer.design.residual_analysis import bands_above, minimum_gain
-from fmu_observer.design.robust_residual.check import margins
-from fmu_observer.design.robust_residual.inequalities import sensitivity
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.solve import sensitivity_candidates
+from fmu_observer.design.robust_residual.residual_inequalities import sensitivity
+from fmu_observer.design.robust_residual.residual_recomputed import margins
+from fmu_observer.design.robust_residual.residual_solver import sensitivity_candidates
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from math import isfinite
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from fmu_observer.block.variables import BlockError
+from fmu_observer.block.block_variables import BlockError
 from fmu_observer.description import VariableTable, exposed_inputs, referenced
 from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, traced_once, width
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
+from fmu_observer.block.block_variables import BlockError, Mode, Role
 from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
-from fmu_observer.block.variables import BlockError, Mode, Role
 
 INT32: tuple[Role, ...] = ("count", "integer_output", "outcome")
 INT64: tuple[Role, ...] = ("policy",)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.design.proposition_4_1.inequalities import SCALE, Proposition41Problem, inequalities
+from fmu_observer.design.proposition_4_1.proposition_inequalities import SCALE, Proposition41Problem, inequalities
 
 ROUNDING = 1e-13  # of the largest number in a matrix: an eigenvalue smaller than this is not told from zero
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale, scaled, scaled_lipschitz
 
 SCALES = np.geomspace(0.1, 100.0, 301)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.hybrid.integration import rk4_step
 from plant_models.hybrid.system import Array, vector

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.design.theorem7.inequalities import Theorem7Problem, Unknowns, inequalities
+from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Problem, Unknowns, inequalities
 
 ROUNDING = 1e-13  # of the largest number in a matrix: an eigenvalue smaller than this is not told from zero
 
