@@ -12,15 +12,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.distance import cdist
 
+from fmu_observer.detection import WheelSignature
+from fmu_observer.detection.wheel_classes import WHEEL_CLASSES
+from fmu_observer.detection.wheel_signature import CODES, record_class
 from fmu_observer.formulas.signatures.classification import PencilSpace, SeparationError, train_classifier
 from fmu_observer.formulas.signatures.clouds import Coordinate, extent, separation
 from fmu_observer.formulas.signatures.conditional_estimate import train_conditional, train_curve
 from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.formulas.signatures.properties import PROPERTIES, branch_tips, printed_branches, printed_tip
 from fmu_observer.observers.generic.signature import SignatureTrack
-from fmu_observer.observers.train import WheelSignature
-from fmu_observer.observers.train.wheel_classes import WHEEL_CLASSES
-from fmu_observer.observers.train.wheel_signature import CODES, record_class
 from plant_models.hybrid import Runtime
 
 GALLERY = Path(__file__).resolve().parents[2] / "docs" / "gallery" / "moving_horizon"

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from shared.jam_runs import CASES, random_jams, readings, trains
 
+from fmu_observer.detection.wheel_classes import DROP, RISE, STEADY
 from fmu_observer.formulas.signatures.classification import PencilSpace, SignatureClassifier, train_classifier
-from fmu_observer.observers.train.wheel_classes import DROP, RISE, STEADY
 
 CHANGES = 4  # in a record
 LENGTHS = (0.2, 0.4, 0.6, 1.0, 2.0, 3.0)  # [s]

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fmu_observer.detection.wheel_classes import CHANGES, DROP, RISE, STEADY, WHEEL_CLASSES
 from fmu_observer.formulas.signatures.classification import Plane, SignatureClassifier
 from fmu_observer.formulas.signatures.clouds import Coordinate
 from fmu_observer.formulas.signatures.pencil import pencil_point
 from fmu_observer.formulas.signatures.properties import PROPERTIES
-from fmu_observer.observers.train.wheel_classes import CHANGES, DROP, RISE, STEADY, WHEEL_CLASSES
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
