@@ -23,7 +23,7 @@ from cosim.observer_benchmark.observers import benchmark_observers
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.real_time_iteration import TOLD, WINDOW_MEMORY, Iterated
 from fmu_observer.formulas.moving_horizon.robust_loss import SCALES
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, _moved, _seen

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.models.filter_models import FilterModel, Known
 from plant_models.hybrid import Signal, input_signal, state
 from plant_models.hybrid.system import Array
 

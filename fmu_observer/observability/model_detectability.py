@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.linear_part import linear_part, start_of
+from fmu_observer.models.linear_models import linear_part, start_of
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability.measured_system import MeasuredSystem

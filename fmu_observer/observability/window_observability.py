@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.models.filter_models import FilterModel, Known
 
 TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not told
 PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it

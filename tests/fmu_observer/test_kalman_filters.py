@@ -12,8 +12,8 @@ from block_systems import Driven
 
 from fmu_observer.models.exhibits.cart_pendulum_model import cart_pendulum
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
-from fmu_observer.models.filter_model import FilterModel, Known
-from fmu_observer.models.system_model import Steps, find_filter_model, system_model
+from fmu_observer.models.filter_models import FilterModel, Known
+from fmu_observer.models.traced_system_model import Steps, find_filter_model, system_model
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter

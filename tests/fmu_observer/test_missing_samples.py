@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_observer import OBSERVERS
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.generic.discrete.member_filter import MemberFilter

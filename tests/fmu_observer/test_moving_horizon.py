@@ -24,7 +24,7 @@ from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver
 from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, passed, solve
 from fmu_observer.formulas.moving_horizon.real_time_iteration import contradicted, iterate, unsettled
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
-from fmu_observer.models.filter_model import Known, filter_model
+from fmu_observer.models.filter_models import Known, filter_model
 from fmu_observer.models.known_models import find_model
 from fmu_observer.observability.window_observability import window_observability
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver

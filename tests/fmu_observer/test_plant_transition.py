@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import cosim
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.models.known_models import MODELS
-from fmu_observer.models.system_model import UNROLLED, Steps, find_filter_model, system_model
+from fmu_observer.models.traced_system_model import UNROLLED, Steps, find_filter_model, system_model
 from fmu_observer.observers.generic.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from fmu_observer.models.exhibits.four_state_example import triangularisable_chain, triangularisable_example
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
-from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
+from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise
 from plant_models.exhibits import NonTriangularisablePlant, TriangularisablePlant
 from plant_models.hybrid import HybridSystem, input_signal, state

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.models.filter_model import Known
+from fmu_observer.models.filter_models import Known
 from fmu_observer.observability.window_observability import window_observability
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from plant_models.hybrid import Runtime, scalar_names

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
+from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from plant_models.hybrid import input_signal, state
 from plant_models.hybrid.system import Array

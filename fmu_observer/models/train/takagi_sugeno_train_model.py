@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
+from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from fmu_observer.models.train.freight_train_model import DAVIS_B, DAVIS_C, MASS, TOP_SPEED, freight_train
 from plant_models.hybrid import input_signal

@@ -9,7 +9,7 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.pole_placement import observability_matrix, observer_gain
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.linear_part import linear_part
+from fmu_observer.models.linear_models import linear_part
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from plant_models.hybrid.system import Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from fmu_observer.models.filter_model import FilterModel
+from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.models.observer_model import stacked_of
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from plant_models.hybrid import Event, PeriodicEvent, Signal, TriggeredEvent, input_signal

@@ -9,10 +9,10 @@ import numpy as np
 
 from fmu_observer.formulas.filtering import kalman, square_root
 from fmu_observer.formulas.filtering.kalman import Corrected
-from fmu_observer.models.filter_model import Known
+from fmu_observer.models.filter_models import Known
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel
-from fmu_observer.models.system_model import Source
+from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observability import require_detectable_model
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.models.filter_model import FilterModel
+from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.observers.generic.discrete.arrivals import Arrivals
 from plant_models.hybrid import OutputWarning, Signal, output_signal
 from plant_models.hybrid import memory as memory_signal

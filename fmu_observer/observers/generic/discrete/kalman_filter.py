@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fmu_observer.models.system_model import Source
+from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.filtering.ensemble import drawn
 from fmu_observer.formulas.filtering.kalman import decoupled
-from fmu_observer.models.filter_model import Known
+from fmu_observer.models.filter_models import Known
+from fmu_observer.models.noise_over_period import noise_over
 from fmu_observer.models.observer_model import named_as, stacked_of
-from fmu_observer.models.process_noise import noise_over
-from fmu_observer.models.system_model import Source, Steps, find_filter_model
+from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.generic.discrete.sample_step import PRIMED

@@ -23,9 +23,9 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
-from fmu_observer.models.filter_model import Known
+from fmu_observer.models.filter_models import Known
 from fmu_observer.models.observer_model import named_as, stacked, stacked_of
-from fmu_observer.models.system_model import Source
+from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observability.window_observability import window_observability
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter

@@ -11,8 +11,8 @@ from fmu_observer.formulas.filtering import unscented
 from fmu_observer.formulas.filtering.kalman import Corrected, decoupled, symmetric
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.filtering.unscented import Scattered, Weights
-from fmu_observer.models.filter_model import Known
-from fmu_observer.models.system_model import Source
+from fmu_observer.models.filter_models import Known
+from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import Form, GaussianFilter
 from plant_models.hybrid import parameter

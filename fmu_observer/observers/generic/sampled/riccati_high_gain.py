@@ -12,7 +12,7 @@ from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.linear_part import linear_part
+from fmu_observer.models.linear_models import linear_part
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observability import MeasuredSystem, require_observable
 from fmu_observer.observers.gap_certified import GapCertified

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fmu_observer.formulas.filtering.kalman import symmetric
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.models.filter_models import FilterModel, Known
 from plant_models.hybrid.system import Array
 
 

@@ -14,7 +14,7 @@ from math import ceil, inf
 import casadi as ca
 import numpy as np
 
-from fmu_observer.models.filter_model import FilterModel, Known, Measured, Transition, filter_model
+from fmu_observer.models.filter_models import FilterModel, Known, Measured, Transition, filter_model
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel
 from plant_models import PLANTS
