@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +16,16 @@ from cosim.baselines.references import embed_baseline, find_references, read_ref
 from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
-from cosim.cli.baseline_text import print_json, tell_change, tell_comparison, tell_header
-from cosim.cli.scenarios import OVERRIDES, between_samples, parse_setting, simulated_time_bar
-from cosim.cli.tolerances import Asked, add_tolerances, asked_tolerances, chosen_tolerances
+from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
+from cosim.cli.baseline_text import print_change, print_comparison, print_header
+from cosim.cli.output import print_json, print_paths, print_warning
+from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
+from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
 from cosim.errors import BaselineError
 from cosim.results.load import load_result
+from fmus.cli.commands import Action, Actions, Argument, Execute, Group, argument
 from fmus.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -33,104 +37,53 @@ DONE, DIFFERS = 0, 1
 EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
 
 
-def register(commands: Any) -> None:
-    """Add the command and its actions to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    description = "Keep a result as a baseline, and check later ones against it."
-    parser = commands.add_parser("baseline", description=description, epilog=EPILOG)
-    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    _register_make(actions)
-    _register_check(actions)
-    show = _action(actions, "show", "show what a baseline is of", _show)
-    _add_file(show)
-    update = _action(actions, "update", "run again and accept the outputs as they are now", _update)
-    _add_file(update)
-    _add_tolerances(update)
-    _register_references(actions)
-
-
-def _register_make(actions: Any) -> None:
-    make = _action(actions, "make", "run an FMU or a scenario and keep its outputs", _make)
-    make.add_argument(
-        "subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"
-    )
-    _add_file(make)
-    make.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="settings",
-        help=f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input",
-    )
-    make.add_argument("--inputs", metavar="TABLE", help="of an FMU: a table with a column for each input")
-    make.add_argument(
+FILE = argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
+FORCE = argument("--force", action="store_true", help="replace a baseline that is there already")
+ALLOWED = Group(TOLERANCES, "tolerances", "those in the baseline, or the usual ones, where not given")
+OUTPUT = (argument("--json", action="store_true", help="print JSON instead of text"), QUIET)
+MAKE = (
+    argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"),
+    FILE,
+    settings_argument(f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input"),
+    argument("--inputs", metavar="TABLE", help="of an FMU: a table with a column for each input"),
+    argument(
         "--between",
         nargs="+",
         default=[],
         metavar="[NAME=]hold|linear",
         help="what inputs of the table do between its rows (default: linear, held where discrete)",
-    )
-    for key, what in (("start", "begin"), ("stop", "end"), ("step", "communication step")):
-        make.add_argument(f"--{key}", type=float, metavar="SECONDS", help=f"{what} of the run [s]")
-    make.add_argument(
+    ),
+    argument("--start", type=float, metavar="SECONDS", help="begin of the run [s]"),
+    argument("--stop", type=float, metavar="SECONDS", help="end of the run [s]"),
+    argument("--step", type=float, metavar="SECONDS", help="communication step of the run [s]"),
+    argument(
         "--record", nargs="+", default=[], metavar="NAME", help="of an FMU: variables to record besides the outputs"
-    )
-    make.add_argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="signals to keep (default: all)")
-    make.add_argument(
-        "--every", type=float, metavar="SECONDS", help="least spacing of the rows [s] (default: about 2000 rows)"
-    )
-    make.add_argument("--force", action="store_true", help="replace a baseline that is there already")
-    _add_tolerances(make)
-
-
-def _register_check(actions: Any) -> None:
-    check = _action(actions, "check", "run again, or take a given result, and compare", _check)
-    check.add_argument("file", metavar="FILE.json", help="the baseline, or an FMU that holds references")
-    check.add_argument(
-        "--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare"
-    )
-    check.add_argument("--reference", metavar="NAME", help="of several references in an FMU: this one only")
-    check.add_argument("--plots", metavar="DIR", help="write a page with pictures of what differs to this folder")
-    check.add_argument("--verbose", action="store_true", help="print all signals and everything that was found")
-    _add_tolerances(check)
-
-
-def _register_references(actions: Any) -> None:
-    embed = _action(actions, "embed", "write a copy of an FMU that holds the baseline (FMI-LS-REF)", _embed)
-    _add_file(embed)
-    embed.add_argument("fmu", metavar="FMU", help="the FMU that the baseline is of")
-    embed.add_argument("-o", "--output", metavar="COPY.fmu", required=True, help="the copy; may be the FMU itself")
-    embed.add_argument("--name", help="of the reference (default: that of the baseline)")
-    extract = _action(actions, "extract", "take a reference (FMI-LS-REF) out of an FMU as a baseline", _extract)
-    extract.add_argument("fmu", metavar="FMU", help="the FMU that holds it")
-    _add_file(extract)
-    extract.add_argument("--reference", metavar="NAME", help="which one, where there are several")
-    extract.add_argument("--force", action="store_true", help="replace a baseline that is there already")
-
-
-def _action(actions: Any, name: str, help_text: str, execute: Any) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = actions.add_parser(
-        name, help=help_text, description=f"{help_text[0].upper()}{help_text[1:]}."
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(execute=execute)
-    return parser
-
-
-def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
-
-
-def _add_tolerances(parser: argparse.ArgumentParser) -> None:
-    add_tolerances(parser.add_argument_group("tolerances", "those in the baseline, or the usual ones, where not given"))
-
-
-# -- actions ----------------------------------------------------------------------------------------------------------
+    ),
+    argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="signals to keep (default: all)"),
+    argument("--every", type=float, metavar="SECONDS", help="least spacing of the rows [s] (default: about 2000 rows)"),
+    FORCE,
+    ALLOWED,
+)
+CHECK = (
+    argument("file", metavar="FILE.json", help="the baseline, or an FMU that holds references"),
+    argument("--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare"),
+    argument("--reference", metavar="NAME", help="of several references in an FMU: this one only"),
+    argument("--plots", metavar="DIR", help="write a page with pictures of what differs to this folder"),
+    argument("--verbose", action="store_true", help="print all signals and everything that was found"),
+    ALLOWED,
+)
+EMBED = (
+    FILE,
+    argument("fmu", metavar="FMU", help="the FMU that the baseline is of"),
+    argument("-o", "--output", metavar="COPY.fmu", required=True, help="the copy; may be the FMU itself"),
+    argument("--name", help="of the reference (default: that of the baseline)"),
+)
+EXTRACT = (
+    argument("fmu", metavar="FMU", help="the FMU that holds it"),
+    FILE,
+    argument("--reference", metavar="NAME", help="which one, where there are several"),
+    FORCE,
+)
 
 
 def _make(options: argparse.Namespace) -> int:
@@ -155,7 +108,7 @@ def _subject(options: argparse.Namespace) -> Subject:
             record=options.record,
             interpolation=between_samples(options.between),
             progress=bar,
-            warn=_warn,
+            warn=print_warning,
             **_values(options),
         )
 
@@ -181,7 +134,7 @@ def _check(options: argparse.Namespace) -> int:
         print_json([one.to_dict() for one in found] if len(found) > 1 else found[0].to_dict())
     else:
         for one in found:
-            tell_comparison(one, options.verbose)
+            print_comparison(one, options.verbose)
     if options.plots:
         _draw(found, options)
     return DONE if all(one.equal for one in found) else DIFFERS
@@ -202,19 +155,18 @@ def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) ->
     if other is not None and Path(other).suffix.lower() != ".fmu":
         return check(load_result(other), baseline, tolerances, label=other)
     with _progress(options) as bar:
-        subject = run_again(baseline, other, bar, _warn)
+        subject = run_again(baseline, other, bar, print_warning)
     return check(
         subject.outcome or subject.result, baseline, tolerances, label=Path(other or subject.recipe.source).name
     )
 
 
 def _draw(found: list[Regression], options: argparse.Namespace) -> None:
-    from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - matplotlib only for those who look
+    from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - matplotlib only for those who draw
 
     for one in found:
         folder = Path(options.plots) / one.reference if len(found) > 1 else Path(options.plots)
-        for kind, path in write_comparison(one, folder).items():
-            print(f"{kind:>10}: {path}", file=sys.stderr if options.json else sys.stdout)
+        print_paths(write_comparison(one, folder), sys.stderr if options.json else sys.stdout)
 
 
 def _show(options: argparse.Namespace) -> int:
@@ -222,7 +174,7 @@ def _show(options: argparse.Namespace) -> int:
     if options.json:
         print_json(header_data(baseline.header, baseline.path.parent) | {"notes": list(baseline.notes)})
     else:
-        tell_header(baseline)
+        print_header(baseline)
     return DONE
 
 
@@ -230,7 +182,7 @@ def _update(options: argparse.Namespace) -> int:
     baseline = read_baseline(options.file)
     tolerances = chosen_tolerances(options, asked_tolerances(options), baseline.tolerances)
     with _progress(options) as bar:
-        subject = run_again(baseline, None, bar, _warn)
+        subject = run_again(baseline, None, bar, print_warning)
     header = baseline.header
     update = plan_update(
         subject.outcome or subject.result,
@@ -246,22 +198,26 @@ def _update(options: argparse.Namespace) -> int:
 def _write(update: Any, path: Path, options: argparse.Namespace) -> int:
     if update.texts:
         write_texts(update.texts, path)
-    tell_change(update, path, options.json)
+    print_change(update, path, options.json)
     return DONE
 
 
 def _embed(options: argparse.Namespace) -> int:
     target = embed_baseline(read_baseline(options.file), options.fmu, options.output, options.name)
-    print_json({"file": str(target)}) if options.json else print(
-        f"{target} holds {options.name or Path(options.file).stem}."
-    )
+    if options.json:
+        print_json({"file": str(target)})
+    else:
+        print(f"{target} holds {options.name or Path(options.file).stem}.")
     return DONE
 
 
 def _extract(options: argparse.Namespace) -> int:
     path = _free(baseline_path(options.file), options.force)
     extract_reference(options.fmu, path, options.reference)
-    print_json({"file": str(path)}) if options.json else print(f"{path} written.")
+    if options.json:
+        print_json({"file": str(path)})
+    else:
+        print(f"{path} written.")
     return DONE
 
 
@@ -282,5 +238,21 @@ def _progress(options: argparse.Namespace) -> ProgressBar:
     return simulated_time_bar(silent=options.quiet or options.json)
 
 
-def _warn(text: str) -> None:
-    print(f"warning: {text}", file=sys.stderr, flush=True)
+def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | Group]) -> Action:
+    words = {"help": text, "description": f"{text[0].upper()}{text[1:]}."}
+    return Action(name, execute, words, (*OUTPUT, *arguments))
+
+
+PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
+ARGUMENTS = (
+    Actions(
+        (
+            _action("make", _make, "run an FMU or a scenario and keep its outputs", MAKE),
+            _action("check", _check, "run again, or take a given result, and compare", CHECK),
+            _action("show", _show, "show what a baseline is of", (FILE,)),
+            _action("update", _update, "run again and accept the outputs as they are now", (FILE, ALLOWED)),
+            _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", EMBED),
+            _action("extract", _extract, "take a reference (FMI-LS-REF) out of an FMU as a baseline", EXTRACT),
+        )
+    ),
+)

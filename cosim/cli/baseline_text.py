@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cosim.baselines.call import Call
 from cosim.baselines.draft import value_range
+from cosim.cli.output import print_json
 from cosim.comparison.text import comparison_text
-from cosim.results.summary_file import jsonable
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
@@ -17,12 +16,7 @@ if TYPE_CHECKING:
     from cosim.baselines.update import Update
 
 
-def print_json(data: Any) -> None:
-    """Print plain data as JSON; NaN becomes null."""
-    print(json.dumps(jsonable(data), indent=2))
-
-
-def tell_comparison(found: Regression, verbose: bool) -> None:
+def print_comparison(found: Regression, verbose: bool) -> None:
     """Print a comparison.
 
     Args:
@@ -31,7 +25,7 @@ def tell_comparison(found: Regression, verbose: bool) -> None:
     print(comparison_text(found, verbose=verbose))
 
 
-def tell_change(update: Update, path: Path, as_json: bool) -> None:
+def print_change(update: Update, path: Path, as_json: bool) -> None:
     """Print what was written.
 
     Args:
@@ -47,7 +41,7 @@ def tell_change(update: Update, path: Path, as_json: bool) -> None:
         print(f"  {line}")
 
 
-def tell_header(baseline: Baseline) -> None:
+def print_header(baseline: Baseline) -> None:
     """Print what a baseline is of."""
     header = baseline.header
     span = header.span

@@ -5,20 +5,20 @@ error.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cosim.baselines import check, is_baseline, read_baseline
-from cosim.cli.tolerances import Asked, add_tolerances, asked_tolerances, chosen_tolerances
+from cosim.cli.output import print_json
+from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import compare_results
 from cosim.comparison.text import comparison_text
 from cosim.comparison.tolerance import Tolerances
 from cosim.errors import ComparisonError, nearest
 from cosim.results.load import load_result
-from cosim.results.summary_file import jsonable
+from fmus.cli.commands import Group, argument, one_of
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline
@@ -35,38 +35,41 @@ EPILOG = (
     "an instant by time + time_relative * length. Exit codes: 0 equal within tolerance, 1 different, 2 error."
 )
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    description = "Compare a result with a reference: signals in tolerance tubes, telegrams as events."
-    parser = commands.add_parser("compare", description=description, epilog=EPILOG)
-    what = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
-    parser.add_argument("reference", metavar="A", help=f"what is right: {what}")
-    parser.add_argument("result", metavar="B", help=f"what is compared with it: {what}")
-    allowed = parser.add_argument_group(
+KINDS = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
+PARSER = {
+    "description": "Compare a result with a reference: signals in tolerance tubes, telegrams as events.",
+    "epilog": EPILOG,
+}
+ARGUMENTS = (
+    argument("reference", metavar="A", help=f"what is right: {KINDS}"),
+    argument("result", metavar="B", help=f"what is compared with it: {KINDS}"),
+    Group(
+        (
+            *TOLERANCES,
+            argument(
+                "--signals", action="append", metavar="PATTERN", help="compare these signals only; may be repeated"
+            ),
+            argument(
+                "--no-telegrams", action="store_true", help="do not compare balise telegrams and packets of a network"
+            ),
+            argument("--extra-fails", action="store_true", help="signals that only B has are a difference"),
+        ),
         "what is compared, and how closely",
         "tolerances that are not given are those of a baseline A, or else the usual ones",
-    )
-    add_tolerances(allowed)
-    allowed.add_argument(
-        "--signals", action="append", metavar="PATTERN", help="compare these signals only; may be repeated"
-    )
-    allowed.add_argument(
-        "--no-telegrams", action="store_true", help="do not compare balise telegrams and packets of a network"
-    )
-    allowed.add_argument("--extra-fails", action="store_true", help="signals that only B has are a difference")
-    output = parser.add_argument_group("output")
-    output.add_argument("--json", action="store_true", help="print the comparison as JSON instead of text")
-    output.add_argument("--html", metavar="FILE", help="write a page with pictures of the signals that differ")
-    output.add_argument("--plots", metavar="DIR", help="write these pictures as PNG files")
-    amount = output.add_mutually_exclusive_group()
-    amount.add_argument("--quiet", action="store_true", help="print the verdict only")
-    amount.add_argument("--verbose", action="store_true", help="print all signals and everything that was found")
-    parser.set_defaults(execute=execute)
+    ),
+    Group(
+        (
+            argument("--json", action="store_true", help="print the comparison as JSON instead of text"),
+            argument("--html", metavar="FILE", help="write a page with pictures of the signals that differ"),
+            argument("--plots", metavar="DIR", help="write these pictures as PNG files"),
+            one_of(
+                argument("--quiet", action="store_true", help="print the verdict only"),
+                argument("--verbose", action="store_true", help="print all signals and everything that was found"),
+            ),
+        ),
+        "output",
+    ),
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -138,7 +141,7 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
 def _tell(comparison: Comparison, options: argparse.Namespace) -> None:
     """Text or JSON first, so that it is seen also where a file cannot be written."""
     if options.json:
-        print(json.dumps(jsonable(comparison.to_dict()), indent=2))
+        print_json(comparison.to_dict())
     else:
         text = comparison_text(comparison, verbose=options.verbose)
         print(text.splitlines()[0] if options.quiet else text)

@@ -4,36 +4,30 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from cosim.errors import OutputError
 from cosim.results.formats.catalogue import format_of
 from cosim.results.load import load_result
 from cosim.results.save import save_result
 from cosim.results.selection import selected
+from fmus.cli.commands import argument
 
 DONE = 0
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    text = (
-        "Write a result in another format: the ending of TARGET says which, such as .csv, .mat (MATLAB), .modelica.mat "
-        "(Dymola, OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder, or a table of any tool."
-    )
-    epilog = "Exit codes: 0 written, 2 error."
-    parser = commands.add_parser("convert", description=text, epilog=epilog)
-    parser.add_argument("source", metavar="SOURCE", help="results folder or file")
-    parser.add_argument("target", metavar="TARGET", help="file to write")
-    parser.add_argument(
-        "--signals", nargs="+", action="extend", metavar="PATTERN", help="only these signals, e.g. 'train.*'"
-    )
-    parser.add_argument("--no-units", action="store_true", help="CSV headings without units")
-    parser.set_defaults(execute=execute)
+PARSER = {
+    "description": (
+        "Write a result in another format: the ending of TARGET says which, such as .csv, .mat (MATLAB), "
+        ".modelica.mat (Dymola, OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder, or a table of any "
+        "tool."
+    ),
+    "epilog": "Exit codes: 0 written, 2 error.",
+}
+ARGUMENTS = (
+    argument("source", metavar="SOURCE", help="results folder or file"),
+    argument("target", metavar="TARGET", help="file to write"),
+    argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="only these signals, e.g. 'train.*'"),
+    argument("--no-units", action="store_true", help="CSV headings without units"),
+)
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import json
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cosim.cli.arguments import JSON_NOT_TABLE, PARAMETERS_FILE, settings_argument
+from cosim.cli.output import print_json, save_figure, write_text
 from cosim.cli.scenarios import parse_setting
 from cosim.components.recording_data import column_courses, interval_ends
-from cosim.errors import CosimError, OutputError, ScenarioError, nearest
+from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.evaluation.numbers import number
 from cosim.results.load import load_result
 from cosim.results.result import Result
-from cosim.results.summary_file import jsonable
 from cosim.simulation.scenario import Scenario
 from fmu_observer.identification.davis import (
     LEVEL,
@@ -25,56 +25,44 @@ from fmu_observer.identification.davis import (
     identify_davis,
 )
 from fmu_observer.identification.davis_estimate import DavisEstimate, IdentificationError
+from fmus.cli.commands import Action, Actions, argument
 from fmus.text_table import text_table
 
 DONE, NOT_IDENTIFIED = 0, 1
 RUN_SECONDS, RUN_STEP = 60.0, 0.05
 
 
-def register(commands: Any) -> None:
-    """Add the command and its actions to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    parser = commands.add_parser("identify", description="Identify parameters of a train from a measured run.")
-    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    text = (
-        "Davis coefficients w0 + w1 v + w2 v^2 from a run with constant or recorded effort, with confidence intervals, "
-        "and what of them cannot be identified."
-    )
-    epilog = "Exit codes: 0 all identified, 1 something is not, 2 error."
-    davis = actions.add_parser("davis", help="running resistance", description=text, epilog=epilog)
-    davis.add_argument("source", metavar="SOURCE", help="results folder, table of any tool, or an FMU, which is driven")
-    davis.add_argument("--speed", metavar="NAME", help="signal of the speed (default: the only one in m/s)")
-    davis.add_argument("--effort", metavar="N_OR_NAME", help="constant effort [N], or the signal of a recorded one")
-    davis.add_argument(
+DAVIS = (
+    argument("source", metavar="SOURCE", help="results folder, table of any tool, or an FMU, which is driven"),
+    argument("--speed", metavar="NAME", help="signal of the speed (default: the only one in m/s)"),
+    argument("--effort", metavar="N_OR_NAME", help="constant effort [N], or the signal of a recorded one"),
+    argument(
         "--between",
         choices=("hold", "linear"),
         help="what a recorded effort does between samples (default: as in the run; of a table linear)",
-    )
-    davis.add_argument("--mass", type=float, metavar="KG", help="mass with rotating parts; 1 for efforts by mass")
-    davis.add_argument("--from", type=float, dest="begin", metavar="SECONDS", help="begin of the part to use [s]")
-    davis.add_argument("--to", type=float, dest="end", metavar="SECONDS", help="end of the part to use [s]")
-    davis.add_argument(
+    ),
+    argument("--mass", type=float, metavar="KG", help="mass with rotating parts; 1 for efforts by mass"),
+    argument("--from", type=float, dest="begin", metavar="SECONDS", help="begin of the part to use [s]"),
+    argument("--to", type=float, dest="end", metavar="SECONDS", help="end of the part to use [s]"),
+    argument(
         "--minimum-speed", type=float, default=MINIMUM_SPEED, metavar="M_S", help="leave out slower samples [m/s]"
-    )
-    davis.add_argument("--level", type=float, default=LEVEL, help="of the intervals (default: 0.95)")
-    davis.add_argument(
+    ),
+    argument("--level", type=float, default=LEVEL, help="of the intervals (default: 0.95)"),
+    argument(
         "--resolution",
         type=float,
         default=RESOLUTION,
         metavar="M_S2",
         help="widest half of an interval that counts as identified, as acceleration at top speed (default: 0.05)",
-    )
-    davis.add_argument("--input", metavar="NAME", help="of an FMU: the input that takes the effort")
-    davis.add_argument("--stop", type=float, default=RUN_SECONDS, help="of an FMU: length of the run [s] (default: 60)")
-    davis.add_argument("--step", type=float, default=RUN_STEP, help="of an FMU: sampling [s] (default: 0.05)")
-    davis.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help="of an FMU")
-    davis.add_argument("--plot", type=Path, metavar="FILE", help="write speed and residuals as a picture")
-    davis.add_argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
-    davis.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
-    davis.set_defaults(execute=execute)
+    ),
+    argument("--input", metavar="NAME", help="of an FMU: the input that takes the effort"),
+    argument("--stop", type=float, default=RUN_SECONDS, help="of an FMU: length of the run [s] (default: 60)"),
+    argument("--step", type=float, default=RUN_STEP, help="of an FMU: sampling [s] (default: 0.05)"),
+    settings_argument("of an FMU"),
+    argument("--plot", type=Path, metavar="FILE", help="write speed and residuals as a picture"),
+    PARAMETERS_FILE,
+    JSON_NOT_TABLE,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -91,10 +79,15 @@ def execute(options: argparse.Namespace) -> int:
     except IdentificationError as error:
         raise CosimError(f"{options.source}: {error}") from error
     if options.plot is not None:
-        _draw(options.plot, estimate)
+        from cosim.drawing.residuals import residual_figure  # noqa: PLC0415 - matplotlib only for those who draw
+
+        save_figure(residual_figure(estimate.time, estimate.measured, estimate.residuals), options.plot)
     if options.toml is not None:
-        _write(options.toml, estimate.toml())
-    print(json.dumps(jsonable(estimate_data(estimate)), indent=2) if options.json else estimate_text(estimate))
+        write_text(options.toml, estimate.toml())
+    if options.json:
+        print_json(estimate_data(estimate))
+    else:
+        print(estimate_text(estimate))
     return DONE if estimate.identified else NOT_IDENTIFIED
 
 
@@ -226,17 +219,23 @@ def estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
     return {"coefficients": coefficients, "remarks": list(estimate.remarks)} | {k: getattr(estimate, k) for k in keys}
 
 
-def _draw(path: Path, estimate: DavisEstimate) -> None:
-    from cosim.drawing.residuals import residual_figure  # noqa: PLC0415 - matplotlib only for those who draw
-
-    try:
-        residual_figure(estimate.time, estimate.measured, estimate.residuals).savefig(path)
-    except (OSError, ValueError) as error:  # matplotlib refuses endings that it does not know by a ValueError
-        raise OutputError(f"{path} cannot be written: {error}.") from error
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+PARSER = {"description": "Identify parameters of a train from a measured run."}
+ARGUMENTS = (
+    Actions(
+        (
+            Action(
+                "davis",
+                execute,
+                {
+                    "help": "running resistance",
+                    "description": (
+                        "Davis coefficients w0 + w1 v + w2 v^2 from a run with constant or recorded effort, with "
+                        "confidence intervals, and what of them cannot be identified."
+                    ),
+                    "epilog": "Exit codes: 0 all identified, 1 something is not, 2 error.",
+                },
+                DAVIS,
+            ),
+        )
+    ),
+)

@@ -12,31 +12,28 @@ from typing import Any
 import fmpy
 
 from cosim import ssp
+from cosim.cli.arguments import PLAIN_JSON
 from cosim.components.description import read_description, runs_here
 from cosim.scenario.package_names import is_package
+from fmus.cli.commands import argument
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
 from plant_models.user_file import names_a_file, names_code
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    parser = commands.add_parser(
-        "info",
-        description="Interfaces, platforms and variables of an FMU; the systems, components and connections in an SSP; "
-        "or what a plant or an observer declares.",
+PARSER = {
+    "description": (
+        "Interfaces, platforms and variables of an FMU; the systems, components and connections in an SSP; or what"
+        " a plant or an observer declares."
     )
-    parser.add_argument(
+}
+ARGUMENTS = (
+    argument(
         "what",
         metavar="WHAT",
         help="an .fmu or .ssp file, a name of 'cosim list', file.py:Class or package.module:Class",
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.set_defaults(execute=execute)
+    ),
+    PLAIN_JSON,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -66,7 +63,10 @@ def execute(options: argparse.Namespace) -> int:
 
 def _execute_package(options: argparse.Namespace) -> int:
     data = ssp.describe_package(options.what)
-    print(json.dumps(data, indent=2) if options.json else ssp.text_of_package(data))
+    if options.json:
+        print(json.dumps(data, indent=2))
+    else:
+        print(ssp.text_of_package(data))
     return 0
 
 

@@ -5,44 +5,48 @@ limits.
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
-from typing import Any
 
+from cosim.cli.arguments import JSON_NOT_TABLE
 from cosim.cli.model_info import declared_model, in_own_words
+from cosim.cli.output import print_json
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import CosimError
 from cosim.limits import limit_rows, limit_text
-from cosim.results.summary_file import jsonable
+from fmus.cli.commands import argument
 from plant_models.hybrid import HybridSystem
 
 FEWEST = 4
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    text = (
-        "How much an observer survives: every printed bound of its sampling period and delay beside the exact limit of "
-        "its error equations and the practical one, found by native runs beside its own model."
-    )
-    parser = commands.add_parser("limits", description=text, epilog="Exit codes: 0 done, 2 error.")
-    parser.add_argument("observer", metavar="OBSERVER", help="an observer that has limits: a name, or file.py:Class")
-    parser.add_argument("--preset", metavar="NAME", help="values to start from (default: the observer's own)")
-    for flag, metavar, text in (
-        ("--set", "NAME=VALUE", "a parameter, for instance --set theta=5"),
-        ("--option", "NAME=VALUE", "an option, for instance --option predictors=2"),
-    ):
-        parser.add_argument(flag, action="append", default=[], metavar=metavar, dest=flag[2:], help=text)
-    parser.add_argument("--no-runs", action="store_true", help="leave the practical limits out")
-    parser.add_argument(
-        "--members", type=int, default=16, metavar="N", help="values that are tried at once (default: 16)"
-    )
-    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
-    parser.set_defaults(execute=execute)
+PARSER = {
+    "description": (
+        "How much an observer survives: every printed bound of its sampling period and delay beside the exact "
+        "limit of its error equations and the practical one, found by native runs beside its own model."
+    ),
+    "epilog": "Exit codes: 0 done, 2 error.",
+}
+ARGUMENTS = (
+    argument("observer", metavar="OBSERVER", help="an observer that has limits: a name, or file.py:Class"),
+    argument("--preset", metavar="NAME", help="values to start from (default: the observer's own)"),
+    argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="set",
+        help="a parameter, for instance --set theta=5",
+    ),
+    argument(
+        "--option",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="an option, for instance --option predictors=2",
+    ),
+    argument("--no-runs", action="store_true", help="leave the practical limits out"),
+    argument("--members", type=int, default=16, metavar="N", help="values that are tried at once (default: 16)"),
+    JSON_NOT_TABLE,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -65,7 +69,7 @@ def execute(options: argparse.Namespace) -> int:
             made.limits(dict(map(parse_setting, options.set)), options.preset), not options.no_runs, options.members
         )
     if options.json:
-        print(json.dumps(jsonable([asdict(row) for row in rows]), indent=2))
+        print_json([asdict(row) for row in rows])
     else:
         print(limit_text(made.name, rows))
     return 0

@@ -3,82 +3,68 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
 import fmu_observer
 import plant_models
+from cosim.cli.arguments import settings_argument
 from cosim.cli.model_info import in_own_words
-from cosim.cli.scenarios import parse_setting
+from cosim.cli.output import print_json
+from cosim.cli.scenarios import parse_setting, setting_number
 from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError, nearest
 from cosim.fmu_model.exact import linearise_system
 from cosim.fmu_model.linearisation import Linearisation
 from cosim.fmu_model.linearise import linearise_fmu
 from cosim.fmu_model.sealed import declared_states
-from cosim.results.summary_file import jsonable
 from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
+from fmus.cli.commands import argument
 from plant_models.hybrid import HybridSystem
 from plant_models.user_file import names_code
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    text = (
+PARSER = {
+    "description": (
         "Linearise an FMU, a plant or an observer at a point. Model exchange and models of ours give matrices of "
-        "continuous time, an FMU with co-simulation only those from one communication step to the next. Events, such "
-        "as samples, are left out, and said."
-    )
-    epilog = "Exit codes: 0 done, 2 error."
-    parser = commands.add_parser("linearise", description=text, epilog=epilog)
-    parser.add_argument(
-        "model", metavar="FMU|MODEL", help="an .fmu file; or a plant or observer by name, file.py:Class"
-    )
-    parser.add_argument(
+        "continuous time, an FMU with co-simulation only those from one communication step to the next. Events, "
+        "such as samples, are left out, and said."
+    ),
+    "epilog": "Exit codes: 0 done, 2 error.",
+}
+ARGUMENTS = (
+    argument("model", metavar="FMU|MODEL", help="an .fmu file; or a plant or observer by name, file.py:Class"),
+    argument(
         "--at",
         type=float,
         default=0.0,
         metavar="SECONDS",
         help="instant; an FMU is run up to it (default: 0, its start)",
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="settings",
-        help="a state, an input or a parameter; a state that is set is not taken from the run",
-    )
-    parser.add_argument(
+    ),
+    settings_argument("a state, an input or a parameter; a state that is set is not taken from the run"),
+    argument(
         "--states",
         nargs="+",
         metavar="NAME",
         help="of an FMU that declares no continuous states: the variables that hold its state",
-    )
-    parser.add_argument("--preset", metavar="NAME", help="of a model of ours: values to start from")
-    parser.add_argument("--inputs", nargs="+", metavar="NAME", help="inputs of B and D (default: all)")
-    parser.add_argument("--outputs", nargs="+", metavar="NAME", help="outputs of C and D (default: all)")
-    parser.add_argument(
+    ),
+    argument("--preset", metavar="NAME", help="of a model of ours: values to start from"),
+    argument("--inputs", nargs="+", metavar="NAME", help="inputs of B and D (default: all)"),
+    argument("--outputs", nargs="+", metavar="NAME", help="outputs of C and D (default: all)"),
+    argument(
         "--interface",
         choices=("model-exchange", "co-simulation"),
         help="of an FMU that has both (default: model exchange)",
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--step",
         type=float,
         default=0.01,
         metavar="SECONDS",
         help="communication step of a co-simulation (default: 0.01)",
-    )
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write .json, .npz or .mat")
-    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the tables")
-    parser.set_defaults(execute=execute)
+    ),
+    argument("-o", "--output", type=Path, metavar="FILE", help="write .json, .npz or .mat"),
+    argument("--json", action="store_true", help="print the data as JSON instead of the tables"),
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -92,12 +78,15 @@ def execute(options: argparse.Namespace) -> int:
     """
     if not options.at >= 0.0:
         raise ScenarioError(f"--at {options.at:g}: expected an instant from 0 s on.")
-    settings = {name: _number(name, value) for name, value in map(parse_setting, options.settings)}
+    settings = {name: setting_number("--set", name, value) for name, value in map(parse_setting, options.settings)}
     is_file = str(options.model).lower().endswith(".fmu")
     found = _of_fmu(options, settings) if is_file else _of_model(options, settings)
     if options.output is not None:
         found.save(options.output)
-    print(json.dumps(jsonable(found.to_dict()), indent=2) if options.json else found.text())
+    if options.json:
+        print_json(found.to_dict())
+    else:
+        print(found.text())
     return 0
 
 
@@ -144,9 +133,3 @@ def _of_model(options: argparse.Namespace, settings: dict[str, float]) -> Linear
             preset=options.preset,
         )
     return found.part(options.inputs, options.outputs)
-
-
-def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"--set {name}={value}: expected a number.")
-    return float(value)

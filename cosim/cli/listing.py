@@ -8,27 +8,30 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from cosim import ssp
+from cosim.cli.arguments import PLAIN_JSON
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
 from fmu_observer import OBSERVERS
 from fmus.catalogue import CatalogueEntry, by_room
 from fmus.catalogue import catalogue as models
+from fmus.cli.commands import argument
 from fmus.text_table import text_table
 from plant_models import PLANTS
 
 KINDS = ("scenarios", "models", "observers", "all")
 
 
-def register(commands: Any) -> None:
-    """Add the command to the parser.
+def _what(text: str) -> str:
+    if text not in KINDS and not is_package(text):
+        raise argparse.ArgumentTypeError(f"choose from {', '.join(KINDS)}, or give an .ssp file (got {text!r})")
+    return text
 
-    Args:
-        commands: subparsers of the program.
-    """
-    parser = commands.add_parser("list", description="Scenarios, plants and observers with their sources.")
-    parser.add_argument("what", nargs="?", type=_what, default="all", help=f"{', '.join(KINDS)}, or an .ssp file")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.set_defaults(execute=execute)
+
+PARSER = {"description": "Scenarios, plants and observers with their sources."}
+ARGUMENTS = (
+    argument("what", nargs="?", type=_what, default="all", help=f"{', '.join(KINDS)}, or an .ssp file"),
+    PLAIN_JSON,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -80,12 +83,6 @@ def _details(entry: Mapping[str, Any], model: CatalogueEntry | None) -> list[str
             "options: " + ", ".join(f"{option} ({values})" if values else option for option, values in words.items())
         )
     return lines
-
-
-def _what(text: str) -> str:
-    if text not in KINDS and not is_package(text):
-        raise argparse.ArgumentTypeError(f"choose from {', '.join(KINDS)}, or give an .ssp file (got {text!r})")
-    return text
 
 
 def _execute_package(options: argparse.Namespace) -> int:

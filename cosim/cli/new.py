@@ -5,31 +5,28 @@ from __future__ import annotations
 import argparse
 import shlex
 from pathlib import Path
-from typing import Any
 
 from cosim.starter.starter import write_starter
+from fmus.cli.commands import argument
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    description = """Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position,
-    speed, wheel speed and effort, to be confirmed by editing. Only the description is read; nothing of the FMU is
-    executed."""
-    epilog = "Exit codes: 0 written, 2 error."
-    parser = commands.add_parser("new", description=description, epilog=epilog)
-    parser.add_argument("fmu", type=Path, help="the FMU")
-    parser.add_argument("-o", "--out", type=Path, metavar="FILE", help="scenario file to write (default: NAME.toml)")
-    parser.add_argument(
+PARSER = {
+    "description": (
+        "Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position, "
+        "speed, wheel speed and effort, to be confirmed by editing. Only the description is read; nothing of the "
+        "FMU is executed."
+    ),
+    "epilog": "Exit codes: 0 written, 2 error.",
+}
+ARGUMENTS = (
+    argument("fmu", type=Path, help="the FMU"),
+    argument("-o", "--out", type=Path, metavar="FILE", help="scenario file to write (default: NAME.toml)"),
+    argument(
         "--observer",
         metavar="NAME",
         help="observer to put beside it, a name or file.py:Class (default: takagi_sugeno_cdo)",
-    )
-    parser.add_argument("--force", action="store_true", help="replace a file that exists")
-    parser.set_defaults(execute=execute)
+    ),
+    argument("--force", action="store_true", help="replace a file that exists"),
+)
 
 
 def execute(options: argparse.Namespace) -> int:

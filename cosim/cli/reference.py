@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cosim.balises.recorded import read_layout
+from cosim.cli.output import print_json
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.evaluation.numbers import number
 from cosim.evaluation.reference_trajectory import (
@@ -26,36 +25,33 @@ from cosim.evaluation.reference_trajectory import (
 from cosim.results.load import load_result
 from cosim.results.result import Result, SignalInfo
 from cosim.results.save import save_result
-from cosim.results.summary_file import jsonable
+from fmus.cli.commands import argument
 
 DONE = 0
 BALISE = 0.5  # standard deviation of a balise's position where no accuracy was told [m]
 ACCURACY = 0.5  # of the told location accuracy, a bound, is taken for a standard deviation
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    text = (
+PARSER = {
+    "description": (
         "Smooth odometer and balises of a recorded run, forwards and backwards, into the trajectory that it was "
-        "most likely made on: position and speed with standard deviations, for a report that has no truth of its own."
-    )
-    parser = commands.add_parser("reference", description=text, epilog="Exit codes: 0 written, 2 error.")
-    parser.add_argument("source", metavar="SOURCE", help="results folder, or table of any tool")
-    parser.add_argument("--odometer", metavar="NAME", help="signal of the odometer (default: that of the report)")
-    parser.add_argument("--telegrams", metavar="FILE", help="results folder or events.csv (default: those of SOURCE)")
-    parser.add_argument("--odometer-std", type=float, default=0.1, metavar="M_S", help="noise of a reading [m/s]")
-    parser.add_argument("--balise-std", type=float, metavar="M", help="of a balise [m] (default: half its accuracy)")
-    parser.add_argument("--jerk-density", type=float, default=JERK, metavar="Q", help="of the train [m2/s5]")
-    parser.add_argument("--scale-std", type=float, default=SCALE, metavar="S", help="of the wheel radius, relative [1]")
-    parser.add_argument("--gate", type=float, default=GATE, help="standard deviations beyond which a reading is slip")
-    parser.add_argument("--slip", type=float, default=SLIP, metavar="M_S", help="the same as a speed [m/s]")
-    parser.add_argument("--out", type=Path, default=Path("reference.csv"), metavar="FILE", help="file to write")
-    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of text")
-    parser.set_defaults(execute=execute)
+        "most likely made on: position and speed with standard deviations, for a report that has no truth of its "
+        "own."
+    ),
+    "epilog": "Exit codes: 0 written, 2 error.",
+}
+ARGUMENTS = (
+    argument("source", metavar="SOURCE", help="results folder, or table of any tool"),
+    argument("--odometer", metavar="NAME", help="signal of the odometer (default: that of the report)"),
+    argument("--telegrams", metavar="FILE", help="results folder or events.csv (default: those of SOURCE)"),
+    argument("--odometer-std", type=float, default=0.1, metavar="M_S", help="noise of a reading [m/s]"),
+    argument("--balise-std", type=float, metavar="M", help="of a balise [m] (default: half its accuracy)"),
+    argument("--jerk-density", type=float, default=JERK, metavar="Q", help="of the train [m2/s5]"),
+    argument("--scale-std", type=float, default=SCALE, metavar="S", help="of the wheel radius, relative [1]"),
+    argument("--gate", type=float, default=GATE, help="standard deviations beyond which a reading is slip"),
+    argument("--slip", type=float, default=SLIP, metavar="M_S", help="the same as a speed [m/s]"),
+    argument("--out", type=Path, default=Path("reference.csv"), metavar="FILE", help="file to write"),
+    argument("--json", action="store_true", help="print the data as JSON instead of text"),
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -89,7 +85,7 @@ def execute(options: argparse.Namespace) -> int:
     written = save_result(as_result(found), options.out)
     if options.json:
         data = {"odometer": name, "file": str(options.out), "balises": found.balises, "readings": found.readings}
-        print(json.dumps(jsonable(data | {"left_out": found.left_out, "consistency": asdict(found.found)}), indent=2))
+        print_json(data | {"left_out": found.left_out, "consistency": asdict(found.found)})
         return DONE
     print(reference_text(found, name))
     print(f"written: {', '.join(map(str, written))}")

@@ -7,12 +7,13 @@ import sys
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cosim.errors import ComparisonError, nearest
 from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.report.overlay.runs import make_runs
 from cosim.results.load import load_result
+from fmus.cli.commands import argument
 
 if TYPE_CHECKING:
     from cosim.evaluation.spec import ReportSpec
@@ -22,40 +23,25 @@ OVERLAY = "overlay.html"
 MOST_SIGNALS = 16  # figures on a page
 DONE = 0
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    description = (
-        "Make the report of a results folder again, or lay several results over each other on one page: the first is "
-        "what the "
-        "others are compared with."
-    )
-    parser = commands.add_parser(
-        "report",
-        description=description,
-        epilog="Exit codes: 0 written, 2 error.",
-    )
-    parser.add_argument(
-        "results", nargs="+", metavar="DIR", help="results folders, or tables in any format that can be read"
-    )
-    parser.add_argument(
-        "--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)"
-    )
-    parser.add_argument(
-        "--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)"
-    )
-    parser.add_argument(
+PARSER = {
+    "description": (
+        "Make the report of a results folder again, or lay several results over each other on one page: the first "
+        "is what the others are compared with."
+    ),
+    "epilog": "Exit codes: 0 written, 2 error.",
+}
+ARGUMENTS = (
+    argument("results", nargs="+", metavar="DIR", help="results folders, or tables in any format that can be read"),
+    argument("--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)"),
+    argument("--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)"),
+    argument(
         "--signals",
         action="append",
         default=[],
         metavar="PATTERN",
         help="for several runs: recorded signals to draw as well, e.g. 'train.*'; may be repeated",
-    )
-    parser.set_defaults(execute=execute)
+    ),
+)
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.scenarios import add_scenario, load_scenario, positive, simulated_time_bar
+from cosim.cli.arguments import QUIET, positive, scenario_arguments
+from cosim.cli.output import ignore, print_json, print_notice, print_paths, print_warning, texts_of
+from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
 from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.consistency_table import consistency_text
@@ -23,62 +25,55 @@ from cosim.evaluation.fault_table import fault_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.process.last_call import LAST_CALL
 from cosim.results.folder import check_writable
-from cosim.results.summary_file import jsonable
 from cosim.results.unfinished import SPARE
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
+from fmus.cli.commands import argument
 from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
 CALL_LOG = "calls.log"
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    description = "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP)."
-    epilog = (
+PARSER = {
+    "description": "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP).",
+    "epilog": (
         "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could "
         "not begin."
-    )
-    parser = commands.add_parser("run", description=description, epilog=epilog)
-    add_scenario(parser)
-    parser.add_argument(
-        "--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)"
-    )
-    parser.add_argument(
+    ),
+}
+ARGUMENTS = (
+    *scenario_arguments(),
+    argument("--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)"),
+    argument(
         "--seed",
         action="append",
         type="seed={}".format,
         dest="settings",
         metavar="N",
         help="seed of the run: all chance",
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--seeds", type=positive, metavar="N", help="also run the seeds 0 to N - 1 and report medians and quartiles"
-    )
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
-    parser.add_argument("--no-report", action="store_true", help="write result files only")
-    parser.add_argument(
+    ),
+    argument("--json", action="store_true", help="print the summary as JSON instead of the table"),
+    argument("--no-report", action="store_true", help="write result files only"),
+    argument(
         "--strict", action="store_true", help="refuse an SSP of wrong form; exit with 1 when the run gave warnings"
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--log-calls",
         nargs="?",
         const="",
         metavar="FILE",
         help="log every call of every component to FILE (default: calls.log among the results)",
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--stream",
         action="store_true",
         help="write results while the run goes on, as table.npy, so that they survive a crash",
-    )
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(execute=execute)
+    ),
+    QUIET,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -88,31 +83,11 @@ def execute(options: argparse.Namespace) -> int:
         options: of the command line.
     """
     scenario = load_scenario(options)
-    formats = scenario.table().report.tables
     directory = (Path(options.out) if options.out is not None else Path("results") / scenario.name).absolute()
-    check_writable(directory, formats)
+    check_writable(directory, scenario.table().report.tables)
     call_log = _call_log(options, scenario, directory)
-    bar = simulated_time_bar(silent=options.quiet or options.json)
     results = _Results(directory, options)
-    try:
-        building = _ignore if options.quiet else _say
-        stream = directory if options.stream else None
-        with _kept(directory, options.stream, formats) as spare:
-            scenario.run(
-                progress=bar,
-                warn=_warn,
-                call_log=call_log,
-                building=building,
-                stream=stream,
-                spare=spare,
-                finished=results.write,
-            )
-    except OutputError:
-        if results.outcome is not None:
-            _tell(results.outcome, None, {}, options)  # what the disk did not take is at least on the screen
-        raise
-    finally:
-        bar.close()
+    _run(scenario, options, results, call_log)
     assert results.outcome is not None
     outcome, paths = results.outcome, results.paths
     study = None
@@ -120,7 +95,7 @@ def execute(options: argparse.Namespace) -> int:
         study = _study(scenario, options, directory / studies.SEEDS_CSV)
         outcome = outcome.with_summary(seed_study=study.to_data())
         paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / studies.SEEDS_CSV}
-    _tell(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
+    _print(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
     if outcome.failure is not None:
         return ERROR
     if study is not None and study.failures:
@@ -144,9 +119,32 @@ class _Results:
         shutil.rmtree(self.directory / SPARE, ignore_errors=True)
 
 
+def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, call_log: Path | None) -> None:
+    """Run; what the disk did not take is at least on the screen."""
+    directory = results.directory
+    bar = simulated_time_bar(silent=options.quiet or options.json)
+    try:
+        with _kept(directory, options.stream, scenario.table().report.tables) as spare:
+            scenario.run(
+                progress=bar,
+                warn=print_warning,
+                call_log=call_log,
+                building=ignore if options.quiet else print_notice,
+                stream=directory if options.stream else None,
+                spare=spare,
+                finished=results.write,
+            )
+    except OutputError:
+        if results.outcome is not None:
+            _print(results.outcome, None, {}, options)
+        raise
+    finally:
+        bar.close()
+
+
 @contextmanager
 def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[Path | None]:
-    """Who watches this process is told what to keep should it die; yields the folder to stream to for that, if one is
+    """Who watches this process learns what to keep should it die; yields the folder to stream to for that, if one is
     needed.
     """
     if not LAST_CALL.watched:
@@ -172,60 +170,48 @@ def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) 
     return directory / CALL_LOG
 
 
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def _ignore(_: str) -> None: ...
-
-
-def _warn(text: str) -> None:
-    print(f"warning: {plain(text)}", file=sys.stderr, flush=True)
-
-
 def _study(scenario: Scenario, options: argparse.Namespace, path: Path) -> Any:
-    def tell(done: int, count: int) -> None:
+    def report(done: int, count: int) -> None:
         if not (options.quiet or options.json) and sys.stderr.isatty():
             print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
 
     with studies.seed_file(path) as done:
-        return studies.seed_study(scenario.copy().master(log_calls=False), range(options.seeds), tell, done)
+        return studies.seed_study(scenario.copy().master(log_calls=False), range(options.seeds), report, done)
 
 
-def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:
+def _print(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:
     summary = outcome.result.summary
     if options.json:
-        data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
-        print(json.dumps(jsonable(data), indent=2))
+        print_json(dict(summary) | {"failure": outcome.failure, "files": texts_of(paths)})
         return
     if outcome.failure is not None and summary["reached"] <= summary["start"]:
         print(f"cosim: the run could not begin: {plain(outcome.failure)}", file=sys.stderr)
-        _list(paths)  # figures of a run that did not take a step would hide why
+        print_paths(paths)  # figures of a run that did not take a step would hide why
         return
     print(_headline(summary))
     if outcome.result.table.size:
-        metrics = [m for m in phase_metrics(outcome.result, outcome.spec) if m.speed or m.position]
-        if metrics:
-            print(error_text(metrics, outcome.spec))
-        faults = fault_text(fault_detection(outcome.result, outcome.spec), outcome.spec)
-        if faults:
-            print("\n" + faults)
-        filters = consistency_text(filter_consistency(outcome.result, outcome.spec), outcome.spec)
-        if filters:
-            print("\n" + filters)
+        _print_tables(outcome)
     print(cost_text(outcome.result), end="\n\n")
     if study is not None:
         print(study.text())
     if outcome.expectations:
         print(outcome.expectations_text(), end="\n\n")
-    _list(paths)
+    print_paths(paths)
     if outcome.failure is not None:
         print(f"cosim: the run ended early: {plain(outcome.failure)}", file=sys.stderr)
 
 
-def _list(paths: dict[str, Path]) -> None:
-    for kind, path in paths.items():
-        print(f"{kind:>10}: {path}")
+def _print_tables(outcome: Outcome) -> None:
+    """Errors, detected faults and consistency of filters, as far as there are any."""
+    metrics = [m for m in phase_metrics(outcome.result, outcome.spec) if m.speed or m.position]
+    if metrics:
+        print(error_text(metrics, outcome.spec))
+    faults = fault_text(fault_detection(outcome.result, outcome.spec), outcome.spec)
+    if faults:
+        print("\n" + faults)
+    filters = consistency_text(filter_consistency(outcome.result, outcome.spec), outcome.spec)
+    if filters:
+        print("\n" + filters)
 
 
 def _headline(summary: Any) -> str:

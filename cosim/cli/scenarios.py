@@ -1,4 +1,4 @@
-"""What the commands that take a scenario share: the argument, the overrides, and loading with them."""
+"""What the commands that take a scenario share: loading with overrides, settings, a progress bar."""
 
 from __future__ import annotations
 
@@ -12,26 +12,6 @@ from cosim.errors import ScenarioError
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from fmus.cli.progress import ProgressBar
-
-DEFAULT = "freight_profile_d"
-OVERRIDES = (
-    "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated; the "
-    "others win over case"
-)
-
-
-def add_scenario(parser: argparse.ArgumentParser, default: str | None = DEFAULT) -> None:
-    """Add the arguments ``SCENARIO`` and ``--set`` to a command.
-
-    Args:
-        parser: of the command. default: the scenario where none is given; None where one must be.
-    """
-    what = "name of a shipped scenario, or a file (.toml or .ssp)"
-    if default is None:
-        parser.add_argument("scenario", help=what)
-    else:
-        parser.add_argument("scenario", nargs="?", default=default, help=f"{what} (default: {default})")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=OVERRIDES)
 
 
 def load_scenario(options: argparse.Namespace) -> Scenario:
@@ -75,24 +55,6 @@ def parse_setting(text: str) -> tuple[str, Any]:
         return name.strip(), value.strip()
 
 
-def positive(text: str) -> int:
-    """A whole number of at least 1, for an option of a command.
-
-    Args:
-        text: as it was typed.
-
-    Raises:
-        argparse.ArgumentTypeError: it is something else.
-    """
-    try:
-        value = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a whole number (got {text!r})") from None
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
-    return value
-
-
 def between_samples(texts: Sequence[str]) -> Chosen:
     """What ``--between`` says: of all inputs, or of some.
 
@@ -111,3 +73,17 @@ def between_samples(texts: Sequence[str]) -> Chosen:
             return kind  # type: ignore[return-value] # one of the two
         said[name] = kind  # type: ignore[assignment] # one of the two
     return said or None
+
+
+def setting_number(option: str, name: str, value: Any) -> float:
+    """The value of a setting as a number.
+
+    Args:
+        option: in which it was given. name: of the setting. value: as `parse_setting` read it.
+
+    Raises:
+        ScenarioError: it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ScenarioError(f"{option} {name}={value}: expected a number.")
+    return float(value)

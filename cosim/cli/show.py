@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
-from cosim.cli.scenarios import add_scenario, load_scenario
+from cosim.cli.arguments import PLAIN_JSON, scenario_arguments
+from cosim.cli.output import print_json
+from cosim.cli.scenarios import load_scenario
+from fmus.cli.commands import argument
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    parser = commands.add_parser(
-        "show",
-        description="Components, connections, order and loops, without a run.",
-    )
-    add_scenario(parser)
-    parser.add_argument("--picture", metavar="FILE", type=Path, help="also draw it, to a .png, .svg or .pdf file")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.set_defaults(execute=execute)
+PARSER = {"description": "Components, connections, order and loops, without a run."}
+ARGUMENTS = (
+    *scenario_arguments(),
+    argument("--picture", metavar="FILE", type=Path, help="also draw it, to a .png, .svg or .pdf file"),
+    PLAIN_JSON,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -36,7 +28,7 @@ def execute(options: argparse.Namespace) -> int:
     """
     structure = load_scenario(options).structure()
     if options.json:
-        print(json.dumps(structure.to_dict(), indent=2))
+        print_json(structure.to_dict())
     else:
         print(structure.text(shutil.get_terminal_size().columns if sys.stdout.isatty() else None))
     if options.picture is not None:

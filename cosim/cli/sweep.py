@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting
+from cosim.cli.arguments import QUIET, scenario_arguments
+from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
 from cosim.results.folder import check_writable
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling import MOST, Range, uniform
+from cosim.studies.sweep import Sweep
+from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar
 
 DONE, SOME_FAILED = 0, 1
@@ -24,36 +27,31 @@ SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
 VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
 a range, with --samples"""  # noqa: E501
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    description = "Run a scenario once for each combination of some values. A run that fails does not stop the others."
-    epilog = (
+PARSER = {
+    "description": (
+        "Run a scenario once for each combination of some values. A run that fails does not stop the others."
+    ),
+    "epilog": (
         "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
-    )
-    parser = commands.add_parser("sweep", description=description, epilog=epilog)
-    add_scenario(parser, default=None)
-    parser.add_argument("--vary", action="append", default=[], metavar="NAME=VALUES", help=VARY)
-    parser.add_argument("--cases", action="store_true", help="run all cases of the scenario, each with all --vary")
-    parser.add_argument("--by", metavar="NAME", help="one line for each value of NAME, such as case: means of its runs")
-    parser.add_argument(
+    ),
+}
+ARGUMENTS = (
+    *scenario_arguments(default=None),
+    argument("--vary", action="append", default=[], metavar="NAME=VALUES", help=VARY),
+    argument("--cases", action="store_true", help="run all cases of the scenario, each with all --vary"),
+    argument("--by", metavar="NAME", help="one line for each value of NAME, such as case: means of its runs"),
+    argument(
         "--zip", action="store_true", help="first values together, then second ones, ... instead of all combinations"
-    )
-    parser.add_argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists")
-    parser.add_argument("--seed", type=int, default=0, help="of the points (default: 0)")
-    parser.add_argument(
-        "--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)"
-    )
-    parser.add_argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)")
-    parser.add_argument("--table-only", action="store_true", help="keep the table, and no results folder for each run")
-    parser.add_argument("--resume", action="store_true", help="take over the runs that are done in the folder already")
-    parser.add_argument("--json", action="store_true", help="print the table as JSON")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(execute=execute)
+    ),
+    argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists"),
+    argument("--seed", type=int, default=0, help="of the points (default: 0)"),
+    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)"),
+    argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)"),
+    argument("--table-only", action="store_true", help="keep the table, and no results folder for each run"),
+    argument("--resume", action="store_true", help="take over the runs that are done in the folder already"),
+    argument("--json", action="store_true", help="print the table as JSON"),
+    QUIET,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -63,21 +61,7 @@ def execute(options: argparse.Namespace) -> int:
         options: of the command line.
     """
     scenario = load_scenario(options)
-    if options.zip and options.samples is not None:
-        raise ScenarioError("--zip and --samples exclude each other.")
-    mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
-    values = (_cases(scenario, options.settings, options.zip) if options.cases else {}) | _values(options.vary)
-    if not values:
-        raise ScenarioError("Nothing is varied: give --vary NAME=VALUES, or --cases for a scenario with cases.")
-    if options.cases and not scenario.cases:
-        raise ScenarioError(f"--cases: {scenario.name} has no cases; expected tables [cases.NAME] in it.")
-    if options.by is not None and options.by not in values:
-        raise ScenarioError(f"--by {options.by}: this is not varied; {nearest(options.by, list(values))}")
-    if options.samples is None and (ranges := [name for name, given in values.items() if isinstance(given, Range)]):
-        raise ScenarioError(
-            f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
-        )
-    sweep = scenario.vary(values, mode, count=options.samples, seed=options.seed)
+    sweep = _sweep(scenario, options)
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep"
     )
@@ -98,6 +82,29 @@ def execute(options: argparse.Namespace) -> int:
         print(result.text() if options.by is None else studies.groups_text(result, options.by))
         print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
     return SOME_FAILED if result.failed else DONE
+
+
+def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:
+    """What is run.
+
+    Raises:
+        ScenarioError: options exclude one another, or nothing is varied.
+    """
+    if options.zip and options.samples is not None:
+        raise ScenarioError("--zip and --samples exclude each other.")
+    mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
+    values = (_cases(scenario, options.settings, options.zip) if options.cases else {}) | _values(options.vary)
+    if not values:
+        raise ScenarioError("Nothing is varied: give --vary NAME=VALUES, or --cases for a scenario with cases.")
+    if options.cases and not scenario.cases:
+        raise ScenarioError(f"--cases: {scenario.name} has no cases; expected tables [cases.NAME] in it.")
+    if options.by is not None and options.by not in values:
+        raise ScenarioError(f"--by {options.by}: this is not varied; {nearest(options.by, list(values))}")
+    if options.samples is None and (ranges := [name for name, given in values.items() if isinstance(given, Range)]):
+        raise ScenarioError(
+            f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
+        )
+    return scenario.vary(values, mode, count=options.samples, seed=options.seed)
 
 
 def _cases(scenario: Scenario, settings: list[str], zipped: bool) -> dict[str, list[Any]]:

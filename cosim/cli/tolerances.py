@@ -14,6 +14,7 @@ from typing import Any
 from cosim.comparison.tolerance import KEYS, Tolerance, Tolerances, tolerance
 from cosim.errors import ComparisonError, nearest
 from cosim.scenario.toml_file import read_toml
+from fmus.cli.commands import argument
 
 Asked = tuple[dict[str, Any], dict[str, Any], list[str]]
 """Keys of the default tolerance, tolerances by signal or pattern, and what to ignore."""
@@ -21,25 +22,24 @@ FILE_TABLES = ("default", "signals", "ignore")
 BY_SIGNAL_EXAMPLE = "'train.*=1e-3', or 'train.speed={absolute = 0.01}'"
 
 
-def add_tolerances(group: Any) -> None:
-    """Add the options to a command, or to a group of its options."""
-    group.add_argument("--rtol", type=float, metavar="SHARE", help="in value, a share of the range of the reference")
-    group.add_argument("--atol", type=float, metavar="SIZE", help="in value, in the SI unit of each signal")
-    group.add_argument("--ttol", type=float, metavar="SECONDS", help="in time [s]")
-    group.add_argument(
-        "--tolerances", metavar="FILE", help="tolerances by signal, a TOML file (end of 'cosim compare --help')"
-    )
-    group.add_argument(
+TOLERANCES = (
+    argument("--rtol", type=float, metavar="SHARE", help="in value, a share of the range of the reference"),
+    argument("--atol", type=float, metavar="SIZE", help="in value, in the SI unit of each signal"),
+    argument("--ttol", type=float, metavar="SECONDS", help="in time [s]"),
+    argument("--tolerances", metavar="FILE", help="tolerances by signal, a TOML file (end of 'cosim compare --help')"),
+    argument(
         "--set-tolerance",
         action="append",
         default=[],
         metavar="SIGNAL=VALUE",
         dest="tolerance_settings",
         help=f"of one signal or pattern: {BY_SIGNAL_EXAMPLE}; may be repeated",
-    )
-    group.add_argument(
+    ),
+    argument(
         "--ignore", action="append", default=[], metavar="PATTERN", help="signals not to compare; may be repeated"
-    )
+    ),
+)
+"""Arguments of tolerances."""
 
 
 def asked_tolerances(options: argparse.Namespace) -> Asked:

@@ -3,74 +3,83 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
-from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting, positive
+from cosim.cli.arguments import QUIET, positive, scenario_arguments
+from cosim.cli.output import print_json
+from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError
 from cosim.results.folder import check_writable
-from cosim.results.summary_file import jsonable
 from cosim.tuning.parameters import Bounds
 from cosim.tuning.tune import tune
+from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar
 
 DONE, NOT_BETTER = 0, 1
 
 
-def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the parser.
+def _seeds(text: str) -> list[int]:
+    """``3``, ``0:4`` (0 to 3) or ``1,5,7``."""
+    try:
+        if ":" in text:
+            first, last = text.split(":")
+            found = list(range(int(first), int(last)))
+        else:
+            found = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected seeds such as 3, 0:4 or 1,5,7 (got {text!r})") from None
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text} holds no seeds; 0:4 are those from 0 to 3")
+    return found
 
-    Args:
-        commands: subparsers of the program.
-    """
-    description = (
-        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and judge "
-        "the best with other seeds. An observer that only listens is run beside one recording of the plant a seed."
-    )
-    epilog = (
+
+PARSER = {
+    "description": (
+        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and "
+        "judge the best with other seeds. An observer that only listens is run beside one recording of the plant a"
+        " seed."
+    ),
+    "epilog": (
         "Exit codes: 0 done, 1 the judging seeds do not show that it became better, 2 error or interrupted; the "
         "history is in the folder, --resume goes on with it."
-    )
-    parser = commands.add_parser("tune", description=description, epilog=epilog)
-    add_scenario(parser, default=None)
-    parser.add_argument("--observer", metavar="NAME", help="component that is tuned, or a shipped observer")
-    parser.add_argument(
+    ),
+}
+ARGUMENTS = (
+    *scenario_arguments(default=None),
+    argument("--observer", metavar="NAME", help="component that is tuned, or a shipped observer"),
+    argument(
         "--parameters",
         nargs="+",
         required=True,
         metavar="NAME=LOW:HIGH[:log]",
         help="parameters with bounds: of the observer, or component.parameter; process_covariance[1,1] for a diagonal",
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--method", default="bbo", metavar="NAME", help="bbo (default), pso, ga, cma, gradient, hand, or a full name"
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--option", action="append", default=[], metavar="NAME=VALUE", help="of the method, such as population=30"
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--cost",
         default="state",
         metavar="COST",
         help="state (default), state:estimate=component.signal,..., likelihood, nis, expectation:NUMBER, or a measure "
         "such as speed_error_rms; with a minus sign (--cost=-NAME) the largest is wanted",
-    )
-    parser.add_argument("--seeds", type=_seeds, default=[0], metavar="0:4", help="for training (default: 0)")
-    parser.add_argument("--judge", type=_seeds, default=[], metavar="10:20", help="for judging before and after")
-    parser.add_argument("--iterations", type=positive, default=20, metavar="N", help="default: 20")
-    parser.add_argument(
+    ),
+    argument("--seeds", type=_seeds, default=[0], metavar="0:4", help="for training (default: 0)"),
+    argument("--judge", type=_seeds, default=[], metavar="10:20", help="for judging before and after"),
+    argument("--iterations", type=positive, default=20, metavar="N", help="default: 20"),
+    argument(
         "--searches", type=positive, default=1, metavar="N", help="searches, each with another seed of the method"
-    )
-    parser.add_argument("--workers", type=positive, default=1, metavar="W", help="processes at a time (default: 1)")
-    parser.add_argument("--out", metavar="DIR", help="folder for history and results (default: results/NAME_tuned)")
-    parser.add_argument(
-        "--resume", action="store_true", help="take over the evaluations that are in the folder already"
-    )
-    parser.add_argument(
-        "--whole-runs", action="store_true", help="run the whole scenario, also where a recording would do"
-    )
-    parser.add_argument("--json", action="store_true", help="print the data as JSON")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(execute=execute)
+    ),
+    argument("--workers", type=positive, default=1, metavar="W", help="processes at a time (default: 1)"),
+    argument("--out", metavar="DIR", help="folder for history and results (default: results/NAME_tuned)"),
+    argument("--resume", action="store_true", help="take over the evaluations that are in the folder already"),
+    argument("--whole-runs", action="store_true", help="run the whole scenario, also where a recording would do"),
+    argument("--json", action="store_true", help="print the data as JSON"),
+    QUIET,
+)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -101,11 +110,13 @@ def execute(options: argparse.Namespace) -> int:
             whole_runs=options.whole_runs,
             progress=bar,
         )
-    print(json.dumps(jsonable(found.to_data()), indent=2) if options.json else found.text())
-    if not options.json:
+    if options.json:
+        print_json(found.to_data())
+    else:
+        print(found.text())
         print(f"\nTuned scenario: {directory / 'tuned.toml'}")
     if found.interrupted:
-        raise KeyboardInterrupt  # all there is has been told
+        raise KeyboardInterrupt  # all there is has been printed
     return NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
 
 
@@ -126,18 +137,3 @@ def _bounds(text: str) -> tuple[str, Bounds]:
             f"--parameters {text!r}: expected NAME=LOW:HIGH or NAME=LOW:HIGH:log, such as theta=0.1:5; an optimiser "
             "does not search without bounds."
         ) from None
-
-
-def _seeds(text: str) -> list[int]:
-    """``3``, ``0:4`` (0 to 3) or ``1,5,7``."""
-    try:
-        if ":" in text:
-            first, last = text.split(":")
-            found = list(range(int(first), int(last)))
-        else:
-            found = [int(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected seeds such as 3, 0:4 or 1,5,7 (got {text!r})") from None
-    if not found:
-        raise argparse.ArgumentTypeError(f"{text} holds no seeds; 0:4 are those from 0 to 3")
-    return found

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from fmu_observer import OBSERVERS
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from fmus.build import build_fmu, fmu_path
+from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar
 from fmus.hosted import build_hosted_fmu
 from fmus.pack import check_target
@@ -43,54 +44,37 @@ class BuildJob:
     target: Path
 
 
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "build",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName"
-    )
-    parser.add_argument("--all", action="store_true", help="all models that 'fmus list' shows")
-    parser.add_argument(
+PARSER = {"epilog": EPILOG, "formatter_class": argparse.RawDescriptionHelpFormatter}
+ARGUMENTS = (
+    argument("names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName"),
+    argument("--all", action="store_true", help="all models that 'fmus list' shows"),
+    argument(
         "--fmi", choices=tuple(VERSIONS), default="3", help="FMI version (default 3); both: folders fmi2 and fmi3"
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--platform",
         default="host",
         metavar="P",
         help="host (default), all, or names separated by commas, "
         "e.g. x86_64-linux,win64; named ones need the extra 'cross'",
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="folder or .fmu file (default: here)"
-    )
-    parser.add_argument("--preset", metavar="P", help="preset whose values become the start values")
-    parser.add_argument(
-        "--option", action="append", default=[], metavar="K=V", help="option of the model; may be repeated"
-    )
-    parser.add_argument(
+    ),
+    argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="folder or .fmu file (default: here)"),
+    argument("--preset", metavar="P", help="preset whose values become the start values"),
+    argument("--option", action="append", default=[], metavar="K=V", help="option of the model; may be repeated"),
+    argument(
         "--events",
         choices=("clocks", "counts"),
         help="how an FMI 3 FMU is told of events: by clocks, in event "
         "mode (default), or by counts, for tools without event mode",
-    )
-    parser.add_argument(
+    ),
+    argument(
         "--late-policy",
         choices=LATE_POLICIES,
         help="what to do with late events; start value of the parameter late_policy (default: as the model declares, "
         "usually replay)",
-    )
-    parser.add_argument(
-        "--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced"
-    )
-    parser.set_defaults(execute=execute)
+    ),
+    argument("--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced"),
+)
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -17,34 +17,26 @@ from typing import Any
 from fmus.check.findings import Class, Verdict
 from fmus.check.report import as_data, table
 from fmus.check.run import CheckReport, check_count, check_fmu
+from fmus.cli.commands import argument, one_of
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
 
 CLEAN, PROBLEMS, UNCHECKED = 0, 1, 2
 TRUTH = {"true": 1.0, "false": 0.0}
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    parser: argparse.ArgumentParser = commands.add_parser("check")
-    parser.add_argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0")
-    parser.add_argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)")
-    parser.add_argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated")
-    parser.add_argument(
-        "--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)"
-    )
-    length = parser.add_mutually_exclusive_group()
-    length.add_argument(
-        "--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)"
-    )
-    length.add_argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps")
-    parser.add_argument("--strict", action="store_true", help="limits end with exit code 1 too")
-    parser.add_argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table")
-    parser.set_defaults(execute=execute)
+PARSER: dict[str, Any] = {}
+ARGUMENTS = (
+    argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0"),
+    argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)"),
+    argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated"),
+    argument("--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)"),
+    one_of(
+        argument("--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)"),
+        argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps"),
+    ),
+    argument("--strict", action="store_true", help="limits end with exit code 1 too"),
+    argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table"),
+)
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -6,21 +6,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from fmus.cli.commands import argument
 from fmus.plain import plain
 from fmus.report import describe_file, problems_of
 
 OK, PROBLEMS = 0, 1
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    parser = commands.add_parser("info")
-    parser.add_argument("file", type=Path, metavar="FILE")
-    parser.set_defaults(execute=execute)
+PARSER: dict[str, Any] = {}
+ARGUMENTS = (argument("file", type=Path, metavar="FILE"),)
 
 
 def execute(options: argparse.Namespace) -> int:

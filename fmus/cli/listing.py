@@ -8,14 +8,8 @@ from typing import Any
 from fmus.catalogue import CatalogueEntry, by_room, catalogue
 from fmus.text_table import text_table
 
-
-def register(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Args:
-        commands: subparsers of the program.
-    """
-    commands.add_parser("list").set_defaults(execute=execute)
+PARSER: dict[str, Any] = {}
+ARGUMENTS = ()
 
 
 def execute(_options: argparse.Namespace) -> int:

@@ -29,6 +29,7 @@ from cosim.results.load import load_result
 from cosim.run.outcome import Outcome
 from cosim.structure.text import when
 from fmus import cached_fmu
+from fmus.cli.commands import add_command
 from plant_models import PLANTS
 from plant_models.hybrid import (
     HybridSystem,
@@ -380,7 +381,7 @@ def test_parameters_are_identified_as_the_effort_acted(tmp_path: Path, algorithm
     )
     words = ["identify", "davis", str(tmp_path / "run"), "--speed", "train.speed", "--effort", "driver.effort"]
     parser = argparse.ArgumentParser()
-    identify.register(parser.add_subparsers())
+    add_command(parser.add_subparsers(), "identify", identify)
     found = identify._identified(parser.parse_args([*words, "--mass", "80e3"]))
     values = {c.name: c.value for c in found.coefficients}
     for name in ("davis_a", "davis_b", "davis_c"):

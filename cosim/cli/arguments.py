@@ -1,0 +1,58 @@
+"""Arguments that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from fmus.cli.commands import Argument, argument
+
+DEFAULT_SCENARIO = "freight_profile_d"
+OVERRIDES = (
+    "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated; the "
+    "others win over case"
+)
+QUIET = argument("--quiet", action="store_true", help="no progress bar")
+JSON_NOT_TABLE = argument("--json", action="store_true", help="print the data as JSON instead of the table")
+PLAIN_JSON = argument("--json", action="store_true", help="print JSON")
+PARAMETERS_FILE = argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
+
+
+def settings_argument(text: str = OVERRIDES) -> Argument:
+    """The argument ``--set``, whose words become ``options.settings``.
+
+    Args:
+        text: what the help says of it.
+    """
+    return argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=text)
+
+
+def scenario_arguments(default: str | None = DEFAULT_SCENARIO) -> tuple[Argument, Argument]:
+    """The arguments ``SCENARIO`` and ``--set``.
+
+    Args:
+        default: the scenario where none is given; None where one must be.
+    """
+    what = "name of a shipped scenario, or a file (.toml or .ssp)"
+    if default is None:
+        return argument("scenario", help=what), settings_argument()
+    optional = argument("scenario", nargs="?", default=default, help=f"{what} (default: {default})")
+    return optional, settings_argument()
+
+
+def positive(text: str) -> int:
+    """A whole number of at least 1, for an option of a command.
+
+    Args:
+        text: as it was typed.
+
+    Raises:
+        argparse.ArgumentTypeError: it is something else.
+    """
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number (got {text!r})") from None
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
+    return value

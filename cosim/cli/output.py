@@ -1,0 +1,97 @@
+"""What commands print and write: data as JSON, paths, warnings, a text or a picture in a file."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from cosim.errors import OutputError
+from cosim.results.summary_file import jsonable
+from fmus.plain import plain
+
+
+def print_json(data: Any) -> None:
+    """Print plain data as JSON; NaN becomes null.
+
+    Args:
+        data: what to print.
+    """
+    print(json.dumps(jsonable(data), indent=2))
+
+
+def print_paths(paths: Mapping[str, Path], file: TextIO | None = None) -> None:
+    """Print what was written, a line for each.
+
+    Args:
+        paths: by kind. file: where to; None for standard output.
+    """
+    for kind, path in paths.items():
+        print(f"{kind:>10}: {path}", file=file)
+
+
+def texts_of(paths: Mapping[str, Path]) -> dict[str, str]:
+    """Paths as texts, for JSON.
+
+    Args:
+        paths: by kind.
+    """
+    return {kind: str(path) for kind, path in paths.items()}
+
+
+def print_notice(text: str) -> None:
+    """Print a line to standard error.
+
+    Args:
+        text: the line.
+    """
+    print(text, file=sys.stderr, flush=True)
+
+
+def print_warning(text: str) -> None:
+    """Print a warning to standard error.
+
+    Args:
+        text: of the warning.
+    """
+    print_notice(f"warning: {plain(text)}")
+
+
+def ignore(_text: str) -> None:
+    """Print nothing, where somebody asked for quiet.
+
+    Args:
+        _text: what is not printed.
+    """
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file.
+
+    Args:
+        path: of the file. text: its contents.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a picture; its ending decides the format.
+
+    Args:
+        figure: of matplotlib. path: of the file.
+
+    Raises:
+        OutputError: the ending is unknown or the file cannot be written.
+    """
+    try:
+        figure.savefig(path)
+    except (OSError, ValueError) as error:  # matplotlib refuses endings that it does not know by a ValueError
+        raise OutputError(f"{path} cannot be written: {error}.") from error
