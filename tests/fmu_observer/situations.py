@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from observer_bench import SteadyMotion
+from observer_runner import SteadyMotion
 from scipy.integrate import solve_ivp
 
 from fmu_observer import OBSERVERS

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from coupled_train import MASSES, ROWS, Journey, trip
-from observer_bench import INERTIA, MASS, RADIUS, Bench, SteadyMotion, random_gaps
+from observer_runner import INERTIA, MASS, RADIUS, SteadyMotion, SystemRunner, random_gaps
 
 from fmu_observer.observers.train import AugmentedHighGainCdo, AugmentedTakagiSugenoCdo
 from fmu_observer.observers.train.augmented_observer import AugmentedTrainObserver
@@ -29,17 +29,17 @@ def binomial(theta: float) -> dict[str, float]:
 
 def pulling(
     make: Callable[[], AugmentedTrainObserver], preset: str, motion: SteadyMotion, **parameters: float
-) -> Bench:
-    """A bench at time zero whose locomotive holds its speed against `PULL`, wheels without slip."""
-    bench = Bench(make(), preset=preset, **parameters)
-    bench.set("u", {"effort": motion.effort(0.0) + PULL, "odometer": motion.odometer(0.0)})
-    bench.runtime.start(0.0)
-    return bench
+) -> SystemRunner:
+    """A runner at time zero whose locomotive holds its speed against `PULL`, wheels without slip."""
+    runner = SystemRunner(make(), preset=preset, **parameters)
+    runner.set("u", {"effort": motion.effort(0.0) + PULL, "odometer": motion.odometer(0.0)})
+    runner.runtime.start(0.0)
+    return runner
 
 
-def sample(bench: Bench, kind: str, position: float) -> None:
-    bench.set("u", {f"{kind}_position": position})
-    bench.runtime.trigger(kind)
+def sample(runner: SystemRunner, kind: str, position: float) -> None:
+    runner.set("u", {f"{kind}_position": position})
+    runner.runtime.trigger(kind)
 
 
 def observe(
@@ -50,17 +50,17 @@ def observe(
     **parameters: float,
 ) -> np.ndarray:
     """Speed and coupler force of the observer at the rows of a journey, fixes at 10 Hz, shape (rows, 2)."""
-    bench, generator = Bench(observer, **parameters), np.random.default_rng(0)
+    runner, generator = SystemRunner(observer, **parameters), np.random.default_rng(0)
     effort = journey.force + rotating_mass * np.gradient(journey.speed, journey.time)
     rows = np.empty((len(journey.time), 2))
     for k, t in enumerate(journey.time):
-        bench.runtime.advance(t)
-        bench.set("u", {"effort": effort[k], "odometer": journey.speed[k]})
+        runner.runtime.advance(t)
+        runner.set("u", {"effort": effort[k], "odometer": journey.speed[k]})
         if k == 0:
-            bench.runtime.start(0.0)
+            runner.runtime.start(0.0)
         if k % round(0.1 / ROWS) == 0:
-            sample(bench, "gps", journey.position[k] + noise * generator.standard_normal())
-        out = bench.outputs()
+            sample(runner, "gps", journey.position[k] + noise * generator.standard_normal())
+        out = runner.outputs()
         rows[k] = out["speed"], out["coupler_force"]
     return rows
 
@@ -101,24 +101,24 @@ def test_signals_and_events(make: Callable[[], AugmentedTrainObserver]) -> None:
 def test_traced_and_plain_numpy_agree_and_a_redo_is_identical(make: Callable[[], AugmentedTrainObserver]) -> None:
     motion, ends = SteadyMotion(speed=12.0, acceleration=0.1, slip_speed=0.2), []
     for python in (False, True):
-        bench = Bench(make(), python=python, internal_step=5e-3)
-        bench.runtime.start(0.0)
+        runner = SystemRunner(make(), python=python, internal_step=5e-3)
+        runner.runtime.start(0.0)
 
-        def ride(kinds: str, bench: Bench = bench) -> None:
+        def ride(kinds: str, runner: SystemRunner = runner) -> None:
             for kind in kinds:
-                stop = bench.runtime.t + 0.1
-                bench.set("u", {"effort": motion.effort(stop), "odometer": motion.odometer(stop), "gradient": 0.002})
-                bench.runtime.advance(stop)
-                sample(bench, "gps" if kind == "g" else "balise", motion.position(stop))
+                stop = runner.runtime.t + 0.1
+                runner.set("u", {"effort": motion.effort(stop), "odometer": motion.odometer(stop), "gradient": 0.002})
+                runner.runtime.advance(stop)
+                sample(runner, "gps" if kind == "g" else "balise", motion.position(stop))
 
         ride("gbg")
-        snapshot = bench.runtime.snapshot()
+        snapshot = runner.runtime.snapshot()
         ride("bg")
-        after = bench.runtime.x.copy()
-        bench.runtime.restore(snapshot)
+        after = runner.runtime.x.copy()
+        runner.runtime.restore(snapshot)
         ride("bg")
-        np.testing.assert_array_equal(bench.runtime.x, after)
-        ends.append(np.append(after, bench.runtime.update_outputs()))
+        np.testing.assert_array_equal(runner.runtime.x, after)
+        ends.append(np.append(after, runner.runtime.update_outputs()))
     # The same operations in another order: rounding only, which the differentiator's sign may amplify by its chatter.
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9, atol=1e-6)
 
@@ -144,19 +144,19 @@ def test_a_batch_flows_and_jumps_like_its_members(make: Callable[[], AugmentedTr
 def test_sampled_fixes_are_events_at_their_period(make: type[AugmentedHighGainCdo]) -> None:
     motion, ends = SteadyMotion(speed=12.0), []
     for fixes in ("sampled", "event"):
-        bench = Bench(make(fixes=fixes))  # type: ignore[arg-type]
-        bench.set("u", {"effort": motion.effort(0.0), "odometer": 12.0})
-        bench.runtime.start(0.0)
+        runner = SystemRunner(make(fixes=fixes))  # type: ignore[arg-type]
+        runner.set("u", {"effort": motion.effort(0.0), "odometer": 12.0})
+        runner.runtime.start(0.0)
         if fixes == "event":
-            sample(bench, "gps", 0.0)
+            sample(runner, "gps", 0.0)
         for k in range(1, 21):
             if fixes == "sampled":
-                bench.set("u", {"fix_position": motion.position(0.1 * k)})
-                bench.runtime.advance(0.1 * k)
+                runner.set("u", {"fix_position": motion.position(0.1 * k)})
+                runner.runtime.advance(0.1 * k)
             else:
-                bench.runtime.advance(0.1 * k)
-                sample(bench, "gps", motion.position(0.1 * k))
-        ends.append(bench.runtime.x.copy())
+                runner.runtime.advance(0.1 * k)
+                sample(runner, "gps", motion.position(0.1 * k))
+        ends.append(runner.runtime.x.copy())
     np.testing.assert_array_equal(*ends)
     with pytest.raises(ValueError, match="unknown fixes 'both'"):
         make(fixes="both")  # type: ignore[arg-type]
@@ -171,18 +171,18 @@ def test_sampled_fixes_are_events_at_their_period(make: type[AugmentedHighGainCd
 def test_the_unknown_force_is_found_at_random_gaps(make: Callable[[], AugmentedTrainObserver], preset: str) -> None:
     """Constant speed, constant unknown force, gaps up to 0.5 s (fixes and balises together up to 0.1 s)."""
     motion, generator = SteadyMotion(speed=10.0), np.random.default_rng(2)
-    bench = pulling(make, preset, motion)
+    runner = pulling(make, preset, motion)
     mixed = preset == "gps_and_balises"
     for gap in random_gaps(3, 0.1 if mixed else 0.5, 500 if mixed else 120):
-        bench.runtime.advance(bench.runtime.t + gap)
+        runner.runtime.advance(runner.runtime.t + gap)
         kind = preset.removesuffix("s") if not mixed else ("gps", "balise")[int(generator.random() < 0.2)]
-        sample(bench, "gps" if preset == "gps" else kind, motion.position(bench.runtime.t))
-    out = bench.outputs()
+        sample(runner, "gps" if preset == "gps" else kind, motion.position(runner.runtime.t))
+    out = runner.outputs()
     # The slowest pole of any preset, 0.35 1/s over 30 s, leaves 3e-5 of start errors of up to 9 m/s and 15 kN, times
     # the size of the transient: less than one per mille of both.
     assert out["coupler_force"] == pytest.approx(PULL, rel=5e-3)
     assert out["speed"] == pytest.approx(10.0, abs=5e-3)
-    assert out["position"] == pytest.approx(motion.position(bench.runtime.t), abs=5e-3)
+    assert out["position"] == pytest.approx(motion.position(runner.runtime.t), abs=5e-3)
     assert out["disturbance"] == pytest.approx(-PULL / MASS, rel=5e-3)
 
 
@@ -192,23 +192,23 @@ def test_a_force_that_grows_steadily_is_followed(make: Callable[[], AugmentedTra
     itself.
     """
     motion = SteadyMotion(speed=10.0)
-    bench = pulling(make, "gps", motion)
+    runner = pulling(make, "gps", motion)
     for k in range(1, 4001):
         # 500 N/s, by its mean in the step
-        bench.set("u", {"effort": motion.effort(0.0) + PULL + 500.0 * (0.01 * k - 0.005)})
-        bench.runtime.advance(0.01 * k)
+        runner.set("u", {"effort": motion.effort(0.0) + PULL + 500.0 * (0.01 * k - 0.005)})
+        runner.runtime.advance(0.01 * k)
         if k % 10 == 0:
-            sample(bench, "gps", motion.position(0.01 * k))
+            sample(runner, "gps", motion.position(0.01 * k))
     # A chain that ends with a constant acceleration would lag by some seconds of the ramp, over 1 kN.
-    assert bench.outputs()["coupler_force"] == pytest.approx(PULL + 500.0 * (40.0 - lag), abs=20.0)
+    assert runner.outputs()["coupler_force"] == pytest.approx(PULL + 500.0 * (40.0 - lag), abs=20.0)
 
 
 @both
 def test_a_known_gradient_is_taken_out_of_the_coupler_force(make: Callable[[], AugmentedTrainObserver]) -> None:
-    bench = pulling(make, "gps", SteadyMotion(speed=10.0))
-    bench.set("x", {"unknown_acceleration": -PULL / MASS})
-    bench.set("u", {"gradient": 0.008})
-    assert bench.outputs()["coupler_force"] == pytest.approx(PULL - MASS * 9.81 * 0.008, abs=1e-6)
+    runner = pulling(make, "gps", SteadyMotion(speed=10.0))
+    runner.set("x", {"unknown_acceleration": -PULL / MASS})
+    runner.set("u", {"gradient": 0.008})
+    assert runner.outputs()["coupler_force"] == pytest.approx(PULL - MASS * 9.81 * 0.008, abs=1e-6)
 
 
 @every
@@ -218,49 +218,49 @@ def test_a_known_gradient_is_taken_out_of_the_coupler_force(make: Callable[[], A
 def test_outputs_stay_finite_without_any_sample(
     make: Callable[[], AugmentedTrainObserver], effort: float, odometer: float
 ) -> None:
-    bench = Bench(make())
-    bench.set("x", {"estimated_speed": 15.0})
-    bench.set("u", {"effort": effort, "odometer": odometer})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(30.0)
-    assert np.all(np.isfinite(list(bench.outputs().values())))
+    runner = SystemRunner(make())
+    runner.set("x", {"estimated_speed": 15.0})
+    runner.set("u", {"effort": effort, "odometer": odometer})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(30.0)
+    assert np.all(np.isfinite(list(runner.outputs().values())))
 
 
 @every
 def test_a_braked_train_is_held_at_rest(make: Callable[[], AugmentedTrainObserver]) -> None:
-    bench = Bench(make())
-    bench.set("u", {"effort": -60e3, "odometer": 0.0})
-    bench.runtime.start(0.0)
+    runner = SystemRunner(make())
+    runner.set("u", {"effort": -60e3, "odometer": 0.0})
+    runner.runtime.start(0.0)
     for k in range(1, 201):
-        bench.runtime.advance(0.1 * k)
-        sample(bench, "gps", 0.0)
+        runner.runtime.advance(0.1 * k)
+        sample(runner, "gps", 0.0)
     # a minute without samples: the brake holds against what is left of the unknown acceleration
-    bench.runtime.advance(80.0)
-    assert abs(bench.outputs()["speed"]) < 1e-3  # [m/s], against 40 m/s backwards if the brake pushed
-    assert abs(bench.outputs()["position"]) < 0.1
+    runner.runtime.advance(80.0)
+    assert abs(runner.outputs()["speed"]) < 1e-3  # [m/s], against 40 m/s backwards if the brake pushed
+    assert abs(runner.outputs()["position"]) < 0.1
 
 
 @both
 def test_a_sensor_without_gain_is_not_used(make: Callable[[], AugmentedTrainObserver]) -> None:
     for preset, unused in (("balises", "gps"), ("gps", "balise")):
-        bench = pulling(make, preset, SteadyMotion(speed=10.0))
-        sample(bench, "balise" if unused == "gps" else "gps", 1.0)
-        before = bench.runtime.x.copy()
-        sample(bench, unused, 50.0)
-        np.testing.assert_array_equal(bench.runtime.x, before)
+        runner = pulling(make, preset, SteadyMotion(speed=10.0))
+        sample(runner, "balise" if unused == "gps" else "gps", 1.0)
+        before = runner.runtime.x.copy()
+        sample(runner, unused, 50.0)
+        np.testing.assert_array_equal(runner.runtime.x, before)
 
 
 @both
 def test_the_latest_sample_and_its_gain_are_in_force(make: Callable[[], AugmentedTrainObserver]) -> None:
-    bench = pulling(make, "gps_and_balises", SteadyMotion(speed=10.0))
-    observer = bench.system
+    runner = pulling(make, "gps_and_balises", SteadyMotion(speed=10.0))
+    observer = runner.system
     corrections = {}
     for kind in ("balise", "gps"):
-        sample(bench, kind, bench.state("estimated_position") - 1.0)
-        assert bench.outputs()["innovation"] == 1.0
-        slope = bench.runtime.derivatives()
-        corrections[kind] = bench.state("estimated_speed") - slope[0]
-        named = observer.unpack_parameters(bench.runtime.p)
+        sample(runner, kind, runner.state("estimated_position") - 1.0)
+        assert runner.outputs()["innovation"] == 1.0
+        slope = runner.runtime.derivatives()
+        corrections[kind] = runner.state("estimated_speed") - slope[0]
+        named = observer.unpack_parameters(runner.runtime.p)
         gains, decay = observer.gains_of(kind, named)  # type: ignore[attr-defined]
         assert corrections[kind] == pytest.approx(gains[0], rel=1e-12)
         assert slope[4] == pytest.approx(-decay, rel=1e-12)
@@ -271,12 +271,12 @@ def test_slip_goes_into_the_speed_only_where_the_odometer_is_trusted() -> None:
     errors = {}
     for preset in ("gps_and_balises", "odometer_trusted"):
         motion = SteadyMotion(speed=10.0, slip_speed=1.0)
-        bench = pulling(AugmentedTakagiSugenoCdo, preset, motion)
-        bench.set("x", {"estimated_speed": 10.0, "unknown_acceleration": -PULL / MASS})
+        runner = pulling(AugmentedTakagiSugenoCdo, preset, motion)
+        runner.set("x", {"estimated_speed": 10.0, "unknown_acceleration": -PULL / MASS})
         for k in range(1, 301):
-            bench.runtime.advance(0.1 * k)
-            sample(bench, "gps", motion.position(0.1 * k))
-        errors[preset] = bench.outputs()["speed"] - 10.0
+            runner.runtime.advance(0.1 * k)
+            sample(runner, "gps", motion.position(0.1 * k))
+        errors[preset] = runner.outputs()["speed"] - 10.0
     assert abs(errors["gps_and_balises"]) < 1e-6
     assert errors["odometer_trusted"] == pytest.approx(1.0, abs=0.02)
 
@@ -341,20 +341,20 @@ def test_drift_costs_less_speed_than_white_noise_of_the_same_size(uphill: Journe
     """Half a metre that wanders over ten minutes gives a third of the speed error of half a metre of white noise, or
     less.
     """
-    receiver, means = Bench(Gps()), {}
+    receiver, means = SystemRunner(Gps()), {}
     for preset, drift_time in (("half_metre", 600.0), ("white", 60.0)):
         receiver.runtime.reset()
         receiver.runtime.p[:] = receiver.system.start_parameters(preset)
         receiver.set("p", {"drift_time": drift_time})
         receiver.runtime.start(0.0)
-        bench, error = Bench(AugmentedTakagiSugenoCdo()), []
-        bench.runtime.start(0.0)
+        runner, error = SystemRunner(AugmentedTakagiSugenoCdo()), []
+        runner.runtime.start(0.0)
         for k in range(0, len(uphill.time), 10):
             receiver.set("u", {"position": uphill.position[k]})
             receiver.runtime.advance(uphill.time[k])
-            bench.runtime.advance(uphill.time[k])
-            bench.set("u", {"effort": uphill.force[k], "odometer": uphill.speed[k]})
-            sample(bench, "gps", receiver.outputs()["gps_position"])
-            error.append(3.6 * abs(bench.outputs()["speed"] - uphill.speed[k]))
+            runner.runtime.advance(uphill.time[k])
+            runner.set("u", {"effort": uphill.force[k], "odometer": uphill.speed[k]})
+            sample(runner, "gps", receiver.outputs()["gps_position"])
+            error.append(3.6 * abs(runner.outputs()["speed"] - uphill.speed[k]))
         means[preset] = np.mean(error[150:])
     assert means["half_metre"] < means["white"] / 3.0

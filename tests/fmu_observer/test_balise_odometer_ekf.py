@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy
-from observer_bench import Bench
+from observer_runner import SystemRunner
 
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.train.balise_odometer_ekf import transition
@@ -14,10 +14,10 @@ MASS, DRAG, EFFORT, PERIOD = 50e3, 800.0, 20e3, 0.1
 VALUES = {"mass": MASS, "davis_a": 0.0, "davis_b": DRAG, "davis_c": 0.0, "creep_share": 0.02, "creep_time": 15.0}
 
 
-def running(**values: float) -> Bench:
-    bench = Bench(OBSERVERS["balise_odometer_ekf"](), **(VALUES | values))
-    bench.set("u", {"effort": EFFORT, "odometer": 20.0})
-    return bench
+def running(**values: float) -> SystemRunner:
+    runner = SystemRunner(OBSERVERS["balise_odometer_ekf"](), **(VALUES | values))
+    runner.set("u", {"effort": EFFORT, "odometer": 20.0})
+    return runner
 
 
 def exact(elapsed: float, drag: float, densities: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -42,10 +42,10 @@ def drift(speed: float, acceleration: float) -> float:
 @pytest.mark.parametrize(("drag", "tolerance"), [(1e-9, 1e-10), (DRAG, 1e-4)])
 def test_it_is_the_kalman_filter_of_the_linear_train(drag: float, tolerance: float) -> None:
     densities = (1e-3, 1e-4)
-    bench = running(
+    runner = running(
         acceleration_density=densities[0], disturbance_density=densities[1], odometer_gate=100.0, davis_b=drag
     )
-    bench.runtime.start(0.0)
+    runner.runtime.start(0.0)
     readings = 20.0 + 0.1 * np.sin(np.arange(100))
     x = np.array([0.0, 1.0, 0.0, 0.0])
     P, last = np.diag([100.0**2, 2.0**2, 0.1**2, 0.1**2]), 0.0
@@ -53,11 +53,11 @@ def test_it_is_the_kalman_filter_of_the_linear_train(drag: float, tolerance: flo
     steady = EFFORT / MASS
     for t, kind, measured in sorted(steps):
         if kind == "balise":
-            bench.runtime.advance(t)
-            bench.balise(measured)
+            runner.runtime.advance(t)
+            runner.balise(measured)
         elif t > 0.0:
-            bench.set("u", {"odometer": measured})
-            bench.runtime.advance(t)
+            runner.set("u", {"odometer": measured})
+            runner.runtime.advance(t)
         F, _ = exact(t - last, drag, densities)
         once, twice = F[0, 1], F[0, 2]
         x = F @ x + steady * np.array([twice, once, 0.0, 0.0])
@@ -68,23 +68,23 @@ def test_it_is_the_kalman_filter_of_the_linear_train(drag: float, tolerance: flo
         S = row @ P @ row.T + (0.5**2 if kind == "balise" else 0.1**2)
         K = P @ row.T / S
         x, P = x + (K * (measured - row @ x)).ravel(), (np.eye(4) - K @ row) @ P
-    found = bench.runtime.x
+    found = runner.runtime.x
     upper = np.array([P[i, j] for i in range(4) for j in range(i, 4)])
     np.testing.assert_allclose(found[:4], x, rtol=tolerance, atol=tolerance)
     np.testing.assert_allclose(found[4:14], upper, rtol=20 * tolerance, atol=tolerance)
 
 
 def test_a_locked_wheel_is_not_believed_and_the_reading_after_it_is() -> None:
-    bench = running()
-    bench.set("x", {"estimated_speed": 20.0})
-    bench.runtime.start(0.0)
+    runner = running()
+    runner.set("x", {"estimated_speed": 20.0})
+    runner.runtime.start(0.0)
     told, nis, likelihood = {}, [], {}
     for k in range(1, 200):
         t = k * PERIOD
         speed = 20.0 + (EFFORT - DRAG * 20.0) / MASS * t
-        bench.set("u", {"odometer": 0.0 if 8.05 < t < 8.95 else speed})
-        bench.runtime.advance(t)
-        values = bench.outputs()
+        runner.set("u", {"odometer": 0.0 if 8.05 < t < 8.95 else speed})
+        runner.runtime.advance(t)
+        values = runner.outputs()
         told[round(t, 1)] = (values["odometer_fault"], values["speed"] - speed)
         nis.append(values["nis"])
         likelihood[round(t, 1)] = values["innovation_likelihood"]
@@ -101,31 +101,31 @@ def test_an_old_reading_is_moved_by_the_acceleration_since() -> None:
     """Readings are those of 0.4 s ago, on a train that gains 0.4 m/s each second."""
     off = {}
     for age in (0.0, 0.4):
-        bench = running(davis_b=0.0, reading_age=age, odometer_deviation=0.01)
-        bench.set("x", {"estimated_speed": 20.0})
-        bench.set("u", {"odometer": 20.0 - 0.4 * 0.4})
-        bench.runtime.start(0.0)
+        runner = running(davis_b=0.0, reading_age=age, odometer_deviation=0.01)
+        runner.set("x", {"estimated_speed": 20.0})
+        runner.set("u", {"odometer": 20.0 - 0.4 * 0.4})
+        runner.runtime.start(0.0)
         for k in range(1, 300):
-            bench.set("u", {"odometer": 20.0 + 0.4 * (k * PERIOD - 0.4)})
-            bench.runtime.advance(k * PERIOD)
-        off[age] = bench.outputs()["speed"] - (20.0 + 0.4 * 299 * PERIOD)
+            runner.set("u", {"odometer": 20.0 + 0.4 * (k * PERIOD - 0.4)})
+            runner.runtime.advance(k * PERIOD)
+        off[age] = runner.outputs()["speed"] - (20.0 + 0.4 * 299 * PERIOD)
     assert off[0.4] == pytest.approx(0.0, abs=1e-6)
     assert off[0.0] < -0.01  # part of the 0.16 m/s, the rest is taken for creep
 
 
 def test_a_train_that_stands_is_not_believed_to_run_backwards() -> None:
-    bench = running(odometer_gate=100.0)
-    bench.set("x", {"estimated_speed": 0.1, "estimated_creep": 1.0})
-    bench.set("u", {"odometer": 0.0, "effort": 0.0})
-    bench.runtime.start(0.0)
-    assert bench.state("estimated_speed") == 0.0
+    runner = running(odometer_gate=100.0)
+    runner.set("x", {"estimated_speed": 0.1, "estimated_creep": 1.0})
+    runner.set("u", {"odometer": 0.0, "effort": 0.0})
+    runner.runtime.start(0.0)
+    assert runner.state("estimated_speed") == 0.0
 
 
 def test_the_gate_of_telegrams_is_told_three_standard_deviations() -> None:
-    bench = running()
-    x = np.zeros(bench.runtime.system.state_count)
+    runner = running()
+    x = np.zeros(runner.runtime.system.state_count)
     x[4] = 7.0**2
-    assert bench.runtime.system.own_bound(bench.runtime.system.unpack_states(x), None) == pytest.approx(21.0)
+    assert runner.runtime.system.own_bound(runner.runtime.system.unpack_states(x), None) == pytest.approx(21.0)
 
 
 def test_the_certificate_is_that_of_the_riccati_equation() -> None:
@@ -168,32 +168,32 @@ def test_a_wheel_that_transmits_less_creeps_less() -> None:
 
 def test_readings_at_rest_say_nothing_of_position_and_disturbance() -> None:
     """Ten minutes at a platform with a reading that trembles: neither place nor disturbance moves."""
-    bench = running(davis_a=2000.0)
-    bench.set("x", {"estimated_speed": 0.0, "estimated_position": 50.0, "estimated_disturbance": 0.02})
-    bench.set("u", {"odometer": 0.0, "effort": -30e3})
-    bench.runtime.start(0.0)
+    runner = running(davis_a=2000.0)
+    runner.set("x", {"estimated_speed": 0.0, "estimated_position": 50.0, "estimated_disturbance": 0.02})
+    runner.set("u", {"odometer": 0.0, "effort": -30e3})
+    runner.runtime.start(0.0)
     readings = np.maximum(0.05 * np.random.default_rng(1).standard_normal(6000), 0.0)
     for k, reading in enumerate(readings):
-        bench.set("u", {"odometer": float(reading)})
-        bench.runtime.advance((k + 1) * PERIOD)
+        runner.set("u", {"odometer": float(reading)})
+        runner.runtime.advance((k + 1) * PERIOD)
     counted = float(readings.sum() * PERIOD)
-    assert bench.state("estimated_disturbance") == pytest.approx(0.02, abs=1e-3)
-    assert bench.state("estimated_position") == pytest.approx(50.0, abs=0.2 * counted)  # a fifth of what is read
+    assert runner.state("estimated_disturbance") == pytest.approx(0.02, abs=1e-3)
+    assert runner.state("estimated_position") == pytest.approx(50.0, abs=0.2 * counted)  # a fifth of what is read
 
 
 def test_readings_that_are_refused_for_long_are_believed_again() -> None:
     """The estimate stands, the train does not: no gate without a way back, and the way is honest about the position."""
-    bench = running(odometer_recover=15.0)
-    bench.set("x", {"estimated_speed": 0.0})
-    bench.set("u", {"odometer": 18.0, "effort": -30e3})
-    bench.runtime.start(0.0)
+    runner = running(odometer_recover=15.0)
+    runner.set("x", {"estimated_speed": 0.0})
+    runner.set("u", {"odometer": 18.0, "effort": -30e3})
+    runner.runtime.start(0.0)
     told = {}
     for k in range(1, 400):
-        bench.runtime.advance(k * PERIOD)
-        values = bench.outputs()
+        runner.runtime.advance(k * PERIOD)
+        values = runner.outputs()
         told[round(k * PERIOD, 1)] = (values["speed"], values["odometer_fault"])
     assert [fault for t, (_, fault) in told.items() if t < 14.85] == [1.0] * 148
     assert told[14.9][1] == told[20.0][1] == 0.0
     assert told[14.9][0] == pytest.approx(18.0, abs=1e-9)
     # 18 m/s for 15 s are 270 m that it may be off, and the first one of 100 m
-    assert bench.outputs()["position_std"] > 270.0
+    assert runner.outputs()["position_std"] > 270.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from sampled_bench import SampledBench, chain, true_motion
+from sampled_runner import SampledRunner, chain, true_motion
 from scipy.linalg import expm, solve_discrete_are
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
@@ -213,13 +213,13 @@ def test_the_error_equations_are_those_of_the_observer_that_runs(name: str) -> N
     error = observer.vertex_error(MODEL.drifts[0], observer.unpack_parameters(observer.start_parameters()))
     assert isinstance(error, ImpulsiveError)
     motion = true_motion(MODEL, (1.0, -0.5, 0.3), (), 4.0)
-    bench = SampledBench(observer, motion, ())
-    bench.sample(0.0)
+    runner = SampledRunner(observer, motion, ())
+    runner.sample(0.0)
     zeta, t = np.r_[-1.0, 0.5, -0.3, 0.0], 0.0
     for gap in (0.2, 0.7, 0.05, 0.4, 0.9):
         zeta, t = expm(error.generator * gap) @ (error.reset @ zeta), t + gap
-        np.testing.assert_allclose(bench.error(t), zeta[:3], atol=1e-7)  # RK4 at 5 ms
-        bench.sample(t)
+        np.testing.assert_allclose(runner.error(t), zeta[:3], atol=1e-7)  # RK4 at 5 ms
+        runner.sample(t)
 
 
 def test_independent_samples_by_small_gain_of_one_loop() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import DAVIS_A, DAVIS_B, DAVIS_C, Bench, SteadyMotion, in_step
+from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, SteadyMotion, SystemRunner, in_step
 
 from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
 
@@ -24,15 +24,15 @@ start_errors = st.tuples(st.floats(-2.0, 2.0), st.floats(-10.0, 10.0)).filter(la
 
 
 def errors_at_balises(observer: TrainObserver, gaps: list[float], start: tuple[float, float]) -> list[np.ndarray]:
-    bench = in_step(observer, MOTION)
-    bench.runtime.x[:2] += start
-    bench.runtime.start(0.0)
-    bench.balise(0.0)
+    runner = in_step(observer, MOTION)
+    runner.runtime.x[:2] += start
+    runner.runtime.start(0.0)
+    runner.balise(0.0)
     errors = [np.array(start)]
     for gap in gaps:
-        bench.runtime.advance(bench.runtime.t + gap)
-        errors.append(bench.runtime.x[:2] - [MOTION.position(bench.runtime.t), MOTION.speed])
-        bench.balise(MOTION.position(bench.runtime.t))
+        runner.runtime.advance(runner.runtime.t + gap)
+        errors.append(runner.runtime.x[:2] - [MOTION.position(runner.runtime.t), MOTION.speed])
+        runner.balise(MOTION.position(runner.runtime.t))
     return errors
 
 
@@ -76,40 +76,40 @@ def test_mixed_gaps_between_the_limits_grow_although_each_alone_is_stable() -> N
     assert np.abs(errors_at_balises(observer, [short] * 50, start)[-1]).max() < 0.01
 
 
-def uio_in_equilibrium() -> Bench:
+def uio_in_equilibrium() -> SystemRunner:
     """At a speed where the linear drag of the observer is met by the effort, so that only the errors put in remain."""
     observer = DiscreteUio()
-    bench = Bench(observer, gate=0.0)  # what is certified is the error while every telegram is used
-    bench.set("u", {"effort": DAVIS_A + (DAVIS_B + DAVIS_C * 50.0 / 3.6) * MOTION.speed, "odometer": MOTION.speed})
-    bench.runtime.x[1] = MOTION.speed
-    return bench
+    runner = SystemRunner(observer, gate=0.0)  # what is certified is the error while every telegram is used
+    runner.set("u", {"effort": DAVIS_A + (DAVIS_B + DAVIS_C * 50.0 / 3.6) * MOTION.speed, "odometer": MOTION.speed})
+    runner.runtime.x[1] = MOTION.speed
+    return runner
 
 
-def uio_errors(bench: Bench, stamps: list[float], start: np.ndarray) -> list[np.ndarray]:
+def uio_errors(runner: SystemRunner, stamps: list[float], start: np.ndarray) -> list[np.ndarray]:
     """Errors just after the first odometer sample behind each balise."""
-    bench.runtime.x[:6] += start
-    bench.runtime.start(0.0)
+    runner.runtime.x[:6] += start
+    runner.runtime.start(0.0)
     errors = []
     for stamp in stamps:
-        bench.runtime.advance(stamp)
-        bench.balise(MOTION.position(bench.runtime.t))
+        runner.runtime.advance(stamp)
+        runner.balise(MOTION.position(runner.runtime.t))
         sample = np.floor(stamp / 0.1 + 1e-9) * 0.1 + 0.1
-        bench.runtime.advance(sample)
-        reference = np.array([MOTION.position(bench.runtime.t), MOTION.speed, 0.0, 0.0, 0.0, 0.0])
-        errors.append(bench.runtime.x[:6] - reference)
+        runner.runtime.advance(sample)
+        reference = np.array([MOTION.position(runner.runtime.t), MOTION.speed, 0.0, 0.0, 0.0, 0.0])
+        errors.append(runner.runtime.x[:6] - reference)
     return errors
 
 
 @settings(max_examples=25, deadline=None)
 @given(relative=st.lists(st.floats(0.0, 1.0), min_size=10, max_size=40), seed=st.integers(0, 1000))
 def test_the_unknown_input_observer_obeys_its_certificate(relative: list[float], seed: int) -> None:
-    bench = uio_in_equilibrium()
+    runner = uio_in_equilibrium()
     limit = DiscreteUio().certify(0.1).aperiodic_limit
     P = np.array(DiscreteUio().certify(limit).lyapunov_matrix)
     stamps = [0.05]
     for gap in relative:  # at most one balise in an odometer period, as the certificate demands
         stamps.append(max(stamps[-1] + gap * limit, np.floor(stamps[-1] / 0.1 + 1e-9) * 0.1 + 0.1 + 1e-6))
-    errors = uio_errors(bench, stamps, np.random.default_rng(seed).normal(size=6))
+    errors = uio_errors(runner, stamps, np.random.default_rng(seed).normal(size=6))
     levels = [float(np.sqrt(e @ P @ e)) for e in errors]
     for before, after in pairwise(levels):
         assert after <= before * (1.0 + INTEGRATION) + 1e-9

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from observer_bench import TRAIN_OBSERVERS
+from observer_runner import TRAIN_OBSERVERS
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import SteadyMotion
-from sampled_bench import Motion, SampledBench, chain, true_motion
+from observer_runner import SteadyMotion
+from sampled_runner import Motion, SampledRunner, chain, true_motion
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
@@ -106,13 +106,13 @@ def test_the_transitions_are_those_of_the_observer_that_runs() -> None:
     observer = DecayingInnovation(model)
     p = observer.unpack_parameters(observer.start_parameters())
     error = observer.vertex_error(model.drifts[0], p)
-    bench = SampledBench(observer, true_motion(model, (1.0, -0.5, 0.3), (), 4.0), ())
-    bench.sample(0.0)
+    runner = SampledRunner(observer, true_motion(model, (1.0, -0.5, 0.3), (), 4.0), ())
+    runner.sample(0.0)
     e, t = np.array([-1.0, 0.5, -0.3]), 0.0
     for gap in (0.2, 0.7, 0.05, 0.4):
         e, t = error.transition(gap) @ e, t + gap
-        np.testing.assert_allclose(bench.error(t), e, atol=2e-6 * max(1.0, np.abs(e).max()))  # RK4 at 5 ms over an end
-        bench.sample(t)
+        np.testing.assert_allclose(runner.error(t), e, atol=2e-6 * max(1.0, np.abs(e).max()))  # RK4 at 5 ms over an end
+        runner.sample(t)
 
 
 @settings(max_examples=20)
@@ -170,9 +170,9 @@ def test_changes_within_a_gap_add_what_they_add_to_an_exponential_that_is_nearly
 
 
 def followed(observer: Any, motion: Motion, gaps: Any, **parameters: float) -> np.ndarray:
-    bench = SampledBench(observer, motion, (0.2,)[: len(observer.model.inputs)], internal_step=1e-3, **parameters)
-    bench.follow(np.cumsum(gaps))
-    return bench.runtime.x[: observer.model.order].copy()
+    runner = SampledRunner(observer, motion, (0.2,)[: len(observer.model.inputs)], internal_step=1e-3, **parameters)
+    runner.follow(np.cumsum(gaps))
+    return runner.runtime.x[: observer.model.order].copy()
 
 
 @settings(max_examples=15, deadline=None)
@@ -262,13 +262,13 @@ def orbit() -> Motion:
 
 def error_left(period: float, **parameters: float) -> float:
     """Largest error over the last 10 s of 80 s."""
-    bench = SampledBench(DecayingInnovation("tanh_system"), orbit(), (), internal_step=1e-2, **parameters)
+    runner = SampledRunner(DecayingInnovation("tanh_system"), orbit(), (), internal_step=1e-2, **parameters)
     instants = period * np.arange(1, int(80.0 / period) + 1)
-    bench.follow(instants[instants < 70.0])
+    runner.follow(instants[instants < 70.0])
     found = []
     for t in instants[instants >= 70.0]:
-        found.append(np.abs(bench.error(float(t))).max())
-        bench.sample(float(t))
+        found.append(np.abs(runner.error(float(t))).max())
+        runner.sample(float(t))
     return float(max(found))
 
 
@@ -337,9 +337,9 @@ def test_theta_follows_its_closed_form(start: float) -> None:
 @pytest.mark.parametrize("period", [0.05, 0.1, 0.3])
 def test_a_gain_that_settles_finds_the_state(period: float) -> None:
     """Independently: the error is zero after 20 s at these periods."""
-    bench = SampledBench(DynamicHighGain("tanh_system"), orbit(), ())
-    bench.follow(period * np.arange(round(20.0 / period)))
-    assert np.abs(bench.error(20.0)).max() < 1e-3
+    runner = SampledRunner(DynamicHighGain("tanh_system"), orbit(), ())
+    runner.follow(period * np.arange(round(20.0 / period)))
+    assert np.abs(runner.error(20.0)).max() < 1e-3
 
 
 @pytest.mark.parametrize(

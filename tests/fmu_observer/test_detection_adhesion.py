@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import Bench
+from observer_runner import SystemRunner
 
 from fmu_observer.detection import (
     AdhesionDetector,
@@ -35,12 +35,12 @@ def detector(
     definition: str = "odometer",
     preset: str = "polach",
     **parameters: float,
-) -> Bench:
-    bench = Bench(AdhesionDetector(definition), preset=preset, **parameters)  # type: ignore[arg-type]
-    bench.set("u", {"speed": speed, "slip": slip})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(seconds)
-    return bench
+) -> SystemRunner:
+    runner = SystemRunner(AdhesionDetector(definition), preset=preset, **parameters)  # type: ignore[arg-type]
+    runner.set("u", {"speed": speed, "slip": slip})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(seconds)
+    return runner
 
 
 def at_once(speed: float, filtered: float, preset: str = "polach") -> dict[str, float]:
@@ -79,8 +79,8 @@ def test_between_its_points_the_detector_follows_the_curve(speed: float, wet: bo
 
 
 def test_the_worked_example_of_the_thesis() -> None:
-    bench = detector(5.0 * KMH, 0.35, definition="speed", preset="as_published")
-    out = bench.outputs()
+    runner = detector(5.0 * KMH, 0.35, definition="speed", preset="as_published")
+    out = runner.outputs()
     assert 100.0 * abs(out["nominal_optimum"] - 0.35) == pytest.approx(25.0, abs=1e-9)
     assert 100.0 * abs(out["degraded_optimum"] - 0.35) == pytest.approx(4.6, abs=1e-9)
     assert (out["condition"], out["raw_condition"]) == (2.0, 2.0)
@@ -125,22 +125,22 @@ def test_a_verdict_has_to_stand(seconds: float, condition: float) -> None:
 
 
 def test_a_broken_verdict_starts_again() -> None:
-    bench = detector(10.0, 0.4, 0.45, slip_filter_time=0.01)
+    runner = detector(10.0, 0.4, 0.45, slip_filter_time=0.01)
     for _ in range(4):
         for slip in (0.0, 0.4):
-            bench.set("u", {"slip": slip})
-            bench.runtime.advance(bench.runtime.t + 0.45)
-    assert bench.outputs()["raw_condition"] == 2.0
-    assert bench.outputs()["condition"] == 1.0
+            runner.set("u", {"slip": slip})
+            runner.runtime.advance(runner.runtime.t + 0.45)
+    assert runner.outputs()["raw_condition"] == 2.0
+    assert runner.outputs()["condition"] == 1.0
 
 
 def test_at_rest_the_verdict_stays() -> None:
-    bench = detector(10.0, 0.4)
-    assert bench.outputs()["condition"] == 2.0
-    bench.set("u", {"speed": 0.0, "slip": 0.0})
-    bench.runtime.advance(10.0)
-    assert bench.outputs()["raw_condition"] == 1.0
-    assert bench.outputs()["condition"] == 2.0
+    runner = detector(10.0, 0.4)
+    assert runner.outputs()["condition"] == 2.0
+    runner.set("u", {"speed": 0.0, "slip": 0.0})
+    runner.runtime.advance(10.0)
+    assert runner.outputs()["raw_condition"] == 1.0
+    assert runner.outputs()["condition"] == 2.0
 
 
 def test_maps_are_of_any_curve_and_bad_ones_are_refused() -> None:

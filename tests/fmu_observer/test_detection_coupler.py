@@ -5,34 +5,34 @@ import pytest
 from coupled_train import journey
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import Bench
+from observer_runner import SystemRunner
 
 from fmu_observer.detection import CouplerRisk
 
-BENCH = Bench(CouplerRisk())
+BENCH = SystemRunner(CouplerRisk())
 
 
-def started(force: float, **parameters: float) -> Bench:
-    bench = BENCH  # tracing it costs more than the run
-    bench.runtime.reset()
-    bench.set("p", parameters)
-    bench.set("u", {"coupler_force": force})
-    bench.runtime.start(0.0)
-    return bench
+def started(force: float, **parameters: float) -> SystemRunner:
+    runner = BENCH  # tracing it costs more than the run
+    runner.runtime.reset()
+    runner.set("p", parameters)
+    runner.set("u", {"coupler_force": force})
+    runner.runtime.start(0.0)
+    return runner
 
 
-def then(bench: Bench, force: float, seconds: float = 1.0) -> dict[str, float]:
+def then(runner: SystemRunner, force: float, seconds: float = 1.0) -> dict[str, float]:
     """Outputs after the force has come slowly, and has stayed."""
-    now = float(bench.runtime.u[0])
+    now = float(runner.runtime.u[0])
     for share in np.linspace(0.0, 1.0, 200)[1:]:
-        bench.set("u", {"coupler_force": now + share * (force - now)})
-        bench.runtime.advance(bench.runtime.t + 0.05)
-    bench.runtime.advance(bench.runtime.t + seconds)
-    return bench.outputs()
+        runner.set("u", {"coupler_force": now + share * (force - now)})
+        runner.runtime.advance(runner.runtime.t + 0.05)
+    runner.runtime.advance(runner.runtime.t + seconds)
+    return runner.outputs()
 
 
 def test_levels_go_up_at_the_limits_and_down_below_them() -> None:
-    bench = started(0.0)
+    runner = started(0.0)
     # warning 340 kN, alarm 510 kN; left below 80 % of them, 272 and 408 kN
     story = [
         (335e3, 0),
@@ -46,7 +46,7 @@ def test_levels_go_up_at_the_limits_and_down_below_them() -> None:
         (280e3, 1),
         (0.0, 0),
     ]
-    assert [then(bench, force)["risk"] for force, _ in story] == [level for _, level in story]
+    assert [then(runner, force)["risk"] for force, _ in story] == [level for _, level in story]
 
 
 def test_compression_is_no_risk() -> None:
@@ -55,36 +55,36 @@ def test_compression_is_no_risk() -> None:
 
 
 def test_a_tension_there_from_the_start_has_not_risen() -> None:
-    bench = started(300e3)
-    bench.runtime.advance(0.5)
-    assert bench.outputs()["risk"] == 0.0
-    assert bench.outputs()["tension_rate"] == 0.0
-    assert bench.outputs()["utilisation"] == pytest.approx(300.0 / 850.0, abs=1e-12)
+    runner = started(300e3)
+    runner.runtime.advance(0.5)
+    assert runner.outputs()["risk"] == 0.0
+    assert runner.outputs()["tension_rate"] == 0.0
+    assert runner.outputs()["utilisation"] == pytest.approx(300.0 / 850.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(("rate", "level"), [(300e3, 0.0), (400e3, 1.0), (800e3, 2.0)])
 def test_a_fast_rise_counts_before_the_force_is_there(rate: float, level: float) -> None:
-    bench = started(0.0)
+    runner = started(0.0)
     for k in range(1, 601):
-        bench.set("u", {"coupler_force": rate * 0.001 * (k - 0.5)})
-        bench.runtime.advance(0.001 * k)
+        runner.set("u", {"coupler_force": rate * 0.001 * (k - 0.5)})
+        runner.runtime.advance(0.001 * k)
         if k * 0.001 * rate > 250e3:
             break
-    assert bench.outputs()["tension_rate"] == pytest.approx(rate, rel=0.06)  # of a ramp, three time constants at least
-    assert bench.outputs()["risk"] == level
+    assert runner.outputs()["tension_rate"] == pytest.approx(rate, rel=0.06)  # of a ramp, three time constants at least
+    assert runner.outputs()["risk"] == level
 
 
 def test_the_peak_is_held_and_forgotten() -> None:
-    bench = started(200e3)
-    bench.set("u", {"coupler_force": 50e3})
-    bench.runtime.advance(4.98)
-    assert bench.outputs()["peak_tension"] == 200e3
-    bench.runtime.advance(5.04)
-    assert bench.outputs()["peak_tension"] == 50e3
+    runner = started(200e3)
+    runner.set("u", {"coupler_force": 50e3})
+    runner.runtime.advance(4.98)
+    assert runner.outputs()["peak_tension"] == 200e3
+    runner.runtime.advance(5.04)
+    assert runner.outputs()["peak_tension"] == 50e3
     for force, until in ((100e3, 5.1), (60e3, 9.9)):  # a later one is held as long
-        bench.set("u", {"coupler_force": force})
-        bench.runtime.advance(until)
-    assert bench.outputs()["peak_tension"] == 100e3
+        runner.set("u", {"coupler_force": force})
+        runner.runtime.advance(until)
+    assert runner.outputs()["peak_tension"] == 100e3
 
 
 @settings(max_examples=25, deadline=None)
@@ -93,12 +93,12 @@ def test_level_and_peak_of_any_history(forces: list[float], hold: int) -> None:
     """The level never lies below that of the tension now; the peak is at least the tension, at most the largest of the
     past.
     """
-    bench = started(forces[0], peak_hold_time=hold * 0.02)
+    runner = started(forces[0], peak_hold_time=hold * 0.02)
     seen = []
     for k, force in enumerate(forces):
-        bench.set("u", {"coupler_force": force})
-        bench.runtime.advance(0.02 * (k + 1))
-        out, tension = bench.outputs(), max(force, 0.0)
+        runner.set("u", {"coupler_force": force})
+        runner.runtime.advance(0.02 * (k + 1))
+        out, tension = runner.outputs(), max(force, 0.0)
         seen.append(tension)
         assert out["risk"] >= (2.0 if tension > 510e3 else 1.0 if tension > 340e3 else 0.0)
         assert tension <= out["peak_tension"] <= max([max(forces[0], 0.0), *seen])
@@ -109,11 +109,11 @@ def test_a_step_of_effort_pulls_the_first_coupler_as_measured() -> None:
     trip = journey(lambda _t: 83e3, [3.0])
     assert trip.coupler_force.max() == pytest.approx(62.16e3, rel=0.005)  # from 0.5 m/s here, where a resistance acts
     assert trip.time[int(trip.coupler_force.argmax())] == pytest.approx(0.63, abs=0.015)
-    bench = started(float(trip.coupler_force[0]))
+    runner = started(float(trip.coupler_force[0]))
     worst = 0.0
     for t, force in zip(trip.time[1:], trip.coupler_force[1:], strict=True):
-        bench.set("u", {"coupler_force": float(force)})
-        bench.runtime.advance(float(t))
-        worst = max(worst, bench.outputs()["risk"])
+        runner.set("u", {"coupler_force": float(force)})
+        runner.runtime.advance(float(t))
+        worst = max(worst, runner.outputs()["risk"])
     assert worst == 0.0
-    assert bench.outputs()["peak_tension"] == pytest.approx(trip.coupler_force.max(), rel=1e-3)  # checked every 0.02 s
+    assert runner.outputs()["peak_tension"] == pytest.approx(trip.coupler_force.max(), rel=1e-3)  # checked every 0.02 s

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from observer_bench import Bench
+from observer_runner import SystemRunner
 
 from fmu_observer.detection import ExcessiveSlip
 
 SPEED = 10.0
-BENCH = Bench(ExcessiveSlip())
+BENCH = SystemRunner(ExcessiveSlip())
 
 
 def odometer(slip: float) -> float:
@@ -19,18 +19,18 @@ def odometer(slip: float) -> float:
 
 def drive(slips: list[tuple[float, float]], **parameters: float) -> list[dict[str, float]]:
     """Outputs every 0.05 s under slips held for durations, the filter as fast as it may be."""
-    bench = BENCH  # tracing it costs more than the run
-    bench.runtime.reset()
-    bench.set("p", {"slip_filter_time": 0.01, **parameters})
+    runner = BENCH  # tracing it costs more than the run
+    runner.runtime.reset()
+    runner.set("p", {"slip_filter_time": 0.01, **parameters})
     rows, k = [], 0
     for slip, duration in slips:
         for _ in range(round(duration / 0.05)):
-            bench.set("u", {"odometer": odometer(slip), "speed": SPEED})
+            runner.set("u", {"odometer": odometer(slip), "speed": SPEED})
             if k == 0:
-                bench.runtime.start(0.0)
+                runner.runtime.start(0.0)
             k += 1
-            bench.runtime.advance(k * 0.05)
-            rows.append(bench.outputs())
+            runner.runtime.advance(k * 0.05)
+            rows.append(runner.outputs())
     return rows
 
 
@@ -59,20 +59,20 @@ def test_a_short_excess_is_not_confirmed_and_leaves_no_trace() -> None:
 
 def test_braking_slip_and_wheel_lock_count_too() -> None:
     assert drive([(-0.4, 1.0)])[-1]["slip_indicator"] == 2.0
-    bench = Bench(ExcessiveSlip())
-    bench.set("u", {"odometer": 0.0, "speed": SPEED})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(1.0)
-    assert bench.outputs()["slip_indicator"] == 2.0
+    runner = SystemRunner(ExcessiveSlip())
+    runner.set("u", {"odometer": 0.0, "speed": SPEED})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(1.0)
+    assert runner.outputs()["slip_indicator"] == 2.0
 
 
 def test_standstill_is_not_judged() -> None:
-    bench = Bench(ExcessiveSlip())
-    bench.set("u", {"odometer": 0.4, "speed": 0.0})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(2.0)
-    assert bench.outputs()["slip_indicator"] == 1.0
-    assert bench.outputs()["exceedance"] == 0.0
+    runner = SystemRunner(ExcessiveSlip())
+    runner.set("u", {"odometer": 0.4, "speed": 0.0})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(2.0)
+    assert runner.outputs()["slip_indicator"] == 1.0
+    assert runner.outputs()["exceedance"] == 0.0
 
 
 @settings(max_examples=60, deadline=None)

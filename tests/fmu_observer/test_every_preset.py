@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observer_bench import SteadyMotion
+from observer_runner import SteadyMotion
 from situations import Follower, Situation, observers
 
 from fmu_observer import OBSERVERS

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import DAVIS_A, DAVIS_B, DAVIS_C, INERTIA, MASS, RADIUS, Bench, SteadyMotion, started
+from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, INERTIA, MASS, RADIUS, SteadyMotion, SystemRunner, started
 from scipy.linalg import eigh, expm
 
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
@@ -43,7 +43,7 @@ class Journey:
         return t0 + (way / v0 if a == 0.0 else (np.sqrt(v0 * v0 + 2.0 * a * way) - v0) / a)
 
 
-def ride(bench: Bench, spacing: float, until: float = 160.0, wheels: float = 0.0) -> np.ndarray:
+def ride(runner: SystemRunner, spacing: float, until: float = 160.0, wheels: float = 0.0) -> np.ndarray:
     """Speed errors every `STEP` with a balise every `spacing` metres; the effort accelerates `wheels` [kg] of inertia
     too.
     """
@@ -53,16 +53,16 @@ def ride(bench: Bench, spacing: float, until: float = 160.0, wheels: float = 0.0
     for k in range(round(until / STEP)):
         _, v, a = journey.at((k + 0.5) * STEP)
         effort = (MASS + wheels) * a + DAVIS_A + DAVIS_B * v + DAVIS_C * v * v
-        bench.set("u", {"effort": effort, "odometer": v})
+        runner.set("u", {"effort": effort, "odometer": v})
         if k == 0:
-            bench.runtime.start(0.0)
+            runner.runtime.start(0.0)
         while following <= (k + 1) * STEP:
-            bench.runtime.advance(following)
-            bench.set("u", {"odometer": journey.at(following)[1]})
-            bench.balise(journey.at(following)[0])
+            runner.runtime.advance(following)
+            runner.set("u", {"odometer": journey.at(following)[1]})
+            runner.balise(journey.at(following)[0])
             following = next(stamps, np.inf)
-        bench.runtime.advance((k + 1) * STEP)
-        errors.append(bench.state("estimated_speed") - journey.at((k + 1) * STEP)[1])
+        runner.runtime.advance((k + 1) * STEP)
+        errors.append(runner.state("estimated_speed") - journey.at((k + 1) * STEP)[1])
         if abs(errors[-1]) > 1e3:
             break
     return np.array(errors)
@@ -73,25 +73,25 @@ def test_it_follows_where_a_constant_gain_of_8_diverges(spacing: float) -> None:
     """Adhesion force exact, as in the independent measurement: end errors up to 3 mm/s for 2 to 100 m, a start 4 m/s
     wrong.
     """
-    adaptive = ride(Bench(AdaptiveGainCdo(), expected_spacing=spacing), spacing)
+    adaptive = ride(SystemRunner(AdaptiveGainCdo(), expected_spacing=spacing), spacing)
     assert abs(adaptive[-1]) <= 0.003
     assert np.abs(adaptive).max() < 4.5
-    constant = Bench(AdaptiveGainCdo(), theta_min=8.0, theta_max=8.0)
+    constant = SystemRunner(AdaptiveGainCdo(), theta_min=8.0, theta_max=8.0)
     assert bool(np.abs(ride(constant, spacing)).max() > 1e3) is (spacing >= 8.7)
 
 
 def test_a_constant_gain_of_2_pays_with_large_transients() -> None:
-    errors = ride(Bench(AdaptiveGainCdo(), theta_min=2.0, theta_max=2.0), 25.0)
+    errors = ride(SystemRunner(AdaptiveGainCdo(), theta_min=2.0, theta_max=2.0), 25.0)
     assert 10.0 < np.abs(errors).max() < 100.0  # 61 m/s were measured on another journey
 
 
 @pytest.mark.parametrize("first_stage", ["differentiator", "effort"])
 def test_the_differentiator_takes_out_what_the_wheels_inertia_costs(first_stage: str) -> None:
-    bench = Bench(AdaptiveGainCdo(first_stage=first_stage), expected_spacing=25.0)  # type: ignore[arg-type]
-    bench.set("x", {"estimated_speed": 5.0})
+    runner = SystemRunner(AdaptiveGainCdo(first_stage=first_stage), expected_spacing=25.0)  # type: ignore[arg-type]
+    runner.set("x", {"estimated_speed": 5.0})
     if first_stage == "differentiator":
-        bench.set("x", {"wheel_rate": 5.0 / RADIUS, "wheel_acceleration": 0.5 / RADIUS})
-    errors = ride(bench, 25.0, until=17.0, wheels=INERTIA / RADIUS**2)
+        runner.set("x", {"wheel_rate": 5.0 / RADIUS, "wheel_acceleration": 0.5 / RADIUS})
+    errors = ride(runner, 25.0, until=17.0, wheels=INERTIA / RADIUS**2)
     bias = INERTIA / RADIUS**2 * 0.5 / MASS  # [m/s2]
     assert abs(errors[-1]) < 4.0 * bias  # a second of it, and some: theta is about 1 1/s
     assert bool(abs(errors[-1]) > 0.2 * bias) is (first_stage == "effort")
@@ -103,11 +103,11 @@ def test_the_differentiator_takes_out_what_the_wheels_inertia_costs(first_stage:
 
 def gains_at(observer: TrainObserver, places: list[float], speed: float, odometer: float | None = None) -> list[float]:
     motion = SteadyMotion(speed=speed, slip_speed=0.0 if odometer is None else odometer - speed)
-    bench = started(observer, motion)
+    runner = started(observer, motion)
     gains = []
     for place in places:
-        bench.balise(place)
-        gains.append(bench.outputs()["gain"])
+        runner.balise(place)
+        gains.append(runner.outputs()["gain"])
     return gains
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import SteadyMotion, in_step
+from observer_runner import SteadyMotion, in_step
 from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
@@ -75,19 +75,19 @@ def test_both_families_say_what_they_cost() -> None:
 def test_a_certified_design_never_diverges(make: Callable[[], GainDesign], relative: list[float], seed: int) -> None:
     design = make()
     motion = SteadyMotion(speed=10.0)
-    bench = in_step(OBSERVERS[design.observer](), motion)  # type: ignore[arg-type]
-    bench.set("p", {n: v for name, v in design.parameters.items() for n, v in _scalars(bench.system, name, v)})
-    bench.set("p", {"internal_step": 0.02})  # theta times it: 4e-3
-    bench.runtime.x[:2] += np.random.default_rng(seed).normal(size=2)
-    bench.runtime.start(0.0)
-    bench.balise(0.0)
+    runner = in_step(OBSERVERS[design.observer](), motion)  # type: ignore[arg-type]
+    runner.set("p", {n: v for name, v in design.parameters.items() for n, v in _scalars(runner.system, name, v)})
+    runner.set("p", {"internal_step": 0.02})  # theta times it: 4e-3
+    runner.runtime.x[:2] += np.random.default_rng(seed).normal(size=2)
+    runner.runtime.start(0.0)
+    runner.balise(0.0)
     P = np.array(design.certificate.lyapunov_matrix)
     levels = []
     for gap in (design.gaps.longest * share for share in relative):
-        e = bench.runtime.x[:2] - [motion.position(bench.runtime.t), motion.speed]
+        e = runner.runtime.x[:2] - [motion.position(runner.runtime.t), motion.speed]
         levels.append(np.sqrt(e @ P @ e))
-        bench.runtime.advance(bench.runtime.t + gap)
-        bench.balise(motion.position(bench.runtime.t))
+        runner.runtime.advance(runner.runtime.t + gap)
+        runner.balise(motion.position(runner.runtime.t))
     # integration of the chattering differentiator: 7 N on 90 t over a gap of 20 s moves 0.02 m, weighed by P
     leeway = 0.03 * np.sqrt(P[0, 0]) + 0.002 * np.sqrt(P[1, 1])
     assert all(after <= before + leeway for before, after in pairwise(levels))

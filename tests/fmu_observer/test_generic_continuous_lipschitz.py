@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from control import place_acker
-from generic_bench import joint_errors
+from generic_runner import joint_errors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm

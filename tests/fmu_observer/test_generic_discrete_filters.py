@@ -5,7 +5,7 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from generic_bench import exact_states, sampled_run
+from generic_runner import exact_states, sampled_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sampled_bench import Motion, SampledBench, aperiodic_instants, true_motion
+from sampled_runner import Motion, SampledRunner, aperiodic_instants, true_motion
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
@@ -49,8 +49,8 @@ def swing() -> Motion:
     return true_motion(pendulum(), START, (TORQUE,), END)
 
 
-def bench(make: Make, *, python: bool = False, **parameters: float) -> SampledBench:
-    return SampledBench(make(), swing(), (TORQUE,), python=python, **parameters)
+def runner(make: Make, *, python: bool = False, **parameters: float) -> SampledRunner:
+    return SampledRunner(make(), swing(), (TORQUE,), python=python, **parameters)
 
 
 # Order of magnitude of the independent measurement on a pendulum whose parameters and start are not printed, |e| at 2,
@@ -71,7 +71,7 @@ APERIODIC_ERRORS = [
 ]
 
 
-def errors_along(observer: SampledBench, instants: np.ndarray) -> list[float]:
+def errors_along(observer: SampledRunner, instants: np.ndarray) -> list[float]:
     found = []
     for end in (2.0, 5.0, 10.0):
         observer.follow(instants[(instants > observer.runtime.t + 1e-9) & (instants < end + 1e-9)])
@@ -81,7 +81,7 @@ def errors_along(observer: SampledBench, instants: np.ndarray) -> list[float]:
 
 @pytest.mark.parametrize(("make", "parameters", "measured"), PERIODIC_ERRORS, ids=lambda v: getattr(v, "name", None))
 def test_convergence_at_periodic_samples(make: Make, parameters: dict[str, float], measured: tuple[float, ...]) -> None:
-    errors = errors_along(bench(make, **parameters), 0.1 * np.arange(1, 101))
+    errors = errors_along(runner(make, **parameters), 0.1 * np.arange(1, 101))
     assert all(error < 10.0 * other for error, other in zip(errors, measured, strict=True)), errors
 
 
@@ -90,7 +90,7 @@ def test_convergence_at_aperiodic_samples(
     make: Make, parameters: dict[str, float], measured: tuple[float, ...]
 ) -> None:
     errors = np.median(
-        [errors_along(bench(make, **parameters), aperiodic_instants(seed, 0.5, 10.0)) for seed in range(5)], axis=0
+        [errors_along(runner(make, **parameters), aperiodic_instants(seed, 0.5, 10.0)) for seed in range(5)], axis=0
     )
     assert all(error < 10.0 * other for error, other in zip(errors, measured, strict=True)), errors
 
@@ -101,7 +101,7 @@ def test_without_any_sample_the_model_runs_on(make: Make) -> None:
     free = true_motion(pendulum(), (0.0, 0.0), (TORQUE,), 2.0)
     # its angle is right at the start, where periodic ones sample
     moving = true_motion(pendulum(), (0.0, 0.5), (TORQUE,), 2.0)
-    observer = SampledBench(make(), moving, (TORQUE,), **({"sample_period": 100.0} if make in PERIODIC else {}))
+    observer = SampledRunner(make(), moving, (TORQUE,), **({"sample_period": 100.0} if make in PERIODIC else {}))
     observer.runtime.advance(2.0)
     frozen = make is TakagiSugenoAperiodic  # its weights are those of the start
     np.testing.assert_allclose(observer.runtime.x[:2], free(2.0), atol=2e-3 if frozen else 1e-8)
@@ -109,7 +109,7 @@ def test_without_any_sample_the_model_runs_on(make: Make) -> None:
 
 @pytest.mark.parametrize("make", EVENT, ids=lambda cls: cls.name)
 def test_it_recovers_after_samples_were_missed(make: Make) -> None:
-    observer = bench(make)
+    observer = runner(make)
     instants = 0.1 * np.arange(1, 200)
     observer.follow(instants[(instants < 3.0) | (instants > 5.0)])
     assert np.linalg.norm(observer.error()) < 1e-4
@@ -117,7 +117,7 @@ def test_it_recovers_after_samples_were_missed(make: Make) -> None:
 
 @on_pendulum
 def test_redo_after_restore_is_bit_identical(make: Make) -> None:
-    observer = bench(make)
+    observer = runner(make)
     observer.follow(aperiodic_instants(1, 0.3, 3.0))
     snapshot = observer.runtime.snapshot()
     observer.follow(aperiodic_instants(2, 0.3, 3.0) + 3.0)
@@ -129,7 +129,7 @@ def test_redo_after_restore_is_bit_identical(make: Make) -> None:
 
 @on_pendulum
 def test_the_traced_kernel_and_plain_numpy_agree(make: Make) -> None:
-    traced, python = bench(make), bench(make, python=True)
+    traced, python = runner(make), runner(make, python=True)
     for observer in (traced, python):
         observer.follow(0.1 * np.arange(1, 6))
     np.testing.assert_allclose(traced.runtime.x, python.runtime.x, rtol=1e-10, atol=1e-12)
@@ -201,7 +201,7 @@ def test_the_output_predictor_is_the_exponential_gain_observer(
     integrator.
     """
     motion = true_motion(find_model(model), START, (TORQUE,), 8.0)
-    runs = [SampledBench(make(model), motion, (TORQUE,), theta=theta) for make in (ExponentialGain, OutputPredictor)]
+    runs = [SampledRunner(make(model), motion, (TORQUE,), theta=theta) for make in (ExponentialGain, OutputPredictor)]
     for run in runs:
         run.runtime.p[1:3] = first, second
         run.follow(np.cumsum(gaps))
@@ -210,7 +210,7 @@ def test_the_output_predictor_is_the_exponential_gain_observer(
 
 
 def test_the_hybrid_observer_without_jump_is_the_exponential_gain_observer() -> None:
-    hybrid, plain = bench(HybridImpulsive), bench(ExponentialGain)
+    hybrid, plain = runner(HybridImpulsive), runner(ExponentialGain)
     names = [n for s in hybrid.observer.parameter_signals for n in s.scalar_names]
     for i, value in ((1, 4.0), (2, 4.0)):
         hybrid.runtime.p[names.index(f"flow_gain[{i}]")] = value

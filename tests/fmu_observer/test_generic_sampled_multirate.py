@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sampled_bench import chain
+from sampled_runner import chain
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 

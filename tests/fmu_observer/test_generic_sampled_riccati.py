@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sampled_bench import SampledBench, chain, true_motion
+from sampled_runner import SampledRunner, chain, true_motion
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -44,19 +44,19 @@ def covariance_filter(end: float) -> tuple[np.ndarray, np.ndarray]:
 
 def test_it_is_an_extended_kalman_filter_in_information_form() -> None:
     end = 1.0
-    bench = SampledBench(RiccatiHighGain(), true_motion(pendulum(), START, (TORQUE,), end), (TORQUE,))
-    bench.follow(T * np.arange(1, round(end / T) + 1))
+    runner = SampledRunner(RiccatiHighGain(), true_motion(pendulum(), START, (TORQUE,), end), (TORQUE,))
+    runner.follow(T * np.arange(1, round(end / T) + 1))
     estimate, P = covariance_filter(end)
-    s11, s12, s22 = bench.runtime.x[2:5]
-    np.testing.assert_allclose(bench.runtime.x[:2], estimate, atol=1e-6)  # RK4 at 5 ms against the rate of S
+    s11, s12, s22 = runner.runtime.x[2:5]
+    np.testing.assert_allclose(runner.runtime.x[:2], estimate, atol=1e-6)  # RK4 at 5 ms against the rate of S
     np.testing.assert_allclose(np.linalg.inv([[s11, s12], [s12, s22]]), P, rtol=1e-6, atol=1e-6)
 
 
 def test_the_information_stays_positive_definite() -> None:
-    bench = SampledBench(RiccatiHighGain(), true_motion(pendulum(), START, (TORQUE,), 10.0), (TORQUE,))
+    runner = SampledRunner(RiccatiHighGain(), true_motion(pendulum(), START, (TORQUE,), 10.0), (TORQUE,))
     for k in range(1, 101):
-        bench.sample(k * T)
-        s11, s12, s22 = bench.runtime.x[2:5]
+        runner.sample(k * T)
+        s11, s12, s22 = runner.runtime.x[2:5]
         assert np.linalg.eigvalsh([[s11, s12], [s12, s22]])[0] > 0.0
 
 
@@ -67,12 +67,12 @@ def test_the_settled_error_falls_as_the_certificate_says(period: float) -> None:
     p = observer.unpack_parameters(observer.start_parameters())
     flow = expm(chain(2).A * period)
     settled = np.linalg.inv(flow) @ observer.vertex_error(chain(2).A, chain(2).A, p).transition(period) @ flow
-    bench = SampledBench(observer, true_motion(chain(2), (1.0, 1.0), (), 40.0), (), sample_period=period)
+    runner = SampledRunner(observer, true_motion(chain(2), (1.0, 1.0), (), 40.0), (), sample_period=period)
     errors = []
     count = {0.1: 40, 0.8: 10}[period]
     for k in range(1, count + 1):
-        bench.sample(k * period)
-        errors.append(bench.error())
+        runner.sample(k * period)
+        errors.append(runner.error())
     # what is left of the settling of S, and of RK4 at 5 ms
     np.testing.assert_allclose(errors[-1], settled @ errors[-2], atol=2e-3 * float(np.abs(errors[-2]).max()))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sampled_bench import SampledBench, aperiodic_instants, true_motion
+from sampled_runner import SampledRunner, aperiodic_instants, true_motion
 from scipy.linalg import expm
 
 from fmu_observer.models.exhibits.pendulum_model import pendulum
@@ -21,14 +21,14 @@ REST = true_motion(pendulum(), (np.arcsin(TORQUE), 0.0), (TORQUE,), 20.0)  # whe
 
 
 def test_weights_of_the_estimate_let_the_error_die() -> None:
-    bench = SampledBench(TakagiSugenoPeriodic(), SWING, (TORQUE,))
-    bench.follow(0.1 * np.arange(1, 101))
-    assert np.abs(bench.error()).max() < 1e-6
+    runner = SampledRunner(TakagiSugenoPeriodic(), SWING, (TORQUE,))
+    runner.follow(0.1 * np.arange(1, 101))
+    assert np.abs(runner.error()).max() < 1e-6
 
 
 def test_frozen_weights_leave_an_error_while_the_pendulum_swings_and_none_at_rest() -> None:
     instants = aperiodic_instants(0, 0.3, 19.0)
-    swinging, resting = (SampledBench(TakagiSugenoAperiodic(), motion, (TORQUE,)) for motion in (SWING, REST))
+    swinging, resting = (SampledRunner(TakagiSugenoAperiodic(), motion, (TORQUE,)) for motion in (SWING, REST))
     swinging.follow(instants[instants < 6.0])
     assert 1e-6 < np.abs(swinging.error()).max() < 1e-2
     resting.follow(instants)
@@ -36,14 +36,14 @@ def test_frozen_weights_leave_an_error_while_the_pendulum_swings_and_none_at_res
 
 
 def test_weights_and_innovation_change_at_samples_only() -> None:
-    bench = SampledBench(TakagiSugenoAperiodic(), SWING, (TORQUE,))
-    bench.sample(0.3)
-    held = bench.runtime.x[2:].copy()
+    runner = SampledRunner(TakagiSugenoAperiodic(), SWING, (TORQUE,))
+    runner.sample(0.3)
+    held = runner.runtime.x[2:].copy()
     assert held[1] + held[2] == pytest.approx(1.0, abs=1e-15)
-    bench.runtime.advance(0.7)
-    np.testing.assert_array_equal(bench.runtime.x[2:], held)
-    bench.sample(0.71)
-    assert np.all(bench.runtime.x[2:5] != held[:3])
+    runner.runtime.advance(0.7)
+    np.testing.assert_array_equal(runner.runtime.x[2:], held)
+    runner.sample(0.71)
+    assert np.all(runner.runtime.x[2:5] != held[:3])
 
 
 def test_the_flow_uses_the_frozen_weights() -> None:
@@ -58,10 +58,10 @@ def test_the_flow_uses_the_frozen_weights() -> None:
 def test_the_correction_pulls_towards_the_measurement() -> None:
     """The repaired sign: an angle measured above the estimate raises it."""
     for make in (TakagiSugenoPeriodic, TakagiSugenoAperiodic):
-        bench = SampledBench(make(), SWING, (TORQUE,))
-        bench.sample(0.1)
-        bench.runtime.advance(0.15)
-        assert abs(bench.error()[0]) < abs((-SWING(0.15))[0])
+        runner = SampledRunner(make(), SWING, (TORQUE,))
+        runner.sample(0.1)
+        runner.runtime.advance(0.15)
+        assert abs(runner.error()[0]) < abs((-SWING(0.15))[0])
 
 
 @settings(max_examples=40)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observer_bench import Bench
+from observer_runner import SystemRunner
 from scipy.integrate import solve_ivp
 
 from fmu_observer.certificates.bounds.carried import unpacked
@@ -78,16 +78,16 @@ def test_ten_thousand_runs_never_break_a_bound(bound_runs: Any, preset: str) -> 
 # -- equations --------------------------------------------------------------------------------------------------------
 
 
-def followed(bench: Bench, v: Any, effort: float, until: float, faults: Any = lambda _t: False) -> None:
+def followed(runner: SystemRunner, v: Any, effort: float, until: float, faults: Any = lambda _t: False) -> None:
     """Samples every 0.2 s, each reading the speed of its instant."""
-    bench.set("u", {"effort": effort})
+    runner.set("u", {"effort": effort})
     for k in range(round(until / 0.2)):
-        t = bench.runtime.t + 0.2 if k else bench.runtime.t
-        bench.set("u", {"odometer": v(t), "odometer_fault": float(faults(t))})
+        t = runner.runtime.t + 0.2 if k else runner.runtime.t
+        runner.set("u", {"odometer": v(t), "odometer_fault": float(faults(t))})
         if k:
-            bench.runtime.advance(t)
+            runner.runtime.advance(t)
         else:
-            bench.runtime.start(0.0)
+            runner.runtime.start(0.0)
 
 
 @BOTH
@@ -95,13 +95,13 @@ def followed(bench: Bench, v: Any, effort: float, until: float, faults: Any = la
 def test_the_equations_are_those_of_the_thesis(make: Any, preset: str) -> None:
     """(4.2) by SciPy over one gap, with ``K(y_k)`` and ``K(v)``, and the level of the carried bound beside it."""
     observer = make()
-    bench = Bench(observer, preset=preset)
-    p = observer.unpack_parameters(bench.runtime.p)
-    bench.runtime.x[1:4] = 20.4, 0.2, -0.03
+    runner = SystemRunner(observer, preset=preset)
+    p = observer.unpack_parameters(runner.runtime.p)
+    runner.runtime.x[1:4] = 20.4, 0.2, -0.03
     effort = 0.8 * float(p.mass)
-    bench.set("u", {"effort": effort, "odometer": 20.0})
-    bench.runtime.start(0.0)
-    level = bench.state("bound_level")
+    runner.set("u", {"effort": effort, "odometer": 20.0})
+    runner.runtime.start(0.0)
+    level = runner.state("bound_level")
     P = np.array([[p.lyapunov_matrix[i] for i in row] for row in ((0, 1, 2), (1, 3, 4), (2, 4, 5))])
     error = 0.4 + float(p.odometer_error)
     box = [np.array([error, s * 2.2, q * 1.03]) for s in (1, -1) for q in (1, -1)]
@@ -123,28 +123,29 @@ def test_the_equations_are_those_of_the_thesis(make: Any, preset: str) -> None:
         return [v, *slowing, reading + sizes - p.bound_decay * W, told]
 
     expected = solve_ivp(flow, (0.0, 0.15), [0.0, 20.4, 0.2, -0.03, level, 0.0], rtol=1e-11, atol=1e-13).y[:, -1]
-    bench.runtime.advance(0.15)
+    runner.runtime.advance(0.15)
     # fourth order at 1 ms; the bound by the reading has a corner in it
-    np.testing.assert_allclose(bench.runtime.x[:6], expected, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(runner.runtime.x[:6], expected, rtol=1e-9, atol=1e-7)
 
 
 def test_both_are_one_observer_for_a_gain_that_follows_no_speed() -> None:
-    benches = [
-        Bench(make(), preset="as_published") for make in (DiscreteMeasurementObserver, ContinuousDiscreteObserver)
+    runners = [
+        SystemRunner(make(), preset="as_published")
+        for make in (DiscreteMeasurementObserver, ContinuousDiscreteObserver)
     ]
-    for bench in benches:
-        bench.runtime.x[1] = 14.1
-        followed(bench, lambda t: 14.0 - 0.9 * t, -0.5, 4.0)
-    np.testing.assert_array_equal(benches[0].runtime.x, benches[1].runtime.x)
+    for runner in runners:
+        runner.runtime.x[1] = 14.1
+        followed(runner, lambda t: 14.0 - 0.9 * t, -0.5, 4.0)
+    np.testing.assert_array_equal(runners[0].runtime.x, runners[1].runtime.x)
 
 
 def test_what_is_printed_starts_anew_at_each_sample() -> None:
-    bench = Bench(DiscreteMeasurementObserver(), preset="as_published_set_d", published_sample_error=0.0)
-    followed(bench, lambda _t: 20.0, 0.5, 1.0)
+    runner = SystemRunner(DiscreteMeasurementObserver(), preset="as_published_set_d", published_sample_error=0.0)
+    followed(runner, lambda _t: 20.0, 0.5, 1.0)
     found = []
     for k in range(2):
-        bench.runtime.advance(0.999 + 0.2 * k)
-        found.append(bench.outputs()["error_as_printed"])
+        runner.runtime.advance(0.999 + 0.2 * k)
+        found.append(runner.outputs()["error_as_printed"])
     # 0.325 m/s of specs, of (4.19) with beta 1.9 for 1.90938, 1 ms before the sample; w1 (y_k) for w1
     assert found[0] == pytest.approx(0.325, rel=0.02)
     assert found[0] == pytest.approx(found[1], rel=1e-9)
@@ -157,9 +158,9 @@ def test_what_is_printed_starts_anew_at_each_sample() -> None:
 @pytest.mark.parametrize("missing", ["held", "predicted"])
 def test_a_sample_that_lies_is_not_used_and_the_bound_grows(make: Any, missing: str) -> None:
     speed = lambda t: 25.0 - 0.9 * t  # noqa: E731
-    honest, jammed = Bench(make(missing=missing)), Bench(make(missing=missing))
-    for bench in (honest, jammed):
-        bench.runtime.x[1] = 25.0
+    honest, jammed = SystemRunner(make(missing=missing)), SystemRunner(make(missing=missing))
+    for runner in (honest, jammed):
+        runner.runtime.x[1] = 25.0
     followed(honest, speed, -0.7 * 9e4, 6.0)
     followed(jammed, lambda t: speed(t) if t < 4.0 else 3.0, -0.7 * 9e4, 6.0, lambda t: t > 3.9)
     after, lost = honest.outputs(), jammed.outputs()
@@ -176,33 +177,33 @@ def test_a_sample_that_lies_is_not_used_and_the_bound_grows(make: Any, missing: 
 @BOTH
 def test_a_prediction_goes_on_by_a_disturbance_whose_rate_decays(make: Any) -> None:
     """From the sample before on, with what is not measured limited, against closed form; the level by SciPy."""
-    bench = Bench(make(), disturbance_max=0.3, davis_a=0.0, davis_b=0.0, davis_c=0.0, odometer_error=0.0)
-    p = bench.system.unpack_parameters(bench.runtime.p)
-    bench.set("u", {"odometer": 40.0})
-    bench.runtime.x[1] = 40.0
-    bench.runtime.start(0.0)
-    bench.runtime.x[2:4] = 5.0, 3.0  # what a reading that lies has taught
-    bench.set("x", {"last_disturbance": 0.4, "last_disturbance_rate": -0.2})
-    bench.runtime.advance(0.199)
-    bench.set("u", {"odometer_fault": 1.0, "odometer": 3.0})
-    before, taught = bench.state("bound_level"), bench.runtime.x[2:4].copy()
-    bench.runtime.advance(0.2)
+    runner = SystemRunner(make(), disturbance_max=0.3, davis_a=0.0, davis_b=0.0, davis_c=0.0, odometer_error=0.0)
+    p = runner.system.unpack_parameters(runner.runtime.p)
+    runner.set("u", {"odometer": 40.0})
+    runner.runtime.x[1] = 40.0
+    runner.runtime.start(0.0)
+    runner.runtime.x[2:4] = 5.0, 3.0  # what a reading that lies has taught
+    runner.set("x", {"last_disturbance": 0.4, "last_disturbance_rate": -0.2})
+    runner.runtime.advance(0.199)
+    runner.set("u", {"odometer_fault": 1.0, "odometer": 3.0})
+    before, taught = runner.state("bound_level"), runner.runtime.x[2:4].copy()
+    runner.runtime.advance(0.2)
     P, instants = unpacked(p.lyapunov_matrix), (0.5, 3.0, 34.8)
-    assert tuple(bench.runtime.x[2:4]) == (0.3, -0.2)
+    assert tuple(runner.runtime.x[2:4]) == (0.3, -0.2)
     jump = np.array([0.0, *(taught - (0.3, -0.2))])
-    assert bench.state("bound_level") - before == pytest.approx(np.sqrt(jump @ P @ jump), rel=1e-2)  # of 1 ms
-    t0, v0, way0, level0 = bench.runtime.t, bench.runtime.x[1], bench.runtime.x[0], bench.state("bound_level")
+    assert runner.state("bound_level") - before == pytest.approx(np.sqrt(jump @ P @ jump), rel=1e-2)  # of 1 ms
+    t0, v0, way0, level0 = runner.runtime.t, runner.runtime.x[1], runner.runtime.x[0], runner.state("bound_level")
     levels = []
     for s in instants:
-        bench.runtime.advance(t0 + s)
-        levels.append(bench.state("bound_level"))
+        runner.runtime.advance(t0 + s)
+        levels.append(runner.state("bound_level"))
         T, left = float(p.rate_decay_time), 1.0 - np.exp(-s / float(p.rate_decay_time))
         d = 0.3 - 0.2 * T * left
         v = v0 - 0.3 * s + 0.2 * T * (s - T * left)
         way = v0 * s - 0.15 * s * s + 0.2 * T * (0.5 * s * s - T * (s - T * left))
-        assert bench.runtime.x[2] == pytest.approx(d, rel=1e-9)
-        assert bench.runtime.x[1] == pytest.approx(v, rel=1e-9)
-        assert bench.runtime.x[0] - way0 == pytest.approx(way, rel=1e-9)
+        assert runner.runtime.x[2] == pytest.approx(d, rel=1e-9)
+        assert runner.runtime.x[1] == pytest.approx(v, rel=1e-9)
+        assert runner.runtime.x[0] - way0 == pytest.approx(way, rel=1e-9)
     sizes = np.sqrt(np.diag(P)) @ (p.unknown_acceleration, p.unknown_jerk, p.unknown_jerk_rate)
     gain = np.sqrt(np.asarray(p.gain) @ P @ np.asarray(p.gain))
 
@@ -219,10 +220,10 @@ def test_a_prediction_goes_on_by_a_disturbance_whose_rate_decays(make: Any) -> N
 @BOTH
 def test_a_fault_told_for_long_loses_neither_speed_nor_bound(make: Any) -> None:
     """A reading that lies is used once; then the detector says for 35 s that the odometer lies."""
-    bench, true = Bench(make()), lambda t: 22.0 + 0.05 * t
-    bench.runtime.x[1] = 22.0
-    followed(bench, lambda t: true(t) - 5.0 * (9.9 < t < 10.1), 900.0 + 0.05 * 9e4, 45.0, lambda t: t > 10.1)
-    out = bench.outputs()
+    runner, true = SystemRunner(make()), lambda t: 22.0 + 0.05 * t
+    runner.runtime.x[1] = 22.0
+    followed(runner, lambda t: true(t) - 5.0 * (9.9 < t < 10.1), 900.0 + 0.05 * 9e4, 45.0, lambda t: t > 10.1)
+    out = runner.outputs()
     assert abs(out["speed"] - true(45.0)) < min(out["error_bound"], 6.0)  # 4 m/s were taught by the lie
     assert abs(out["disturbance"]) < 0.1
 
@@ -231,13 +232,13 @@ def test_a_fault_told_for_long_loses_neither_speed_nor_bound(make: Any) -> None:
 def test_a_disturbance_that_brakes_never_pushes_back(make: Any) -> None:
     """The estimate stands while the train goes on at 3 m/s; what holds it, 1 m/s2, is carried by the bound."""
     nothing = dict.fromkeys(("odometer_error", "unknown_acceleration", "unknown_jerk_rate"), 0.0)
-    bench = Bench(make(), davis_a=0.0, davis_b=0.0, davis_c=0.0, **nothing)
-    p = bench.system.unpack_parameters(bench.runtime.p)
-    bench.set("u", {"odometer": 3.0})
-    bench.runtime.start(0.0)
-    bench.runtime.x[1:4] = 0.0, 1.0, 0.0
-    bench.set("x", {"last_disturbance": 1.0, "bound_level": 0.1, "predicting": 1.0})
-    bench.set("u", {"odometer_fault": 1.0})
+    runner = SystemRunner(make(), davis_a=0.0, davis_b=0.0, davis_c=0.0, **nothing)
+    p = runner.system.unpack_parameters(runner.runtime.p)
+    runner.set("u", {"odometer": 3.0})
+    runner.runtime.start(0.0)
+    runner.runtime.x[1:4] = 0.0, 1.0, 0.0
+    runner.set("x", {"last_disturbance": 1.0, "bound_level": 0.1, "predicting": 1.0})
+    runner.set("u", {"odometer_fault": 1.0})
     P = unpacked(p.lyapunov_matrix)
     gain = np.sqrt(np.asarray(p.gain) @ P @ np.asarray(p.gain))
 
@@ -245,18 +246,18 @@ def test_a_disturbance_that_brakes_never_pushes_back(make: Any) -> None:
         told = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], 3.0 + 1.7 * t)
         return np.array([gain * told + np.sqrt(P[0, 0]) * 1.0 - p.bound_decay * W[0]])
 
-    bench.runtime.advance(1.0)
-    assert bench.outputs()["speed"] == 0.0
+    runner.runtime.advance(1.0)
+    assert runner.outputs()["speed"] == 0.0
     expected = solve_ivp(rate, (0.0, 1.0), [0.1], rtol=1e-10, atol=1e-12).y[0, -1]
-    assert bench.state("bound_level") == pytest.approx(expected, rel=1e-6)
+    assert runner.state("bound_level") == pytest.approx(expected, rel=1e-6)
 
 
 @BOTH
 def test_without_a_first_sample_the_bound_is_that_of_the_start(make: Any) -> None:
-    bench = Bench(make(), start_speed_error=6.0)
-    bench.runtime.x[1] = 20.0
-    followed(bench, lambda _t: 99.0, 0.0, 0.4, lambda _t: True)
-    out = bench.outputs()
+    runner = SystemRunner(make(), start_speed_error=6.0)
+    runner.runtime.x[1] = 20.0
+    followed(runner, lambda _t: 99.0, 0.0, 0.4, lambda _t: True)
+    out = runner.outputs()
     assert out["speed"] == pytest.approx(20.0, abs=0.1)
     assert 6.0 < out["error_bound"] <= 6.0 + 1.7 * 0.2 + abs(out["speed"] - 20.0) + 1e-12
 
@@ -268,21 +269,21 @@ def test_bounds_hold_while_the_train_stops_and_starts_again(make: Any) -> None:
     def v(t: float) -> float:
         return max(5.0 - 1.0 * t, 0.0) if t < 8.0 else 0.8 * (t - 8.0)
 
-    bench = Bench(make(), odometer_error=0.0)
-    bench.runtime.x[1] = 5.0
+    runner = SystemRunner(make(), odometer_error=0.0)
+    runner.runtime.x[1] = 5.0
     worst = 0.0
     for k in range(60):
         t = 0.2 * k
-        bench.set("u", {"effort": 9e4 * (-1.0 if t < 8.0 else 0.8), "odometer": v(t)})
+        runner.set("u", {"effort": 9e4 * (-1.0 if t < 8.0 else 0.8), "odometer": v(t)})
         if k:
-            bench.runtime.advance(t)
+            runner.runtime.advance(t)
         else:
-            bench.runtime.start(0.0)
+            runner.runtime.start(0.0)
         for part in (0.05, 0.1, 0.15):
-            bench.runtime.advance(t + part)
-            out = bench.outputs()
+            runner.runtime.advance(t + part)
+            out = runner.outputs()
             worst = max(worst, abs(out["speed"] - v(t + part)) / out["error_bound"])
-        bench.set("u", {"odometer": v(t + 0.2)})
+        runner.set("u", {"odometer": v(t + 0.2)})
     assert 0.05 < worst <= 1.0
 
 
@@ -292,17 +293,17 @@ def test_a_standstill_ends_what_is_carried(make: Any) -> None:
     at 50 readings a second, does not cover that; from there on it begins anew.
     """
     sharp = {"unknown_acceleration": 0.0, "unknown_jerk_rate": 0.0, "odometer_error": 0.0}
-    bench = Bench(make(), odometer_period=0.02, acceleration_max=1.1, **sharp)
+    runner = SystemRunner(make(), odometer_period=0.02, acceleration_max=1.1, **sharp)
     v = lambda t: max(10.0 - t, 0.0) if t < 14.0 else 1.0 * (t - 14.0)  # noqa: E731
-    bench.runtime.x[1] = 10.0
-    bench.set("u", {"odometer": 10.0})
-    bench.runtime.start(0.0)
+    runner.runtime.x[1] = 10.0
+    runner.set("u", {"odometer": 10.0})
+    runner.runtime.start(0.0)
     told = []
     for k in range(1, 2000):
         t = 0.01 * k
-        bench.set("u", {"odometer": v(t)})
-        bench.runtime.advance(t)
-        out = bench.outputs()
+        runner.set("u", {"odometer": v(t)})
+        runner.runtime.advance(t)
+        out = runner.outputs()
         error = abs(out["speed"] - v(t))
         told.append((error - 1e-9) / max(out["error_bound"], 1e-12))
     assert max(told) <= 1.0
@@ -310,13 +311,13 @@ def test_a_standstill_ends_what_is_carried(make: Any) -> None:
 
 
 def test_the_position_bound_starts_anew_at_a_balise() -> None:
-    bench = Bench(DiscreteMeasurementObserver(), start_position_error=3.0)
-    bench.runtime.x[1] = 20.0
-    followed(bench, lambda _t: 20.0, 0.0, 2.0)
-    assert bench.outputs()["position_bound"] > 3.0
-    bench.set("u", {"balise_location_accuracy": 1.5})
-    bench.balise(40.0)
-    out = bench.outputs()
+    runner = SystemRunner(DiscreteMeasurementObserver(), start_position_error=3.0)
+    runner.runtime.x[1] = 20.0
+    followed(runner, lambda _t: 20.0, 0.0, 2.0)
+    assert runner.outputs()["position_bound"] > 3.0
+    runner.set("u", {"balise_location_accuracy": 1.5})
+    runner.balise(40.0)
+    out = runner.outputs()
     assert (out["position"], out["position_bound"]) == (40.0, 1.5)
     assert out["innovation"] == pytest.approx(-4.0, abs=0.5)  # sampled 1.8 s long
 

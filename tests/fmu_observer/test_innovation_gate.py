@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import MASS, Bench, SteadyMotion
+from observer_runner import MASS, SteadyMotion, SystemRunner
 
 from fmu_observer import OBSERVERS
 from fmu_observer.formulas.filtering.kalman import correct
@@ -52,26 +52,26 @@ def own_count(system: GatedObserver) -> int:
     return scalar_names(system.states).index(GATE_MEMORY[0].name)
 
 
-def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **parameters: float) -> Bench:
+def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **parameters: float) -> SystemRunner:
     """An observer that believes the steady motion, and whose gate has settled."""
     system = make()
-    bench = Bench(system, preset=PRESETS.get(system.name), gate=gate, **parameters)
+    runner = SystemRunner(system, preset=PRESETS.get(system.name), gate=gate, **parameters)
     names = scalar_names(system.states)
     v, inputs = MOTION.speed, scalar_names(system.input_signals)
     exact = {"estimated_speed": v, "wheel_rate": v / 0.575, "wheel_speed_estimate": v, "odometer_speed": v}
     exact |= {TOLD_BY_PACKETS: v}
     exact |= {"adhesion_deceleration": -(0.575**2) / 225.0 * MOTION.effort(0.0)}
-    bench.set("x", {name: value for name, value in exact.items() if name in names})
+    runner.set("x", {name: value for name, value in exact.items() if name in names})
     fed = {
         "effort": effort_for(system),
         "odometer": v,
         "measured_odometer": v,
         "net_effort": MOTION.effort(0.0) - 900.0,
     }
-    bench.set("u", {name: value for name, value in fed.items() if name in inputs})
-    bench.runtime.start(0.0)
-    run(bench, 5)
-    return bench
+    runner.set("u", {name: value for name, value in fed.items() if name in inputs})
+    runner.runtime.start(0.0)
+    run(runner, 5)
+    return runner
 
 
 def effort_for(system: GatedObserver) -> float:
@@ -80,18 +80,18 @@ def effort_for(system: GatedObserver) -> float:
     return MOTION.effort(0.0) * (masses[0] / MASS if masses else 1.0)
 
 
-def run(bench: Bench, count: int, offsets: dict[int, float] | None = None) -> list[int]:
+def run(runner: SystemRunner, count: int, offsets: dict[int, float] | None = None) -> list[int]:
     """Pass balises, some of them off by so much [m]; the verdicts."""
     verdicts = []
     for k in range(count):
-        bench.runtime.advance(bench.runtime.t + GAP)
-        bench.set("u", {"balise_position": MOTION.position(bench.runtime.t) + (offsets or {}).get(k, 0.0)})
-        verdicts.append(bench.runtime.trigger("balise"))
+        runner.runtime.advance(runner.runtime.t + GAP)
+        runner.set("u", {"balise_position": MOTION.position(runner.runtime.t) + (offsets or {}).get(k, 0.0)})
+        verdicts.append(runner.runtime.trigger("balise"))
     return verdicts
 
 
-def error(bench: Bench, off: float = 0.0) -> float:
-    return abs(float(bench.runtime.x[0]) - MOTION.position(bench.runtime.t) - off)
+def error(runner: SystemRunner, off: float = 0.0) -> float:
+    return abs(float(runner.runtime.x[0]) - MOTION.position(runner.runtime.t) - off)
 
 
 # -- the judgement alone
@@ -267,11 +267,11 @@ def test_false_telegrams_are_ignored_and_change_nothing(make: Callable[[], Gated
 
 @every
 def test_warned_of_false_telegrams_are_used_as_with_the_gate_off(make: Callable[[], GatedObserver]) -> None:
-    benches = {name: bench_of(make, gate) for name, gate in GATES.items() if name != "reject"}
-    verdicts = {name: run(bench, 1, {0: 30.0}) for name, bench in benches.items()}
+    runners = {name: bench_of(make, gate) for name, gate in GATES.items() if name != "reject"}
+    verdicts = {name: run(runner, 1, {0: 30.0}) for name, runner in runners.items()}
     assert verdicts == {"off": [USED], "warn": [DOUBTED]}
     own = own_count(make())
-    np.testing.assert_array_equal(*(b.runtime.x[:own] for b in benches.values()))
+    np.testing.assert_array_equal(*(b.runtime.x[:own] for b in runners.values()))
 
 
 @every
@@ -282,34 +282,34 @@ def test_without_false_telegrams_the_gate_changes_no_bit(make: Callable[[], Gate
     noise = dict(enumerate(np.random.default_rng(seed).uniform(-0.05, 0.05, 12).tolist()))
     ends = []
     for gate in GATES.values():
-        bench = bench_of(make, gate)
-        assert run(bench, 12, noise) == [USED] * 12
-        ends.append(bench.runtime.x[:own].copy())
+        runner = bench_of(make, gate)
+        assert run(runner, 12, noise) == [USED] * 12
+        ends.append(runner.runtime.x[:own].copy())
     np.testing.assert_array_equal(ends[0], ends[1])
     np.testing.assert_array_equal(ends[0], ends[2])
 
 
 @every
 def test_a_wrong_estimate_recovers_from_telegrams_that_agree(make: Callable[[], GatedObserver]) -> None:
-    bench = bench_of(make)
+    runner = bench_of(make)
     off = dict.fromkeys(range(12), 50.0)  # the train is 50 m further than believed
-    assert run(bench, 2, off) == [IGNORED, DOUBTED]  # the second is believed, and the estimate restarts there
-    assert error(bench, 50.0) < 0.5
-    assert run(bench, 12, off) == [USED] * 12
-    assert error(bench, 50.0) < 0.2
+    assert run(runner, 2, off) == [IGNORED, DOUBTED]  # the second is believed, and the estimate restarts there
+    assert error(runner, 50.0) < 0.5
+    assert run(runner, 12, off) == [USED] * 12
+    assert error(runner, 50.0) < 0.2
 
 
 @every
 def test_false_telegrams_that_do_not_agree_are_never_believed(make: Callable[[], GatedObserver]) -> None:
-    bench = bench_of(make)
-    assert run(bench, 6, {k: 40.0 * (-1) ** k * (k + 1) for k in range(6)}) == [IGNORED] * 6
+    runner = bench_of(make)
+    assert run(runner, 6, {k: 40.0 * (-1) ** k * (k + 1) for k in range(6)}) == [IGNORED] * 6
 
 
 @every
 def test_a_false_telegram_told_twice_is_one(make: Callable[[], GatedObserver]) -> None:
-    bench = bench_of(make)
-    run(bench, 1, {0: 40.0})
-    assert [bench.runtime.trigger("balise") for _ in range(5)] == [IGNORED] * 5
+    runner = bench_of(make)
+    run(runner, 1, {0: 40.0})
+    assert [runner.runtime.trigger("balise") for _ in range(5)] == [IGNORED] * 5
 
 
 @pytest.mark.parametrize("name", [s.name for s in SYSTEMS])
@@ -317,35 +317,35 @@ def test_a_start_50_m_off_is_no_reason_to_doubt(name: str) -> None:
     ends = []
     for gate in (OFF, REJECT):
         system = MAKERS[name]()
-        bench = Bench(system, preset=PRESETS.get(name), gate=gate)
+        runner = SystemRunner(system, preset=PRESETS.get(name), gate=gate)
         fed = {"effort": effort_for(system), "odometer": MOTION.speed}
-        bench.set("u", {n: value for n, value in fed.items() if n in scalar_names(system.input_signals)})
-        bench.set("x", dict.fromkeys({TOLD_BY_PACKETS} & set(scalar_names(system.states)), MOTION.speed))
-        bench.runtime.x[:2] = -50.0, MOTION.speed
-        bench.runtime.start(0.0)
-        assert run(bench, 30) == [USED] * 30
-        ends.append(error(bench))
+        runner.set("u", {n: value for n, value in fed.items() if n in scalar_names(system.input_signals)})
+        runner.set("x", dict.fromkeys({TOLD_BY_PACKETS} & set(scalar_names(system.states)), MOTION.speed))
+        runner.runtime.x[:2] = -50.0, MOTION.speed
+        runner.runtime.start(0.0)
+        assert run(runner, 30) == [USED] * 30
+        ends.append(error(runner))
     assert ends[0] == ends[1] < 1.0
 
 
 def test_the_location_accuracy_widens_the_gate() -> None:
     for accuracy, expected in ((0.0, IGNORED), (10.0, USED)):
-        bench = bench_of(MAKERS["differentiator_cdo"])
-        bench.set("u", {"balise_location_accuracy": accuracy})
-        assert run(bench, 1, {0: 8.0}) == [expected]
+        runner = bench_of(MAKERS["differentiator_cdo"])
+        runner.set("u", {"balise_location_accuracy": accuracy})
+        assert run(runner, 1, {0: 8.0}) == [expected]
 
 
 def test_a_balise_that_does_not_act_is_not_judged() -> None:
     """Satellite fixes alone correct this one: what balises say neither restarts it nor counts."""
     system = OBSERVERS["augmented_high_gain_cdo"]()
-    bench = Bench(system, preset="gps", gate=REJECT)
-    bench.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
-    bench.set("x", {"gate_settled": 3.0})
-    bench.runtime.start(0.0)
-    before = float(bench.runtime.x[0])
-    assert run(bench, 8, dict.fromkeys(range(8), 500.0)) == [USED] * 8
-    assert (bench.state("gate_settled"), bench.state("gate_doubted"), bench.state("gate_recent")) == (3.0, 0.0, 0.0)
-    assert abs(float(bench.runtime.x[0]) - before) < 100.0
+    runner = SystemRunner(system, preset="gps", gate=REJECT)
+    runner.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
+    runner.set("x", {"gate_settled": 3.0})
+    runner.runtime.start(0.0)
+    before = float(runner.runtime.x[0])
+    assert run(runner, 8, dict.fromkeys(range(8), 500.0)) == [USED] * 8
+    assert (runner.state("gate_settled"), runner.state("gate_doubted"), runner.state("gate_recent")) == (3.0, 0.0, 0.0)
+    assert abs(float(runner.runtime.x[0]) - before) < 100.0
 
 
 @every
@@ -358,10 +358,10 @@ def test_python_and_traced_code_judge_alike(make: Callable[[], GatedObserver]) -
     np.testing.assert_allclose(traced.runtime.x, python.runtime.x, rtol=1e-10, atol=1e-10)
 
 
-def _in_python(bench: Bench) -> Runtime:
+def _in_python(runner: SystemRunner) -> Runtime:
     """The same runtime, evaluated by NumPy."""
-    other = Runtime(bench.system, NumpyKernel(bench.system))
-    other.restore(bench.runtime.snapshot())
+    other = Runtime(runner.system, NumpyKernel(runner.system))
+    other.restore(runner.runtime.snapshot())
     return other
 
 
@@ -378,10 +378,10 @@ def _in_python(bench: Bench) -> Runtime:
     ],
 )
 def test_a_gate_that_cannot_be_is_refused(name: str, value: float, expected: str) -> None:
-    bench = Bench(OBSERVERS["differentiator_cdo"](), **{name: value})
+    runner = SystemRunner(OBSERVERS["differentiator_cdo"](), **{name: value})
     said = (
         rf"differentiator_cdo: time cannot run with these values: {name} must be .*{expected}.* \({name} = "
         rf"{value}\)"
     )
     with pytest.raises(ValueError, match=said):
-        bench.runtime.start(0.0)
+        runner.runtime.start(0.0)

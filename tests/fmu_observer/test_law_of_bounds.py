@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observer_bench import Bench
+from observer_runner import SystemRunner
 
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.bounds.worst_case import worst_case
@@ -51,10 +51,10 @@ def run(name: str, preset: str, acceleration: Callable[[float], float]) -> dict[
     """The largest share that an error takes of each bound, in a run from true estimates of the start."""
     observer: Any = OBSERVERS[name]()
     told = {"unknown_acceleration": ROUGH, "start_position_error": 0.0}
-    bench = Bench(observer, preset=preset, **told)
-    p = observer.unpack_parameters(bench.runtime.p)
+    runner = SystemRunner(observer, preset=preset, **told)
+    p = observer.unpack_parameters(runner.runtime.p)
     speed, position = 24.0, 0.0
-    bench.runtime.x[1] = speed
+    runner.runtime.x[1] = speed
     shares = dict.fromkeys(bounds_of(name), 0.0)
     period = round(float(p.odometer_period) / STEP)
     for k in range(round(SECONDS / STEP)):
@@ -63,15 +63,15 @@ def run(name: str, preset: str, acceleration: Callable[[float], float]) -> dict[
             rate = abs(rate) if speed < 20.0 else -abs(rate)
         middle = speed + 0.5 * rate * STEP
         effort = float(p.mass) * (rate + (p.davis_a + p.davis_b * middle + p.davis_c * middle**2) / float(p.mass))
-        bench.set("u", {"effort": effort, "odometer": speed})
+        runner.set("u", {"effort": effort, "odometer": speed})
         if k == 0:
-            bench.runtime.start(0.0)
+            runner.runtime.start(0.0)
         position += speed * STEP + 0.5 * rate * STEP**2
         speed += rate * STEP
         if (k + 1) % period == 0:
-            bench.set("u", {"odometer": speed})  # what is sampled at the end of the step
-        bench.runtime.advance((k + 1) * STEP)
-        found = bench.outputs()
+            runner.set("u", {"odometer": speed})  # what is sampled at the end of the step
+        runner.runtime.advance((k + 1) * STEP)
+        found = runner.outputs()
         for bound, of in bounds_of(name).items():
             error = abs(found[of] - {"speed": speed, "position": position}[of])
             # the observer's own integration: fourth order at 5 ms

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from generic_bench import sampled_run
+from generic_runner import sampled_run
 from scipy import stats
 
 from fmu_observer.formulas.filtering import ensemble, particles

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from observer_bench import INERTIA, RADIUS, Bench, SteadyMotion
+from observer_runner import INERTIA, RADIUS, SteadyMotion, SystemRunner
 
 from fmu_observer.formulas.differentiation.differentiator import (
     differentiator_flow,
@@ -91,14 +91,14 @@ def test_signed_power() -> None:
 def test_chatter_of_the_adhesion_force_at_the_internal_step(jerk_bound: float) -> None:
     """The bound the class states for the Runge-Kutta step on the discontinuous equations: (J / r^2) jerk_bound h."""
     motion = SteadyMotion(speed=10.0)
-    bench = Bench(DifferentiatorCdo(), jerk_bound=jerk_bound)
-    bench.set("x", {"wheel_rate": motion.speed / RADIUS})
-    bench.set("u", {"effort": motion.effort(0.0), "odometer": motion.speed})
-    bench.set("x", {"wheel_acceleration": 0.1})  # a small error to start the chatter from
-    bench.runtime.start(0.0)
-    bench.runtime.advance(5.0)
+    runner = SystemRunner(DifferentiatorCdo(), jerk_bound=jerk_bound)
+    runner.set("x", {"wheel_rate": motion.speed / RADIUS})
+    runner.set("u", {"effort": motion.effort(0.0), "odometer": motion.speed})
+    runner.set("x", {"wheel_acceleration": 0.1})  # a small error to start the chatter from
+    runner.runtime.start(0.0)
+    runner.runtime.advance(5.0)
     errors = []
     for k in range(2000):
-        bench.runtime.advance(5.0 + 0.001 * (k + 1))
-        errors.append(bench.outputs()["adhesion_force"] - motion.adhesion_force(0.0))
+        runner.runtime.advance(5.0 + 0.001 * (k + 1))
+        errors.append(runner.outputs()["adhesion_force"] - motion.adhesion_force(0.0))
     assert np.abs(errors).max() <= INERTIA / RADIUS**2 * jerk_bound * 1e-3

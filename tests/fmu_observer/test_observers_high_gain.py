@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from observer_bench import DAVIS_A, DAVIS_B, DAVIS_C, MASS, SteadyMotion, in_step
+from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, MASS, SteadyMotion, in_step
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
@@ -55,11 +55,11 @@ def output_predictor(drift: Drift, gain: np.ndarray) -> np.ndarray:
 
 
 def observed(observer: TrainObserver) -> np.ndarray:
-    bench = in_step(observer, MOTION)
-    bench.set("x", {"estimated_position": START[0], "estimated_speed": START[1]})
-    bench.runtime.start(0.0)
-    bench.follow(MOTION, GAPS)
-    return np.array([bench.state("estimated_position"), bench.state("estimated_speed")])
+    runner = in_step(observer, MOTION)
+    runner.set("x", {"estimated_position": START[0], "estimated_speed": START[1]})
+    runner.runtime.start(0.0)
+    runner.follow(MOTION, GAPS)
+    return np.array([runner.state("estimated_position"), runner.state("estimated_speed")])
 
 
 @pytest.mark.parametrize("make", [DifferentiatorCdo, MultirateCdo], ids=lambda m: m.name)

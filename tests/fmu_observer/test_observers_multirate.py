@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from observer_bench import SteadyMotion, in_step
+from observer_runner import SteadyMotion, in_step
 
 from fmu_observer.observers.train import MultirateCdo
 from plant_models.hybrid import scalar_names
@@ -11,36 +11,36 @@ MOTION = SteadyMotion(speed=20.0)
 
 
 def test_the_odometer_is_read_at_its_period_only() -> None:
-    bench = in_step(MultirateCdo(), MOTION)
-    bench.runtime.start(0.0)
-    bench.runtime.advance(0.11)
-    bench.set("u", {"odometer": 25.0})
-    bench.runtime.advance(0.19)
-    assert abs(bench.state("odometer_innovation")) < 1e-9
-    bench.runtime.advance(0.2)
-    assert bench.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
+    runner = in_step(MultirateCdo(), MOTION)
+    runner.runtime.start(0.0)
+    runner.runtime.advance(0.11)
+    runner.set("u", {"odometer": 25.0})
+    runner.runtime.advance(0.19)
+    assert abs(runner.state("odometer_innovation")) < 1e-9
+    runner.runtime.advance(0.2)
+    assert runner.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
 
 
 def test_the_odometer_period_is_a_parameter() -> None:
-    bench = in_step(MultirateCdo(), MOTION)
-    bench.set("p", {"odometer_period": 0.25})
-    bench.runtime.start(0.0)
-    bench.set("u", {"odometer": 25.0})
-    bench.runtime.advance(0.249)
-    assert abs(bench.state("odometer_innovation")) < 1e-9
-    bench.runtime.advance(0.25)
-    assert bench.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
+    runner = in_step(MultirateCdo(), MOTION)
+    runner.set("p", {"odometer_period": 0.25})
+    runner.runtime.start(0.0)
+    runner.set("u", {"odometer": 25.0})
+    runner.runtime.advance(0.249)
+    assert abs(runner.state("odometer_innovation")) < 1e-9
+    runner.runtime.advance(0.25)
+    assert runner.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
 
 
 def test_a_balise_leaves_the_wheel_stage_alone() -> None:
-    bench = in_step(MultirateCdo(), MOTION)
-    bench.runtime.start(0.0)
-    before = bench.runtime.x.copy()
-    bench.balise(-3.0)
-    changed = np.flatnonzero(bench.runtime.x != before)
-    names = [list(scalar_names(bench.runtime.system.states))[i] for i in changed]
+    runner = in_step(MultirateCdo(), MOTION)
+    runner.runtime.start(0.0)
+    before = runner.runtime.x.copy()
+    runner.balise(-3.0)
+    changed = np.flatnonzero(runner.runtime.x != before)
+    names = [list(scalar_names(runner.runtime.system.states))[i] for i in changed]
     assert [name for name in names if not name.startswith("gate")] == ["balise_innovation"]
-    assert bench.outputs()["innovation"] == 3.0
+    assert runner.outputs()["innovation"] == 3.0
 
 
 def test_the_wheel_stage_alone_decides_nothing_about_balises_but_can_spoil_the_certificate() -> None:

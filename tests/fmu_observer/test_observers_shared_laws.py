@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import TRAIN_OBSERVERS, Bench, SteadyMotion, random_gaps, started
+from observer_runner import TRAIN_OBSERVERS, SteadyMotion, SystemRunner, random_gaps, started
 
 from fmu_observer import OBSERVERS
 from fmu_observer.detection import SlipIndicator
@@ -43,21 +43,21 @@ def test_the_shared_signals_are_declared(make: Make) -> None:
 
 @every_observer
 def test_it_starts_from_the_wrong_start_of_the_thesis(make: Make) -> None:
-    bench = Bench(make())  # before the start: an odometer sample at time zero already corrects
-    assert (bench.outputs()["position"], bench.outputs()["speed"]) == (0.0, 1.0)
+    runner = SystemRunner(make())  # before the start: an odometer sample at time zero already corrects
+    assert (runner.outputs()["position"], runner.outputs()["speed"]) == (0.0, 1.0)
 
 
 @every_observer
 def test_redo_after_restore_is_bit_identical(make: Make) -> None:
-    bench = started(make(), MOTION)
-    bench.follow(MOTION, random_gaps(1, 0.5, 5), feed=0.01)
-    snapshot = bench.runtime.snapshot()
-    bench.follow(MOTION, random_gaps(2, 0.5, 5), feed=0.01)
-    first = bench.runtime.x.copy()
-    bench.follow(MOTION, [0.3], feed=0.01)
-    bench.runtime.restore(snapshot)
-    bench.follow(MOTION, random_gaps(2, 0.5, 5), feed=0.01)
-    np.testing.assert_array_equal(bench.runtime.x, first)
+    runner = started(make(), MOTION)
+    runner.follow(MOTION, random_gaps(1, 0.5, 5), feed=0.01)
+    snapshot = runner.runtime.snapshot()
+    runner.follow(MOTION, random_gaps(2, 0.5, 5), feed=0.01)
+    first = runner.runtime.x.copy()
+    runner.follow(MOTION, [0.3], feed=0.01)
+    runner.runtime.restore(snapshot)
+    runner.follow(MOTION, random_gaps(2, 0.5, 5), feed=0.01)
+    np.testing.assert_array_equal(runner.runtime.x, first)
 
 
 @every_observer
@@ -65,21 +65,21 @@ def test_redo_after_restore_is_bit_identical(make: Make) -> None:
 @given(cuts=st.lists(st.integers(1, 399), max_size=6, unique=True))
 def test_splitting_a_step_on_the_grid_changes_nothing(make: Make, cuts: list[int]) -> None:
     whole, split = started(make(), MOTION), started(make(), MOTION)
-    for bench in (whole, split):
-        bench.follow(MOTION, [0.137])  # a stamp off the grid stays part of both histories
+    for runner in (whole, split):
+        runner.follow(MOTION, [0.137])  # a stamp off the grid stays part of both histories
     base = whole.runtime.t
     for k in sorted(cuts):
         split.runtime.advance(round(base + 0.001 * k, 3))
-    for bench in (whole, split):
-        bench.runtime.advance(0.537)
+    for runner in (whole, split):
+        runner.runtime.advance(0.537)
     np.testing.assert_array_equal(split.runtime.x, whole.runtime.x)
 
 
 @every_observer
 def test_the_traced_kernel_and_plain_numpy_agree(make: Make) -> None:
     traced, python = started(make(), MOTION), started(make(), MOTION, python=True)
-    for bench in (traced, python):
-        bench.follow(MOTION, random_gaps(3, 0.5, 3), feed=0.05)
+    for runner in (traced, python):
+        runner.follow(MOTION, random_gaps(3, 0.5, 3), feed=0.05)
     # The same operations in another order: rounding only, which the differentiator's sign may amplify by its chatter
     # (1e-9).
     np.testing.assert_allclose(traced.runtime.x, python.runtime.x, rtol=1e-9, atol=1e-9)
@@ -93,34 +93,34 @@ def test_the_traced_kernel_and_plain_numpy_agree(make: Make) -> None:
     ids=["rest", "held", "lock", "spin"],
 )
 def test_outputs_stay_finite_without_any_balise(make: Make, effort: float, odometer: float) -> None:
-    bench = Bench(make())
-    bench.runtime.x[1] = 15.0  # the speed, or the odometer speed, is the second state of every observer
-    bench.set("u", {"effort": effort, "odometer": odometer})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(30.0)
-    assert np.all(np.isfinite(list(bench.outputs().values())))
+    runner = SystemRunner(make())
+    runner.runtime.x[1] = 15.0  # the speed, or the odometer speed, is the second state of every observer
+    runner.set("u", {"effort": effort, "odometer": odometer})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(30.0)
+    assert np.all(np.isfinite(list(runner.outputs().values())))
 
 
 @every_observer
 def test_a_braked_train_is_held_at_rest_and_not_pushed_back(make: Make) -> None:
-    bench = started(make(), SteadyMotion(speed=0.0))
-    bench.set("u", {"effort": -60e3, "odometer": 0.0})
+    runner = started(make(), SteadyMotion(speed=0.0))
+    runner.set("u", {"effort": -60e3, "odometer": 0.0})
     for _ in range(40):
-        bench.runtime.advance(bench.runtime.t + 0.4)
-        bench.balise(0.0)
-    bench.runtime.advance(bench.runtime.t + 60.0)  # a minute without balises
-    assert abs(bench.outputs()["speed"]) < 1e-3  # [m/s], against 40 m/s backwards if the brake pushed
-    assert abs(bench.outputs()["position"]) < 0.01
+        runner.runtime.advance(runner.runtime.t + 0.4)
+        runner.balise(0.0)
+    runner.runtime.advance(runner.runtime.t + 60.0)  # a minute without balises
+    assert abs(runner.outputs()["speed"]) < 1e-3  # [m/s], against 40 m/s backwards if the brake pushed
+    assert abs(runner.outputs()["position"]) < 0.01
 
 
 @every_observer
 def test_wheel_lock_raises_the_indicator(make: Make) -> None:
-    bench = started(make(), SteadyMotion(speed=15.0))
-    bench.follow(SteadyMotion(speed=15.0), random_gaps(4, 0.5, 40))
-    assert bench.outputs()["slip_indicator"] == 1.0
-    bench.set("u", {"odometer": 0.0})
-    bench.runtime.advance(bench.runtime.t + 0.3)
-    assert bench.outputs()["slip_indicator"] == 2.0
+    runner = started(make(), SteadyMotion(speed=15.0))
+    runner.follow(SteadyMotion(speed=15.0), random_gaps(4, 0.5, 40))
+    assert runner.outputs()["slip_indicator"] == 1.0
+    runner.set("u", {"odometer": 0.0})
+    runner.runtime.advance(runner.runtime.t + 0.3)
+    assert runner.outputs()["slip_indicator"] == 2.0
 
 
 @every_observer

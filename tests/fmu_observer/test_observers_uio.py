@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from observer_bench import DAVIS_B, DAVIS_C, MASS, Bench
+from observer_runner import DAVIS_B, DAVIS_C, MASS, SystemRunner
 from scipy.linalg import expm
 
 from fmu_observer.design.uio_design import UioCovariances, discretise, uio_gains, uio_matrices
@@ -46,15 +46,15 @@ def test_the_printed_matrix_neither_matches_nor_is_observable() -> None:
 
 def test_the_observer_between_samples_is_the_discrete_model() -> None:
     observer = DiscreteUio()
-    bench = Bench(observer)
-    bench.runtime.start(0.0)
+    runner = SystemRunner(observer)
+    runner.runtime.start(0.0)
     x = np.array([3.0, 12.0, -0.4, 0.2, 0.05, -0.1])
-    bench.runtime.x[:6] = x
-    bench.set("u", {"effort": 40e3})
-    bench.runtime.advance(0.0999)
+    runner.runtime.x[:6] = x
+    runner.set("u", {"effort": 40e3})
+    runner.runtime.advance(0.0999)
     Ad, Bd = discretise(*uio_matrices(MASS, SLOPE), 0.0999)
     # RK4 is nearly exact here
-    np.testing.assert_allclose(bench.runtime.x[:6], Ad @ x + Bd * (40e3 - 900.0), atol=1e-11)
+    np.testing.assert_allclose(runner.runtime.x[:6], Ad @ x + Bd * (40e3 - 900.0), atol=1e-11)
 
 
 def test_declared_gains_are_those_of_the_design() -> None:
@@ -82,14 +82,14 @@ def test_the_design_is_the_stationary_kalman_filter() -> None:
 def test_a_balise_acts_at_its_own_stamp() -> None:
     """One balise between two odometer samples against the exact product of the linear maps."""
     observer = DiscreteUio()
-    bench = Bench(observer)
+    runner = SystemRunner(observer)
     x = np.array([1.0, 12.0, 0.3, 0.1, 0.0, 0.0])
-    bench.runtime.x[:6] = x
-    bench.set("u", {"odometer": 12.0, "effort": 900.0})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(0.0637)
-    bench.balise(0.9)
-    bench.runtime.advance(0.1)
+    runner.runtime.x[:6] = x
+    runner.set("u", {"odometer": 12.0, "effort": 900.0})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(0.0637)
+    runner.balise(0.9)
+    runner.runtime.advance(0.1)
     A, _ = uio_matrices(MASS, SLOPE)
     gains = {s.name: np.array(s.start) for s in observer.parameters}
     x = x - gains["odometer_gain"] * (x[1] - 12.0)
@@ -97,10 +97,10 @@ def test_a_balise_acts_at_its_own_stamp() -> None:
     x = x - gains["balise_gain"] * (x[0] - 0.9)
     x = expm(A * 0.0363) @ x
     x = x - gains["odometer_gain"] * (x[1] - 12.0)
-    np.testing.assert_allclose(bench.runtime.x[:6], x, atol=1e-11)
+    np.testing.assert_allclose(runner.runtime.x[:6], x, atol=1e-11)
 
 
 def test_speed_is_odometer_speed_plus_slip_speed() -> None:
-    bench = Bench(DiscreteUio())
-    bench.runtime.x[:3] = [0.0, 12.0, -0.25]
-    assert bench.outputs()["speed"] == 11.75
+    runner = SystemRunner(DiscreteUio())
+    runner.runtime.x[:3] = [0.0, 12.0, -0.25]
+    assert runner.outputs()["speed"] == 11.75

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from observer_bench import Bench
+from observer_runner import SystemRunner
 
 from fmu_observer.detection import SlipIndicator, indicator_level
 
 
 def settled(odometer: float, speed: float, **parameters: float) -> dict[str, float]:
-    bench = Bench(SlipIndicator(), **parameters)
-    bench.set("u", {"odometer": odometer, "speed": speed})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(4.0)  # twenty filter time constants
-    return bench.outputs()
+    runner = SystemRunner(SlipIndicator(), **parameters)
+    runner.set("u", {"odometer": odometer, "speed": speed})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(4.0)  # twenty filter time constants
+    return runner.outputs()
 
 
 @pytest.mark.parametrize(
@@ -32,30 +32,30 @@ def test_level_by_threshold_speed_and_lock(odometer: float, speed: float, level:
 
 
 def test_slip_output_is_not_filtered() -> None:
-    bench = Bench(SlipIndicator())
-    bench.set("u", {"odometer": 10.0, "speed": 8.0})
-    bench.runtime.start(0.0)
-    assert bench.outputs()["slip"] == pytest.approx(0.2, abs=1e-15)
-    assert bench.outputs()["slip_indicator"] == 1.0
+    runner = SystemRunner(SlipIndicator())
+    runner.set("u", {"odometer": 10.0, "speed": 8.0})
+    runner.runtime.start(0.0)
+    assert runner.outputs()["slip"] == pytest.approx(0.2, abs=1e-15)
+    assert runner.outputs()["slip_indicator"] == 1.0
 
 
 def test_the_filter_is_first_order() -> None:
-    bench = Bench(SlipIndicator(), slip_filter_time=0.2)
-    bench.set("u", {"odometer": 10.0, "speed": 9.0})
-    bench.runtime.start(0.0)
-    bench.runtime.advance(0.2)
+    runner = SystemRunner(SlipIndicator(), slip_filter_time=0.2)
+    runner.set("u", {"odometer": 10.0, "speed": 9.0})
+    runner.runtime.start(0.0)
+    runner.runtime.advance(0.2)
     # closed form; RK4 at a step of 1/200 of the time constant leaves 1e-13
-    assert bench.state("filtered_slip") == pytest.approx(0.1 * (1.0 - np.exp(-1.0)), abs=1e-12)
+    assert runner.state("filtered_slip") == pytest.approx(0.1 * (1.0 - np.exp(-1.0)), abs=1e-12)
 
 
 def test_a_chattering_odometer_does_not_chatter_the_indicator() -> None:
-    bench = Bench(SlipIndicator())
-    bench.runtime.start(0.0)
+    runner = SystemRunner(SlipIndicator())
+    runner.runtime.start(0.0)
     levels = []
     for k in range(2000):
-        bench.set("u", {"odometer": 10.0 + 0.3 * (-1) ** k, "speed": 10.0})
-        bench.runtime.advance((k + 1) * 0.001)
-        levels.append(bench.outputs()["slip_indicator"])
+        runner.set("u", {"odometer": 10.0 + 0.3 * (-1) ** k, "speed": 10.0})
+        runner.runtime.advance((k + 1) * 0.001)
+        levels.append(runner.outputs()["slip_indicator"])
     assert set(levels) == {1.0}  # the raw slip is 3 %, its filtered swing 0.01 %
 
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from observer_bench import Bench
+from observer_runner import SystemRunner
 from test_innovation_gate import GAP, MAKERS, MOTION, bench_of
 from test_kalman_filters import Vehicle
 
@@ -33,16 +33,16 @@ every = pytest.mark.parametrize("make", LAWFUL.values(), ids=LAWFUL)
 
 def caused(make: Callable[[], GatedObserver], accuracy: float) -> float:
     """Largest error of the position, until the next one, that a balise makes which is off and tells so much [m]."""
-    bench = bench_of(make, OFF)
-    bench.runtime.advance(bench.runtime.t + GAP)
-    place = MOTION.position(bench.runtime.t)
-    before = abs(float(bench.runtime.x[0]) - place)
-    bench.set("u", {"balise_position": place + OFFSET, "balise_location_accuracy": accuracy})
-    bench.runtime.trigger("balise")
+    runner = bench_of(make, OFF)
+    runner.runtime.advance(runner.runtime.t + GAP)
+    place = MOTION.position(runner.runtime.t)
+    before = abs(float(runner.runtime.x[0]) - place)
+    runner.set("u", {"balise_position": place + OFFSET, "balise_location_accuracy": accuracy})
+    runner.runtime.trigger("balise")
     largest = 0.0
     for _ in range(6):
-        largest = max(largest, abs(float(bench.runtime.x[0]) - MOTION.position(bench.runtime.t)) - before)
-        bench.runtime.advance(bench.runtime.t + GAP / 6.0)
+        largest = max(largest, abs(float(runner.runtime.x[0]) - MOTION.position(runner.runtime.t)) - before)
+        runner.runtime.advance(runner.runtime.t + GAP / 6.0)
     return largest
 
 
@@ -61,12 +61,12 @@ def test_an_accuracy_that_is_none_or_better_than_the_floor_changes_no_bit(
 ) -> None:
     ends = []
     for accuracy in (0.0, told):
-        bench = bench_of(make, OFF)
-        bench.runtime.advance(bench.runtime.t + GAP)
-        bench.set("u", {"balise_position": MOTION.position(bench.runtime.t), "balise_location_accuracy": accuracy})
-        bench.runtime.trigger("balise")
-        bench.runtime.advance(bench.runtime.t + GAP)
-        ends.append(bench.runtime.x[:2].copy())
+        runner = bench_of(make, OFF)
+        runner.runtime.advance(runner.runtime.t + GAP)
+        runner.set("u", {"balise_position": MOTION.position(runner.runtime.t), "balise_location_accuracy": accuracy})
+        runner.runtime.trigger("balise")
+        runner.runtime.advance(runner.runtime.t + GAP)
+        ends.append(runner.runtime.x[:2].copy())
     np.testing.assert_array_equal(*ends)
 
 
@@ -81,14 +81,14 @@ def test_filters_weigh_a_balise_by_its_variance(name: str, form: str) -> None:
     system = OBSERVERS[name](Vehicle(), outputs=["position", "speed"], arrival=["balise", "periodic"], form=form)
     ends = []
     for accuracy, deviation in ((20.0, 1e-2), (0.0, float(place_deviation(20.0, 1e-2)))):
-        bench = Bench(system, gate=OFF)
-        bench.set("p", {"measurement_covariance[1]": deviation**2, "measurement_covariance[4]": 1e-4})
-        bench.set("u", {"measured_speed": 10.0, "balise_location_accuracy": accuracy})
-        bench.runtime.start(0.0)
+        runner = SystemRunner(system, gate=OFF)
+        runner.set("p", {"measurement_covariance[1]": deviation**2, "measurement_covariance[4]": 1e-4})
+        runner.set("u", {"measured_speed": 10.0, "balise_location_accuracy": accuracy})
+        runner.runtime.start(0.0)
         for k in range(1, 6):
-            bench.runtime.advance(3.0 * k)
-            bench.balise(30.0 * k + 5.0)
-        ends.append(bench.runtime.update_outputs().copy())
+            runner.runtime.advance(3.0 * k)
+            runner.balise(30.0 * k + 5.0)
+        ends.append(runner.runtime.update_outputs().copy())
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9, atol=1e-9)  # rounding, of 30 additions
 
 
@@ -103,17 +103,17 @@ def test_what_a_told_accuracy_leaves_is_told_honestly() -> None:
     system, rng, v = OBSERVERS["adaptive_wheel_radius"](), np.random.default_rng(3), 20.0
     ratios = []
     for _ in range(150):
-        bench = Bench(system, gate=OFF, odometer_deviation=0.0, internal_step=0.1)
+        runner = SystemRunner(system, gate=OFF, odometer_deviation=0.0, internal_step=0.1)
         scale = float(rng.normal()) * PRIOR
-        bench.set("u", {"odometer": v / (1.0 + scale)})
-        bench.runtime.start(0.0)
+        runner.set("u", {"odometer": v / (1.0 + scale)})
+        runner.runtime.start(0.0)
         for k in range(1, 25):
-            bench.runtime.advance(15.0 * k)
+            runner.runtime.advance(15.0 * k)
             accuracy = (0.0, 20.0, 5.0)[k % 3]
             off = float(rng.uniform(-accuracy, accuracy) if accuracy > 0.0 else 0.5 * rng.normal())
-            bench.set("u", {"balise_location_accuracy": accuracy})
-            bench.balise(v * 15.0 * k + off)
-        told = bench.outputs()
+            runner.set("u", {"balise_location_accuracy": accuracy})
+            runner.balise(v * 15.0 * k + off)
+        told = runner.outputs()
         wrong = told["position"] - v * 15.0 * 24, told["wheel_radius_error"] - (1.0 / (1.0 + scale) - 1.0)
         ratios.append((wrong[0] / told["position_deviation"], wrong[1] / told["wheel_radius_error_deviation"]))
     rms = np.sqrt(np.mean(np.square(ratios), axis=0))
@@ -125,14 +125,14 @@ def test_the_position_bound_holds_with_balises_anywhere_in_their_accuracy(name: 
     rng, system = np.random.default_rng(7), OBSERVERS[name]()
     widths = []
     for accuracy in (0.0, 2.0, 12.0, 63.0) * 3:
-        bench = Bench(system, gate=OFF)
-        bench.set("u", {"odometer": MOTION.speed, "effort": MOTION.effort(0.0), "balise_location_accuracy": accuracy})
-        bench.set("x", {"estimated_speed": MOTION.speed, "held_speed": MOTION.speed})
-        bench.runtime.start(0.0)
+        runner = SystemRunner(system, gate=OFF)
+        runner.set("u", {"odometer": MOTION.speed, "effort": MOTION.effort(0.0), "balise_location_accuracy": accuracy})
+        runner.set("x", {"estimated_speed": MOTION.speed, "held_speed": MOTION.speed})
+        runner.runtime.start(0.0)
         for k in range(1, 8):
-            bench.runtime.advance(4.0 * k)
-            bench.balise(MOTION.position(4.0 * k) + float(rng.uniform(-accuracy, accuracy)))
-            told = bench.outputs()
+            runner.runtime.advance(4.0 * k)
+            runner.balise(MOTION.position(4.0 * k) + float(rng.uniform(-accuracy, accuracy)))
+            told = runner.outputs()
             assert abs(told["position"] - MOTION.position(4.0 * k)) <= told["position_bound"] + 1e-6  # of integration
         widths.append(told["position_bound"])
     assert widths[:4] == sorted(widths[:4])

@@ -157,7 +157,7 @@ def test_two_runs_part_by_the_transition_that_is_certified() -> None:
     observer, gap = GeneralTakagiSugenoCdo(TRAIN, "frozen"), 0.37
     ends = []
     for offset in (np.zeros(2), np.array([0.7, -0.4])):
-        runtime = bench(observer, measured_odometer=20.0, net_effort=3e4)
+        runtime = runner(observer, measured_odometer=20.0, net_effort=3e4)
         runtime.x[:2] = np.array([5.0, 19.0]) + offset
         runtime.trigger("balise")
         runtime.advance(gap)
@@ -173,7 +173,7 @@ def test_two_runs_part_by_the_transition_that_is_certified() -> None:
 # --------------------------------------------------------------------------------------------
 
 
-def bench(observer: GeneralTakagiSugenoCdo, **inputs: float) -> Runtime:
+def runner(observer: GeneralTakagiSugenoCdo, **inputs: float) -> Runtime:
     runtime = Runtime(observer)
     for name, value in inputs.items():
         runtime.u[scalar_names(observer.input_signals).index(name)] = value
@@ -187,7 +187,7 @@ def outputs(runtime: Runtime) -> dict[str, float]:
 
 @pytest.mark.parametrize("premise", PREMISES)
 def test_premises_outside_their_bounds_are_counted_and_the_nearer_vertex_used(premise: Any) -> None:
-    fast, faster = (bench(GeneralTakagiSugenoCdo(TRAIN, premise), measured_odometer=v) for v in (50.0, 50.0))
+    fast, faster = (runner(GeneralTakagiSugenoCdo(TRAIN, premise), measured_odometer=v) for v in (50.0, 50.0))
     for runtime in (fast, faster):
         runtime.x[1] = 20.0
         runtime.trigger("balise")
@@ -203,7 +203,7 @@ def test_premises_outside_their_bounds_are_counted_and_the_nearer_vertex_used(pr
 
 
 def test_frozen_premises_wait_for_the_next_sample() -> None:
-    runtime = bench(GeneralTakagiSugenoCdo(TRAIN, "frozen"), measured_odometer=20.0)
+    runtime = runner(GeneralTakagiSugenoCdo(TRAIN, "frozen"), measured_odometer=20.0)
     runtime.trigger("balise")
     held = scalar_names(runtime.system.states).index("held_train_speed")
     runtime.u[scalar_names(runtime.system.input_signals).index("measured_odometer")] = 30.0

@@ -8,7 +8,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from shared.bench import Together, errors, sampling, unless_rounding
+from shared.runner import Together, errors, sampling, unless_rounding
 from shared.sheet import Sheet
 
 from fmu_observer.observers.generic.continuous import HighGain, TakagiSugenoLuenberger, Thau

@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.linalg import solve_continuous_are
-from shared.bench import ModelPlant, Together, errors, unless_rounding
+from shared.runner import ModelPlant, Together, errors, unless_rounding
 from shared.sheet import Sheet
 
 from fmu_observer.observers.generic.sampled import MultirateSylvester

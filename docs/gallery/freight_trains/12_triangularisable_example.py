@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from academic import EXAMPLES, STOP, final_quarter, followed
-from shared.bench import Together, errors, sampling, unless_rounding
+from shared.runner import Together, errors, sampling, unless_rounding
 from shared.sheet import Sheet
 
 from fmu_observer.models.exhibits.four_state_example import triangularisable_chain

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from shared.bench import Bench
+from shared.runner import SystemRunner
 from shared.sheet import Sheet
 
 from plant_models.interop import to_state_space
@@ -48,14 +48,14 @@ def modes(preset: str) -> np.ndarray:
     return np.array(sorted(values[values.imag > 1e-6], key=abs))
 
 
-def rows(bench: Bench, names: list[str]) -> np.ndarray:
+def rows(runner: SystemRunner, names: list[str]) -> np.ndarray:
     """Outputs at `TIMES`, shape (len(TIMES), len(names))."""
-    bench.set("u", effort=EFFORT)
-    bench.runtime.start(0.0)
+    runner.set("u", effort=EFFORT)
+    runner.runtime.start(0.0)
     found = []
     for t in TIMES:
-        bench.runtime.advance(float(t))
-        values = bench.outputs()
+        runner.runtime.advance(float(t))
+        values = runner.outputs()
         found.append([values[name] for name in names])
     return np.array(found)
 
@@ -72,15 +72,17 @@ def main() -> None:
         "fastest growth of a mode, damping sign as printed", "1/s", "decays", modes("as_published").real.max(), SIGN
     )
     names = [*(f"coupler_force[{i}]" for i in (1, 2, 3, 4)), "speed"]
-    found = rows(Bench(TRAIN, **RIGID), names)
+    found = rows(SystemRunner(TRAIN, **RIGID), names)
     for i in range(4):
         sheet.add(f"step of 83 kN: peak of coupler {i + 1}", "kN", None, found[:, i].max() / 1e3, STEP)
     sheet.add("step of 83 kN: instant of the first peak", "s", None, TIMES[found[:, 0].argmax()], STEP, repeats=0.02)
     sheet.add("step of 83 kN: speed after 60 s", "m/s", None, found[-1, 4], STEP)
     slope = {f"gradient[{i}]": UPHILL for i in (1, 2, 3, 4)}
-    uphill = rows(Bench(TRAIN, "table_4_2_one_axle", **slope), ["speed"])[:, 0]  # the single point has one wheel too
+    uphill = rows(SystemRunner(TRAIN, "table_4_2_one_axle", **slope), ["speed"])[
+        :, 0
+    ]  # the single point has one wheel too
     point, point_uphill = (
-        rows(Bench(Locomotive(), "table_4_1", **changes), ["speed"])[:, 0] for changes in ({}, slope)
+        rows(SystemRunner(Locomotive(), "table_4_1", **changes), ["speed"])[:, 0] for changes in ({}, slope)
     )
     half = int(np.searchsorted(TIMES, 30.0))
     for words, single in (("without the gradient", point), ("with the gradient", point_uphill)):

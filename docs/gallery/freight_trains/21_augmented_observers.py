@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from shared.bench import Bench
+from shared.runner import SystemRunner
 from shared.sheet import Sheet
 
 from fmu_observer.observers.train import AugmentedHighGainCdo, AugmentedTakagiSugenoCdo
@@ -48,11 +48,11 @@ def binomial(theta: float) -> dict[str, float]:
 
 def journey() -> dict[str, np.ndarray]:
     """Every 10 ms: time, position, speed, wheel speed, effort and first coupler force, up to 35 km/h on 8 per mille."""
-    train = Bench(Train(), **{f"gradient[{i}]": UPHILL for i in (1, 2, 3, 4)})
+    train = SystemRunner(Train(), **{f"gradient[{i}]": UPHILL for i in (1, 2, 3, 4)})
     train.set("x", **train.system.rolling(0.5))  # type: ignore[attr-defined]
     reached = (CRUISE - 0.5) / 0.5
     profile = {"profile_time": [0.0, reached, *[STOP] * 6], "profile_speed": [0.5, CRUISE, *[CRUISE] * 6]}
-    driver = Bench(
+    driver = SystemRunner(
         Driver(), **{f"{name}[{i + 1}]": v for name, values in profile.items() for i, v in enumerate(values)}
     )
     start = float(166e3 * 9.81 * UPHILL + 1.7e3)  # the hold at the start
@@ -76,7 +76,7 @@ def journey() -> dict[str, np.ndarray]:
 
 def fixes(way: dict[str, np.ndarray], preset: str, drift_time: float) -> np.ndarray:
     """Positions told by the receiver every 0.1 s."""
-    receiver, told = Bench(Gps(), preset, drift_time=drift_time), []
+    receiver, told = SystemRunner(Gps(), preset, drift_time=drift_time), []
     for k in range(0, len(way["time"]), 10):
         receiver.set("u", position=way["position"][k])
         if k == 0:
@@ -86,7 +86,7 @@ def fixes(way: dict[str, np.ndarray], preset: str, drift_time: float) -> np.ndar
     return np.array(told)
 
 
-def followed(observer: Bench, way: dict[str, np.ndarray], told: np.ndarray) -> np.ndarray:
+def followed(observer: SystemRunner, way: dict[str, np.ndarray], told: np.ndarray) -> np.ndarray:
     """Speed and coupler force (with gravity) of an observer, shape (rows, 2)."""
     observer.set("x", estimated_speed=0.5)
     rows = np.empty((len(way["time"]), 2))
@@ -116,7 +116,7 @@ def main() -> None:
                 ("high gain", AugmentedHighGainCdo, {"theta_gps": theta}),
                 ("Takagi-Sugeno", AugmentedTakagiSugenoCdo, binomial(theta)),
             ):
-                found = followed(Bench(make(), n_axles=4.0, **gains), way, told)
+                found = followed(SystemRunner(make(), n_axles=4.0, **gains), way, told)
                 error = 3.6 * np.abs(found[:, 0] - way["speed"])
                 late = way["time"] > 10.0
                 name = f"mean speed error, {family}, {label}, {words}"

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from shared.bench import Bench
+from shared.runner import SystemRunner
 from shared.sheet import Sheet
 
 from fmu_observer.detection import AdhesionDetector, degraded_map, nominal_map, published_map
@@ -26,11 +26,11 @@ CONDITIONS = {1.0: "nominal", 2.0: "degraded"}
 
 def verdict(slip: float, definition: str, preset: str) -> str:
     """What the detector says at 5 km/h after 5 s of a slip."""
-    bench = Bench(AdhesionDetector(definition), preset)  # type: ignore[arg-type]
-    bench.set("u", speed=5.0 * KMH, slip=slip)
-    bench.runtime.start(0.0)
-    bench.runtime.advance(5.0)
-    return CONDITIONS[bench.outputs()["condition"]]
+    runner = SystemRunner(AdhesionDetector(definition), preset)  # type: ignore[arg-type]
+    runner.set("u", speed=5.0 * KMH, slip=slip)
+    runner.runtime.start(0.0)
+    runner.runtime.advance(5.0)
+    return CONDITIONS[runner.outputs()["condition"]]
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from shared.bench import Together, errors, sampling
+from shared.runner import Together, errors, sampling
 
 from fmu_observer.observers.generic.sampled import GeneralTakagiSugenoCdo
 from plant_models.exhibits import NonTriangularisablePlant, TriangularisablePlant

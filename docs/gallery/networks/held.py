@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from shared.bench import Together
+from shared.runner import Together
 
 from fmu_observer.models.exhibits.tanh_model import Reading, tanh_system
 from fmu_observer.observers.generic.sampled import DecayingInnovation

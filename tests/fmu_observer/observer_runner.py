@@ -1,4 +1,4 @@
-"""A test bench for observers: named access to a runtime, and a train whose motion is known in closed form."""
+"""Runners of observers: named access to a runtime, and a train whose motion is known in closed form."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SteadyMotion:
         return self.adhesion_force(t) + self.n_axles * INERTIA / RADIUS**2 * self.acceleration
 
 
-class Bench:
+class SystemRunner:
     """A runtime whose signals, states and parameters are reached by name."""
 
     def __init__(
@@ -92,20 +92,20 @@ class Bench:
             self.balise(motion.position(end))
 
 
-def started(system: HybridSystem, motion: SteadyMotion, **arguments: object) -> Bench:
-    """A bench at time zero with the motion's inputs."""
-    bench = Bench(system, **arguments)  # type: ignore[arg-type]
-    bench.set("u", {"effort": motion.effort(0.0), "odometer": motion.odometer(0.0)})
-    bench.runtime.start(0.0)
-    return bench
+def started(system: HybridSystem, motion: SteadyMotion, **arguments: object) -> SystemRunner:
+    """A runner at time zero with the motion's inputs."""
+    runner = SystemRunner(system, **arguments)  # type: ignore[arg-type]
+    runner.set("u", {"effort": motion.effort(0.0), "odometer": motion.odometer(0.0)})
+    runner.runtime.start(0.0)
+    return runner
 
 
-def in_step(observer: TrainObserver, motion: SteadyMotion) -> Bench:
-    """A bench whose observer already agrees with a motion at constant speed, so that every error is put in on purpose.
+def in_step(observer: TrainObserver, motion: SteadyMotion) -> SystemRunner:
+    """A runner whose observer already agrees with a motion at constant speed, so that every error is put in on purpose.
 
     Its gate is off: what is certified is the error while every telegram is used.
     """
-    bench = Bench(observer, gate=0.0)
+    runner = SystemRunner(observer, gate=0.0)
     v = motion.speed
     exact = {
         "estimated_position": 0.0,
@@ -115,9 +115,9 @@ def in_step(observer: TrainObserver, motion: SteadyMotion) -> Bench:
         "adhesion_deceleration": -(RADIUS**2) / INERTIA * motion.effort(0.0),
         "odometer_speed": v,
     }
-    bench.set("x", {name: value for name, value in exact.items() if name in scalar_names(observer.states)})
-    bench.set("u", {"effort": motion.effort(0.0), "odometer": motion.odometer(0.0)})
-    return bench
+    runner.set("x", {name: value for name, value in exact.items() if name in scalar_names(observer.states)})
+    runner.set("u", {"effort": motion.effort(0.0), "odometer": motion.odometer(0.0)})
+    return runner
 
 
 def random_gaps(seed: int, longest: float, count: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A test bench for observers corrected by samples: the true motion by an independent integrator, and errors along a
+"""Runners of observers corrected by samples: the true motion by an independent integrator, and errors along a
 run.
 """
 
@@ -30,7 +30,7 @@ def true_motion(model: ObserverModel, start: Sequence[float], inputs: Sequence[f
     return found.sol  # type: ignore[no-any-return]
 
 
-class SampledBench:
+class SampledRunner:
     """An observer that follows a true motion, sampled at given instants; periodic observers sample by themselves."""
 
     def __init__(

@@ -27,7 +27,7 @@ from plant_models.hybrid import (
 Seen = Callable[[Mapping[str, Any], Any], Mapping[str, Any]]
 
 
-class Bench:
+class SystemRunner:
     """A runtime whose inputs, states, outputs and parameters are reached by name."""
 
     def __init__(self, system: HybridSystem, preset: str | None = None, **parameters: float) -> None:
