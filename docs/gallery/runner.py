@@ -4,13 +4,14 @@ instants.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fmu_observer.models.observer_model import ObserverModel
+from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import (
     HybridSystem,
@@ -56,8 +57,6 @@ class ModelPlant(HybridSystem):
     inputs.
     """
 
-    by_name = False
-
     name, description, source = "model_plant", "A plant that is what its observer believes", "docs/gallery"
     inputs = (input_signal("unused", "1"),)
 
@@ -67,13 +66,12 @@ class ModelPlant(HybridSystem):
         self.outputs = tuple(output_signal(f"true_{s.name}", s.unit) for s in (*model.states, *model.inputs))
         super().__init__()
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return self.model.flow(x, -(self.feedback @ x))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        true = stacked_of(x, self.states)
+        return named_as(self.states, self.model.flow(true, -(self.feedback @ true)))
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        known = -(self.feedback @ x)
-        values = [x[i] for i in range(self.model.order)] + [known[i] for i in range(len(self.model.inputs))]
-        return {s.name: value for s, value in zip(self.outputs, values, strict=True)}
+        return named_as(self.outputs, (*x, *-(self.feedback @ stacked_of(x, self.states))))
 
 
 class Together(HybridSystem):
@@ -85,8 +83,6 @@ class Together(HybridSystem):
             the plant's outputs and the noise, an input of the whole. step: internal step [s]. preset, overrides: of the
             observer.
     """
-
-    by_name = False
 
     name, description, source = "together", "A plant and its observer", "docs/gallery"
     inputs = (input_signal("noise", "1"),)
@@ -102,35 +98,40 @@ class Together(HybridSystem):
     ) -> None:
         self.plant, self.observer, self.seen, self.order = plant, observer, seen, plant.state_count
         self.internal_step = step
-        self._p = parameter_values(observer, overrides, preset)
-        self._plant_values = plant.start_inputs(), plant.start_parameters()
+        self._p = observer.unpack_parameters(parameter_values(observer, overrides, preset))
+        self._plant_values = (
+            plant.unpack_inputs(plant.start_inputs()),
+            plant.unpack_parameters(plant.start_parameters()),
+        )
         self.states = (*plant.states, *observer.states)
+        self._plant_type: Any = namedtuple("PlantStates", [s.name for s in plant.states])
         self.outputs = tuple(output_signal(f"error_{i + 1}", "1") for i in range(self.order))
         periods = [e.period for e in observer.events if isinstance(e, PeriodicEvent)]
-        values = observer.unpack_parameters(self._p)
-        self.parameters = tuple(parameter(name, "s", float(getattr(values, name))) for name in periods)
+        self.parameters = tuple(parameter(name, "s", float(getattr(self._p, name))) for name in periods)
         self.events = tuple(
             replace(e, samples=()) if isinstance(e, PeriodicEvent) else TriggeredEvent(e.name) for e in observer.events
         )
         super().__init__()
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        n = self.order
-        moved = self.plant.state_derivative(t, x[:n], *self._plant_values)
-        return np.hstack([moved, self.observer.state_derivative(t, x[n:], self._inputs(t, x, u), self._p)])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        moved = self.plant.flow(t, self._of_plant(x), *self._plant_values)
+        return moved | self.observer.flow(t, x, self._inputs(t, x, u), self._p)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        n = self.order
-        return np.hstack([x[:n], self.observer.jump_vector(event, t, x[n:], self._inputs(t, x, u), self._p)])
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return self.observer.jump(event, t, x, self._inputs(t, x, u), self._p)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        told = self.observer.output_vector(t, x[self.order :], self._inputs(t, x, u), self._p)
-        return {f"error_{i + 1}": told[i] - x[i] for i in range(self.order)}
+        estimates = self.observer.output(t, x, self._inputs(t, x, u), self._p)
+        pairs = zip(self.observer.outputs, self.plant.states, strict=False)
+        errors = [estimates[estimate.name] - getattr(x, true.name) for estimate, true in pairs]
+        return named_as(self.outputs, errors)
+
+    def _of_plant(self, x: Any) -> Any:
+        return self._plant_type._make(getattr(x, name) for name in self._plant_type._fields)
 
     def _inputs(self, t: Any, x: Any, u: Any) -> Any:
-        told = self.plant.output_vector(t, x[: self.order], *self._plant_values)
-        named = self.seen({s.name: told[i] for i, s in enumerate(self.plant.outputs)}, u.noise)
-        return vector(*(named[s.name] for s in self.observer.input_signals))
+        named = self.seen(self.plant.output(t, self._of_plant(x), *self._plant_values), u.noise)
+        return self.observer.unpack_inputs(vector(*(named[s.name] for s in self.observer.input_signals)))
 
 
 def errors(

@@ -16,7 +16,7 @@ import numpy as np
 import fmus
 import plant_models
 from cosim import Result, Scenario
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, parameter
 from plant_models.railway.vehicle.locomotive import Locomotive
 
 STOP, STEP = 12.0, 0.01  # [s]; the FMU's own step is 0.5 ms
@@ -35,8 +35,6 @@ PARAMETERS: Mapping[str, Any] = {"train_speed": SPEED, "wheel_rate": SPEED / 0.5
 
 class EffortProfile(HybridSystem):
     """An effort that steps at given instants and is constant between them."""
-
-    by_name = False
 
     name = "effort_profile"
     description = "Effort in steps"
@@ -57,8 +55,6 @@ class EffortProfile(HybridSystem):
 class BaliseRegister(HybridSystem):
     """Keeps the position told by the last balise."""
 
-    by_name = False
-
     name = "balise_register"
     description = "Position of the last balise"
     source = "the mutation study"
@@ -68,11 +64,11 @@ class BaliseRegister(HybridSystem):
     outputs = (output_signal("last_balise", "m", "Position told last", variability="discrete"),)
     events = (TriggeredEvent("balise", (input_signal("balise_position", "m", variability="discrete"),)),)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.balise_position)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"last_position": u.balise_position}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"last_balise": x[0]}
+        return {"last_balise": x.last_position}
 
 
 HELPERS: Mapping[str, HybridSystem] = {"profile": EffortProfile(), "register": BaliseRegister()}

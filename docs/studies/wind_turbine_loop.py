@@ -7,6 +7,7 @@ and the largest residuals.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,13 +19,11 @@ from fmu_observer.observers.exhibits.wind_turbine_diagnosis import ALARM_NAMES, 
 from plant_models.exhibits.wind_turbine import Wind, WindTurbine, WindTurbineController
 from plant_models.hybrid import HybridSystem, PeriodicEvent, memory, output_signal, parameter, vector
 from plant_models.hybrid.signal import Signal
-from plant_models.hybrid.state_layout import StateLayout
 from plant_models.hybrid.system import Array
 
 PARTS = {"wind": Wind(), "turbine": WindTurbine(), "controller": WindTurbineController()}
 DIAGNOSIS = WindTurbineDiagnosis()
 SYSTEMS = {**PARTS, "diagnosis": DIAGNOSIS}
-DIAGNOSED = StateLayout(DIAGNOSIS.states)
 SETTLED = 20.0  # [s]: residuals count from here on
 PEAKS = (
     ("pitch_difference", 3),
@@ -68,18 +67,27 @@ _STATES = (
     *(s for part, system in SYSTEMS.items() for s in _renamed(part, system, "discrete")),
     *_LOG,
 )
-_ENDS = np.cumsum([s.width for s in _STATES])
-LAYOUT = {s.name: slice(int(end) - s.width, int(end)) for s, end in zip(_STATES, _ENDS, strict=True)}
-"""Where each state of the loop stands."""
-
-FIXED = {name: system.start_parameters() for name, system in PARTS.items()}
+FIXED: dict[str, Any] = {part: system.unpack_parameters(system.start_parameters()) for part, system in PARTS.items()}
 """Parameters of the parts."""
+_OWN: dict[str, Any] = {part: namedtuple(part, [s.name for s in system.states]) for part, system in SYSTEMS.items()}
+
+
+def _part(part: str, x: Any) -> Any:
+    """States of the loop that are a part's, by the part's own names."""
+    return _OWN[part]._make(getattr(x, f"{part}_{name}") for name in _OWN[part]._fields)
+
+
+def _whole(part: str, changed: dict[str, Array]) -> dict[str, Array]:
+    """States of a part by their names in the loop."""
+    return {f"{part}_{name}": value for name, value in changed.items()}
+
+
+def _inputs(system: HybridSystem, **values: Array) -> Any:
+    return system.unpack_inputs(system.start_inputs())._replace(**values)
 
 
 class WindTurbineLoop(HybridSystem):
     """The closed loop with one fault at a time, and what came of it."""
-
-    by_name = False
 
     name = "wind_turbine_loop"
     description = "Wind turbine, controller, fault and diagnosis"
@@ -114,97 +122,74 @@ class WindTurbineLoop(HybridSystem):
         *(s for s in DIAGNOSIS.parameters if s.name != "sample_period"),
     )
 
-    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The turbine turns."""
-        inputs = self._turbine_inputs(t, x, None, p)
-        return PARTS["turbine"].state_derivative(t, self._part("turbine", x), inputs, FIXED["turbine"])
+        inputs = self._turbine_inputs(t, x, p)
+        return _whole("turbine", PARTS["turbine"].flow(t, _part("turbine", x), inputs, FIXED["turbine"]))
 
-    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimated efficiency."""
-        return {"efficiency": x[LAYOUT["diagnosis_held_efficiency_estimate"].start]}
+        return {"efficiency": x.diagnosis_held_efficiency_estimate}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A sampling instant, or one of the diagnosis alone."""
         if event != "sampling":
-            return self._with(x, diagnosis=self._diagnosed(event, t, x, None, p))
-        wind = PARTS["wind"].jump_vector("gust", t, self._part("wind", x), vector(u.gust_noise), self._wind(p))
-        x = self._with(x, wind=wind)
-        inputs, turbine = self._turbine_inputs(t, x, u, p), self._part("turbine", x)
-        x = self._with(x, turbine=PARTS["turbine"].jump_vector("sampling", t, turbine, inputs, FIXED["turbine"]))
-        readings = self._readings(t, x, p)
-        controller = self._part("controller", x)
-        given = DIAGNOSIS.unpack_inputs(
-            vector(
-                readings["wind"],
-                *readings["rotor"],
-                *readings["generator"],
-                readings["torque"],
-                *readings["pitch"],
-                controller[2],
-                controller[1],
-            )
+            return _whole("diagnosis", DIAGNOSIS.jump(event, t, _part("diagnosis", x), None, p))
+        gust = _inputs(PARTS["wind"], gust_noise=u.gust_noise)
+        new = _whole("wind", PARTS["wind"].jump("gust", t, _part("wind", x), gust, self._wind(p)))
+        x = x._replace(**new)
+        noises = {s.name: getattr(u, s.name) for s in PARTS["turbine"].noises}
+        inputs, turbine = self._turbine_inputs(t, x, p)._replace(**noises), _part("turbine", x)
+        new |= _whole("turbine", PARTS["turbine"].jump("sampling", t, turbine, inputs, FIXED["turbine"]))
+        readings = self._readings(t, x._replace(**new), p)
+        before, controller = _part("diagnosis", x), _part("controller", x)
+        given = _inputs(
+            DIAGNOSIS,
+            wind_speed=readings["wind"],
+            rotor_speed=vector(*readings["rotor"]),
+            generator_speed=vector(*readings["generator"]),
+            torque=readings["torque"],
+            pitch=vector(*readings["pitch"]),
+            torque_reference=controller.held_torque,
+            pitch_reference=controller.held_pitch,
         )
-        told = self._diagnosed("sampling", t, x, given, p)
-        asked = vector(readings["generator"][0], readings["power"])
-        moved = PARTS["controller"].jump_vector("sampling", t, controller, asked, FIXED["controller"])
-        log = self._logged(t, x, told, p)
-        return self._with(self._with(x, diagnosis=told, controller=moved), log=log)
-
-    def _diagnosed(self, event: str, t: Array, x: Array, given: Any, p: Any) -> Array:
-        before = self._part("diagnosis", x)
-        changed = DIAGNOSIS.jump(event, t, DIAGNOSED.named(before), given, p)
-        return DIAGNOSED.flat(changed, "the diagnosis", before.shape[1:], before)
+        diagnosed = DIAGNOSIS.jump("sampling", t, before, given, p)
+        asked = _inputs(
+            PARTS["controller"], generator_speed=readings["generator"][0], generator_power=readings["power"]
+        )
+        moved = PARTS["controller"].jump("sampling", t, controller, asked, FIXED["controller"])
+        log = self._logged(t, x, before, before._replace(**diagnosed), p)
+        return new | _whole("diagnosis", diagnosed) | _whole("controller", moved) | log
 
     # -- parts ------------------------------------------------------------------------------------------------------
 
-    def _slots(self, part: str) -> list[slice]:
-        if part == "log":
-            return [LAYOUT[s.name] for s in _LOG]
-        system = DIAGNOSIS if part == "diagnosis" else PARTS[part]
-        return [LAYOUT[f"{part}_{s.name}"] for s in system.states]
-
-    def _part(self, part: str, x: Array) -> Array:
-        return np.hstack([x[slot] for slot in self._slots(part)])
-
-    def _with(self, x: Array, **parts: Array) -> Array:
-        pieces = {slot.start: x[slot] for slot in LAYOUT.values()}
-        for part, new in parts.items():
-            first = 0
-            for slot in self._slots(part):
-                pieces[slot.start] = new[first : first + slot.stop - slot.start]
-                first += slot.stop - slot.start
-        return np.hstack([pieces[start] for start in sorted(pieces)])
-
     def _wind(self, p: Any) -> Any:
         names = ("mean_from", "mean_to", "sine_amplitude", "turbulence_std", "sample_period")
-        pairs = zip(PARTS["wind"].parameter_signals, FIXED["wind"], strict=True)
-        return vector(*(getattr(p, s.name) if s.name in names else value for s, value in pairs))
+        return FIXED["wind"]._replace(**{name: getattr(p, name) for name in names})
 
-    def _turbine_inputs(self, t: Array, x: Array, u: Any, p: Any) -> Any:
-        blown = PARTS["wind"].output_vector(t, self._part("wind", x), np.zeros(1), self._wind(p))[0]
-        controller = self._part("controller", x)
+    def _turbine_inputs(self, t: Array, x: Any, p: Any) -> Any:
+        """Of the turbine, without noise."""
+        blown = PARTS["wind"].output(t, _part("wind", x), None, self._wind(p))["wind_speed"]
         acts = self._acts(t, p)
-        into = [self._is(p, 7) * acts * 1000.0 * p.size]
-        into += [0.97 + self._is(p, 10) * acts * p.size * (0.25 - 0.97)]
         # Fault 9 comes in 30 s and goes in 30 s; its onset and end are those of the whole.
         ramp = np.clip(np.minimum((t - p.onset) / 30.0, (p.end - t) / 30.0), 0.0, 1.0)
         abrupt, slow = self._is(p, 8) * acts * p.size, self._is(p, 9) * ramp * p.size
-        into += [11.11, 11.11 + abrupt * (5.73 - 11.11), 11.11 + slow * (3.42 - 11.11)]
-        into += [0.6, 0.6 + abrupt * (0.45 - 0.6), 0.6 + slow * (0.9 - 0.6)]
-        count = sum(s.width for s in PARTS["turbine"].noises)
-        noises = [0.0] * count
-        if u is not None:
-            parts = [getattr(u, s.name) for s in PARTS["turbine"].noises]
-            noises = [part[i] for part, s in zip(parts, PARTS["turbine"].noises, strict=True) for i in range(s.width)]
-        return vector(blown, controller[2], controller[1], *into, *noises)
+        return _inputs(
+            PARTS["turbine"],
+            wind_speed=blown,
+            torque_reference=x.controller_held_torque,
+            pitch_reference=x.controller_held_pitch,
+            torque_offset=self._is(p, 7) * acts * 1000.0 * p.size,
+            efficiency=0.97 + self._is(p, 10) * acts * p.size * (0.25 - 0.97),
+            pitch_frequency=vector(11.11, 11.11 + abrupt * (5.73 - 11.11), 11.11 + slow * (3.42 - 11.11)),
+            pitch_damping=vector(0.6, 0.6 + abrupt * (0.45 - 0.6), 0.6 + slow * (0.9 - 0.6)),
+        )
 
-    def _readings(self, t: Array, x: Array, p: Any) -> dict[str, Any]:
-        def held(name: str) -> list[Array]:
-            slot = LAYOUT[f"turbine_held_{name}"]
-            return [x[i] for i in range(slot.start, slot.stop)]
-
+    def _readings(self, t: Array, x: Any, p: Any) -> dict[str, Any]:
         acts = self._acts(t, p)
-        pitch, rotor, generator = held("pitch"), held("rotor_speed"), held("generator_speed")
+        pitch, rotor, generator = (
+            list(held) for held in (x.turbine_held_pitch, x.turbine_held_rotor_speed, x.turbine_held_generator_speed)
+        )
         pitch[4] = self._stuck(pitch[4], 10.0, self._is(p, 1) * acts)
         pitch[3] = pitch[3] * (1.0 + 4.0 * p.size * self._is(p, 2) * acts)
         rotor[0] = self._stuck(rotor[0], 3.5, self._is(p, 3) * acts)
@@ -215,7 +200,7 @@ class WindTurbineLoop(HybridSystem):
         rotor, generator = (
             [value * shares[first + i] for i, value in enumerate(pair)] for first, pair in ((0, rotor), (2, generator))
         )
-        single = {"wind": held("wind")[0], "torque": held("torque")[0], "power": held("power")[0]}
+        single = {"wind": x.turbine_held_wind, "torque": x.turbine_held_torque, "power": x.turbine_held_power}
         return {"pitch": pitch, "rotor": rotor, "generator": generator, **single}
 
     @staticmethod
@@ -230,9 +215,12 @@ class WindTurbineLoop(HybridSystem):
     def _acts(t: Array, p: Any) -> Array:
         return np.where(t >= p.onset - 1e-6, np.where(t < p.end - 1e-6, 1.0, 0.0), 0.0)
 
-    def _logged(self, t: Array, x: Array, told: Array, p: Any) -> Array:
-        was, now = (DIAGNOSED.named(state) for state in (self._part("diagnosis", x), told))
-        log = {s.name: x[LAYOUT[s.name].start] if s.size is None else x[LAYOUT[s.name]] for s in _LOG}
+    def _logged(self, t: Array, x: Any, was: Any, now: Any, p: Any) -> dict[str, Array]:
+        """The log behind a sampling instant.
+
+        Args:
+            x: states of the loop. was, now: states of the diagnosis before and after the instant.
+        """
         acts = self._acts(t, p)
         own = 0.0 * t
         raised_before, raised = _told(was), _told(now)
@@ -241,16 +229,17 @@ class WindTurbineLoop(HybridSystem):
             own = np.maximum(own, np.maximum(mine[i], mine[NOT_ISOLATED]) * raised[i])
         over = np.where(p.fault > 0.0, np.where(t >= p.end - 1e-6, 1.0, 0.0), 0.0)
         rises = [raised[i] * (1.0 - raised_before[i]) for i in range(_ALARMS)]
-        values = (
-            np.where(log["first_raised"] < 0.0, np.where(own * acts > 0.0, t, -1.0), log["first_raised"]),
-            np.where(log["first_clear"] < 0.0, np.where((1.0 - own) * over > 0.0, t, -1.0), log["first_clear"]),
-            np.where(own > 0.0, t, log["last_raised"]),
-            log["covered"] + own * acts,
-            *(log["false_begun"][i] + rises[i] * (1.0 - mine[i] * acts) for i in range(_ALARMS)),
-        )
+        false = (x.false_begun[i] + rises[i] * (1.0 - mine[i] * acts) for i in range(_ALARMS))
         settled = np.where(t >= SETTLED, 1.0, 0.0)
-        peaks = [np.maximum(log["peak"][i], settled * _largest(now, name, p)) for i, (name, _) in enumerate(PEAKS)]
-        return vector(*values, *peaks)
+        peaks = (np.maximum(x.peak[i], settled * _largest(now, name, p)) for i, (name, _) in enumerate(PEAKS))
+        return {
+            "first_raised": np.where(x.first_raised < 0.0, np.where(own * acts > 0.0, t, -1.0), x.first_raised),
+            "first_clear": np.where(x.first_clear < 0.0, np.where((1.0 - own) * over > 0.0, t, -1.0), x.first_clear),
+            "last_raised": np.where(own > 0.0, t, x.last_raised),
+            "covered": x.covered + own * acts,
+            "false_begun": vector(*false),
+            "peak": vector(*peaks),
+        }
 
 
 def _told(m: Any) -> list[Array]:

@@ -144,7 +144,9 @@ def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Func
 def _requirement_texts(system: HybridSystem) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Of requirements that last, and of those of start values."""
     p = system.unpack_parameters(system.start_parameters())
-    return tuple(system.requirements(p)), tuple(system.start_requirements(system.handed(system.start_state()), p))
+    return tuple(system.requirements(p)), tuple(
+        system.start_requirements(system.unpack_states(system.start_state()), p)
+    )
 
 
 def _equations_source(name: str, equations: Equations) -> str:

@@ -27,6 +27,23 @@ def vector(*components: Array) -> Array:
     return np.stack(np.broadcast_arrays(*components))
 
 
+def of_length(values: Array, count: int, what: str) -> Array:
+    """The values, if they are as many as expected: a vector of one element would be broadcast in silence.
+
+    Args:
+        values: shape (count,), or (count, members) for a batch. count: as many. what: where they come from.
+
+    Raises:
+        TypeError: they are no array. ValueError: they are fewer or more.
+    """
+    if not getattr(values, "shape", ()):
+        expected = f"expected an array of {count} values, as of vector(...)"
+        raise TypeError(f"{what} returns a {type(values).__name__}; {expected}.")
+    if values.shape[0] != count:
+        raise ValueError(f"{what} returns {values.shape[0]} values, expected {count}.")
+    return values
+
+
 def matrix(*rows: Sequence[Array]) -> Array:
     """Stack rows of scalars (or batches of them) into a matrix.
 

@@ -48,7 +48,6 @@ class Declarations:
     internal_step: float = 1e-3
     purpose: Purpose = Purpose.NOISE
     traceable: bool = True
-    by_name: ClassVar[bool] = True
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
 
     def __init__(self, **options: Any) -> None:

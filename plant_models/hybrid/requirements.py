@@ -79,7 +79,7 @@ def unfulfilled(system: HybridSystem, p: np.ndarray, start: np.ndarray | None = 
     unpacked = system.unpack_parameters(p)
     needed = system.requirements(unpacked)
     if start is not None:
-        needed = {**needed, **system.start_requirements(system.handed(start), unpacked)}
+        needed = {**needed, **system.start_requirements(system.unpack_states(start), unpacked)}
     for text, fulfilled in needed.items():
         if not fulfilled:
             names, (places,) = value_names(system), named_values(system, [text])

@@ -76,8 +76,9 @@ class StateLayout:
             TypeError: `values` is no mapping. ValueError: a name is unknown, or missing, or a shape is another one.
         """
         if not isinstance(values, Mapping):
-            kind = type(values).__name__
-            raise TypeError(f"{what} returns a {kind}; expected a dictionary of values by name of the state.")
+            some = ", ".join(f"{name!r}: ..." for name in [*self._places][:2])
+            advice = f"expected a dictionary of values by name of the state, {{{some}}}, not one array of all"
+            raise TypeError(f"{what} returns a {type(values).__name__}; {advice}.")
         self._check_names(values, what, before is not None)
         parts: list[Array] = []
         for name, place in self._places.items():

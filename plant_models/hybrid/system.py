@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.arrays import Array, vector
+from plant_models.hybrid.arrays import Array, of_length, vector
 from plant_models.hybrid.declaration_checks import check_declarations
 from plant_models.hybrid.declarations import Declarations, Method
 from plant_models.hybrid.missing import is_there, or_else
@@ -60,8 +60,6 @@ class HybridSystem(Declarations):
     13. `purpose` is what its noises are drawn for: two systems of different purpose draw independently even from the
         same seed.
     14. A system that cannot be traced says ``traceable = False`` and may then use any Python.
-    15. A system with ``by_name = False`` is handed ``x`` as one flat array and returns such arrays from `flow` and
-        `jump`.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -70,17 +68,15 @@ class HybridSystem(Declarations):
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
-    def flow(self, t: Array, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the continuous states by name; without it they stand still."""
-        if not self.by_name:
-            return np.zeros((self.continuous_count, *x.shape[1:]))
         return {s.name: np.zeros(s.dimensions) for s in self.states if s.variability == "continuous"}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Values of all outputs by name."""
         return {}
 
-    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What the event changes: new values of states by name."""
         raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no jump for it.")
 
@@ -120,14 +116,6 @@ class HybridSystem(Declarations):
 
     # -- flat arrays ------------------------------------------------------------------------------------------------
 
-    def handed(self, x: Array) -> Any:
-        """The states as the equations get them: by name, or flat where it says so.
-
-        Args:
-            x: flat, shape (n,) or (n, members).
-        """
-        return self.unpack_states(x) if self.by_name else x
-
     def unpack_states(self, values: Array) -> Any:
         """Named tuple `x` from the flat array, shape (n,) or (n, members)."""
         return self._all_places.named(values)
@@ -151,14 +139,12 @@ class HybridSystem(Declarations):
         Args:
             held_switches: see `unpack_inputs`.
         """
-        derivative = self.flow(t, self.handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
-        if self.by_name:
-            return self._flowing_places.flat(derivative, f"{self.name}: flow()", x.shape[1:])
-        return self._checked("flow()", derivative, self.continuous_count)
+        derivative = self.flow(t, *self._unpack_all(x, u, p, held_switches))
+        return self._flowing_places.flat(derivative, f"{self.name}: flow()", x.shape[1:])
 
     def output_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`output` on flat arrays, stacked in the declared order, shape (q,)."""
-        values = self.output(t, self.handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
+        values = self.output(t, *self._unpack_all(x, u, p))
         if not isinstance(values, Mapping):
             raise TypeError(
                 f"{self.name}: output() returns a {type(values).__name__}; expected a dictionary of values by name."
@@ -197,24 +183,25 @@ class HybridSystem(Declarations):
         Args:
             held_switches: see `unpack_inputs`.
         """
-        return self.friction(t, self.handed(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+        return self.friction(t, *self._unpack_all(x, u, p, held_switches))
 
     def switching_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`switching` on flat arrays, shape (len(switchings),)."""
-        values = self.switching(t, self.handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
-        return self._checked("switching()", values, len(self.switchings))
+        values = self.switching(t, *self._unpack_all(x, u, p))
+        return of_length(values, len(self.switchings), f"{self.name}: switching()")
 
     def requirement_vector(self, x: Array, p: Array) -> Array:
         """Values of `requirements`, then of `start_requirements`, in the declared order, stacked."""
         unpacked = self.unpack_parameters(p)
-        values = [*self.requirements(unpacked).values(), *self.start_requirements(self.handed(x), unpacked).values()]
+        asked = self.requirements(unpacked), self.start_requirements(self.unpack_states(x), unpacked)
+        values = [value for needed in asked for value in needed.values()]
         return vector(*values) if values else np.zeros(0)
 
     def switch_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`switches` on flat arrays, now, shape (len(switchings),); None for a system without any."""
         if not self.switchings:
             return None
-        return self.switches(t, self.handed(x), self.unpack_inputs(u), self.unpack_parameters(p))
+        return self.switches(t, *self._unpack_all(x, u, p))
 
     def held_vector(self, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """What a solver holds between events, as it is now: signs of the states with friction, then the switches."""
@@ -223,13 +210,13 @@ class HybridSystem(Declarations):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
+    def _unpack_all(self, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> tuple[Any, Any, Any]:
+        return self.unpack_states(x), self.unpack_inputs(u, held_switches), self.unpack_parameters(p)
+
     def _jumped(self, event: str, t: Array, own: Array, u: Any, p: Any) -> Array:
         """`jump` on the states without the count of missed samples."""
-        what = f"jump({event!r})"
-        if not self.by_name:
-            return self._checked(what, self.jump(event, t, own, u, p), own.shape[0])
         changed = self.jump(event, t, self._own_places.named(own), u, p)
-        return self._own_places.flat(changed, f"{self.name}: {what}", own.shape[1:], own)
+        return self._own_places.flat(changed, f"{self.name}: jump({event!r})", own.shape[1:], own)
 
     @cached_property
     def _own_places(self) -> StateLayout:
@@ -250,16 +237,6 @@ class HybridSystem(Declarations):
     @cached_property
     def _parameter_type(self) -> Any:
         return namedtuple("Parameters", [s.name for s in self.parameter_signals])
-
-    def _checked(self, function: str, values: Array, count: int) -> Array:
-        if not getattr(values, "shape", ()):
-            kind = type(values).__name__
-            raise TypeError(
-                f"{self.name}: {function} returns a {kind}; expected an array of {count} values, as of vector(...)."
-            )
-        if values.shape[0] != count:  # a vector of one element would be broadcast in silence
-            raise ValueError(f"{self.name}: {function} returns {values.shape[0]} values, expected {count}.")
-        return values
 
 
 def _parts(value: Array, size: int | None) -> list[Array]:

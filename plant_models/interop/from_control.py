@@ -22,6 +22,7 @@ from plant_models.hybrid import (
     state,
     vector,
 )
+from plant_models.hybrid.arrays import of_length
 from plant_models.hybrid.declaration_checks import RESERVED_NAMES
 from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array, Method
@@ -102,7 +103,7 @@ class ControlSystem(HybridSystem):
 
     def _moved(self, what: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives, or the next states."""
-        values = self._checked(what, self._called(self._update, t, x, u, p), len(self._own))
+        values = of_length(self._called(self._update, t, x, u, p), len(self._own), f"{self.name}: {what}")
         return dict(zip(self._own, values, strict=True))
 
     def _told(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

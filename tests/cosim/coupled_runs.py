@@ -32,14 +32,11 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 
 
 class Motion(HybridSystem):
     """A train on rails of time: ``p = p0 + v0 t + a t^2/2 + (A/w)(1 - cos w t)``, ``v`` its derivative."""
-
-    by_name = False
 
     name = "motion"
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
@@ -62,26 +59,22 @@ class Motion(HybridSystem):
 class Pushed(HybridSystem):
     """``dp = v, dv = push``: exact for a held push with any steps (RK4 on a polynomial of order 2)."""
 
-    by_name = False
-
     name = "pushed"
     states = (state("p", "m"), state("v", "m/s", 10.0))
     inputs = (input_signal("push", "m/s2"),)
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
     internal_step = 1e-2
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], u.push)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"p": x.v, "v": u.push}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "speed": x[1]}
+        return {"position": x.p, "speed": x.v}
 
 
 class Staircase(HybridSystem):
     """Effort and odometer that are constant on every ``(0.1 k, 0.1 (k + 1)]``: the value at the end of a step is the
     one of the whole step, so that holding it is exact for every communication step that divides 100 ms."""
-
-    by_name = False
 
     name = "staircase"
     outputs = (output_signal("effort", "N"), output_signal("odometer", "m/s"), output_signal("push", "m/s2"))
@@ -104,8 +97,6 @@ class IdealCdo(HighGainTrainObserver):
 class Listener(HybridSystem):
     """Keeps what it is told: the last position, when, how often; between balises it integrates its input."""
 
-    by_name = False
-
     name = "listener"
     states = (state("integral", "m"), memory("told", "m"), memory("told_at", "s", -1.0), memory("count", "1"))
     inputs = (input_signal("speed", "m/s"),)
@@ -118,14 +109,14 @@ class Listener(HybridSystem):
     events = (TriggeredEvent("balise", (input_signal("balise_position", "m", variability="discrete"),)),)
     internal_step = 1e-2
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.speed)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"integral": u.speed}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"integrated": x[0], "last": x[1], "at": x[2], "heard": x[3]}
+        return {"integrated": x.integral, "last": x.told, "at": x.told_at, "heard": x.count}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0], u.balise_position, t, x[3] + 1.0)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"told": u.balise_position, "told_at": t, "count": x.count + 1.0}
 
 
 @dataclass

@@ -15,7 +15,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 
 WORDS = "the table of the boiler ends at 12 bar"
@@ -28,7 +27,6 @@ def fail(t: Any, begin: float = FROM) -> None:
 
 
 class InFlow(HybridSystem):
-    by_name = False
     name = "failing"
     description = "Fails in its flow"
     source = "test"
@@ -38,23 +36,23 @@ class InFlow(HybridSystem):
     inputs = (input_signal("measured", "m", 0.0, "Measured"),)
     outputs = (output_signal("y", "m", "State"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         fail(t)
-        return vector(1.0 + 0.0 * x[0])
+        return {"x": 1.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"y": x[0]}
+        return {"y": x.x}
 
 
 class InOutput(InFlow):
     description = "Fails in its outputs"
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(1.0 + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": 1.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         fail(t)
-        return {"y": x[0]}
+        return {"y": x.x}
 
 
 class InSample(InFlow):
@@ -62,12 +60,12 @@ class InSample(InFlow):
     parameters = (parameter("period", "s", 0.1, "Period"),)
     events = (PeriodicEvent("tick", "period"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(1.0 + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": 1.0}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         fail(t)
-        return x
+        return {}
 
 
 class InPacket(InSample):
@@ -81,7 +79,7 @@ class Traced(InFlow):
 
     traceable = True
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         raise RuntimeError(WORDS)
 
 
@@ -90,9 +88,9 @@ class Worn(InFlow):
 
     parameters = (parameter("from_when", "s", 0.29, "From then on"), parameter("gain", "1/s", 1.0, "Gain", min=0.0))
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         fail(t, p.from_when)
-        return vector(p.gain * (1.0 - x[0]))
+        return {"x": p.gain * (1.0 - x.x)}
 
 
 class Judged(DiscreteMeasurementObserver):
@@ -126,7 +124,6 @@ class PlainStart(PlainStep):
 
 
 class Sine(HybridSystem):
-    by_name = False
     name = "sine"
     description = "Something to measure"
     source = "test"

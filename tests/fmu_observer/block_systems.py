@@ -31,8 +31,6 @@ H = 0.05
 class Swing(HybridSystem):
     """A forced, sampled, kicked and marked pendulum: nonlinear, explicit in time, noisy; its jumps do not commute."""
 
-    by_name = False
-
     name = "swing"
     description = "Pendulum with every kind of event"
     states = (
@@ -72,31 +70,29 @@ class Swing(HybridSystem):
     internal_step = 0.01
 
     def _torque(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        spring = p.stiffness[0] * np.sin(x[0]) + p.stiffness[1] * x[0] ** 3
-        return u.torque + u.wind[0] * np.sin(t) + u.wind[1] - spring - p.damping * x[1]
+        spring = p.stiffness[0] * np.sin(x.angle) + p.stiffness[1] * x.angle**3
+        return u.torque + u.wind[0] * np.sin(t) + u.wind[1] - spring - p.damping * x.rate
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], self._torque(t, x, u, p))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"angle": x.rate, "rate": self._torque(t, x, u, p)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {
-            "energy": 0.5 * x[1] ** 2 + p.stiffness[0] * (1.0 - np.cos(x[0])),
-            "last_sample": x[2],
-            "net_torque": u.torque + u.wind[1] - p.damping * x[1],
+            "energy": 0.5 * x.rate**2 + p.stiffness[0] * (1.0 - np.cos(x.angle)),
+            "last_sample": x.sample,
+            "net_torque": u.torque + u.wind[1] - p.damping * x.rate,
         }
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if event == "kick":
-            return vector(x[0], 0.9 * x[1] + u.kick_share[0] * u.kick_impulse, x[2] + u.kick_share[1], x[3], x[4], x[5])
+            return {"rate": 0.9 * x.rate + u.kick_share[0] * u.kick_impulse, "sample": x.sample + u.kick_share[1]}
         if event == "mark":
-            return vector(x[0], 0.8 * x[1] + 0.1 * u.torque * p.damping, x[2], x[3], x[4] + 1.0, x[1])
-        return vector(x[0], x[1], x[0] + 0.1 * u.jitter, t, x[4], x[5])
+            return {"rate": 0.8 * x.rate + 0.1 * u.torque * p.damping, "marks": vector(x.marks[0] + 1.0, x.rate)}
+        return {"sample": x.angle + 0.1 * u.jitter, "sampled_at": t}
 
 
 class Doorman(HybridSystem):
     """Ordinary Python: it branches on values, keeps no graph and cannot be traced."""
-
-    by_name = False
 
     name = "doorman"
     states = (state("travelled", "m"), memory("doors", "1"))
@@ -107,35 +103,33 @@ class Doorman(HybridSystem):
     traceable = False
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if u.speed > p.limit:
-            return np.array([p.limit])
+            return {"travelled": p.limit}
         if u.speed < 0.0:
             raise RuntimeError("no reverse gear")
-        return np.array([float(u.speed)])
+        return {"travelled": float(u.speed)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"travelled_out": x[0], "doors_out": x[1]}
+        return {"travelled_out": x.travelled, "doors_out": x.doors}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return np.array([x[0], x[1] + 1.0 if u.stop_length > 20.0 else x[1]])
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"doors": x.doors + 1.0 if u.stop_length > 20.0 else x.doors}
 
 
 class Explosion(HybridSystem):
     """``dx = x^2`` with ``x(0) = 1``: without bound at t = 1 s."""
-
-    by_name = False
 
     name = "explosion"
     states = (state("x", "1", 1.0), memory("quiet", "1"), memory("noise", "1"))
     outputs = (output_signal("size", "1"),)
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0] * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": x.x * x.x}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"size": x[0]}
+        return {"size": x.x}
 
 
 class Driven:

@@ -4,10 +4,12 @@ delay.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any
 
 import numpy as np
 
+from fmu_observer.models.observer_model import named_as
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.exhibits import NonTriangularisablePlant, TriangularisablePlant
@@ -20,8 +22,6 @@ STEP = 1e-3
 class Together(HybridSystem):
     """Plant and observer side by side; the noise v of the continuous output is an input, held between two settings."""
 
-    by_name = False
-
     name = "together"
     description = "An academic plant and its observer"
     source = "tests"
@@ -30,32 +30,36 @@ class Together(HybridSystem):
 
     def __init__(self, plant: HybridSystem, observer: HybridSystem, overrides: dict[str, Any] | None = None) -> None:
         self.plant, self.observer = plant, observer
-        self._parameters = parameter_values(observer, overrides)
-        self._plant_values = plant.start_inputs(), plant.start_parameters()
+        self._parameters = observer.unpack_parameters(parameter_values(observer, overrides))
+        self._plant_values = (
+            plant.unpack_inputs(plant.start_inputs()),
+            plant.unpack_parameters(plant.start_parameters()),
+        )
         self.order = plant.state_count
         self.states = (*plant.states, *observer.states)
+        self._plant_type: Any = namedtuple("PlantStates", [s.name for s in plant.states])
         self.outputs = tuple(output_signal(f"error_{i + 1}", "1") for i in range(self.order))
         self.parameters = (parameter("unused", "1", 0.0),)
         self.events = (TriggeredEvent("sample"),)
         super().__init__()
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        plant, behind = x[: self.order], x[self.order :]
-        moved = self.plant.state_derivative(t, plant, *self._plant_values)
-        followed = self.observer.state_derivative(t, behind, self._seen(t, plant, u.noise), self._parameters)
-        return np.hstack([moved, followed])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        moved = self.plant.flow(t, self._of_plant(x), *self._plant_values)
+        return moved | self.observer.flow(t, x, self._seen(t, x, u.noise), self._parameters)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        plant, behind = x[: self.order], x[self.order :]
-        after = self.observer.jump_vector(event, t, behind, self._seen(t, plant, u.noise), self._parameters)
-        return np.hstack([plant, after])
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return self.observer.jump(event, t, x, self._seen(t, x, u.noise), self._parameters)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {f"error_{i + 1}": x[self.order + i] - x[i] for i in range(self.order)}
+        pairs = zip(self.observer.states, self.plant.states, strict=False)
+        errors = [getattr(x, estimate.name) - getattr(x, true.name) for estimate, true in pairs]
+        return named_as(self.outputs, errors)
 
-    def _seen(self, t: Any, plant: Any, noise: Any) -> Any:
-        told = self.plant.output_vector(t, plant, *self._plant_values)
-        values = {s.name: told[i] for i, s in enumerate(self.plant.outputs)}
+    def _of_plant(self, x: Any) -> Any:
+        return self._plant_type._make(getattr(x, name) for name in self._plant_type._fields)
+
+    def _seen(self, t: Any, x: Any, noise: Any) -> Any:
+        values = self.plant.output(t, self._of_plant(x), *self._plant_values)
         model = self.observer.model  # type: ignore[attr-defined]
         named = {"drive": values["total_drive"]}
         if isinstance(model, TakagiSugenoModel):
@@ -63,7 +67,7 @@ class Together(HybridSystem):
             named |= {f"sample_{s.name}": values[s.name] for s in model.sampled}
         else:  # every output sampled, the noise on the second one
             named |= {"sample_x1": values["x1"], "sample_x2": values["x2"] + noise}
-        return vector(*(named[s.name] for s in self.observer.input_signals))
+        return self.observer.unpack_inputs(vector(*(named[s.name] for s in self.observer.input_signals)))
 
 
 def sampling(tau: float, stop: float, seed: int, loss: float = np.inf) -> np.ndarray:

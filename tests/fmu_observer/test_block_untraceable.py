@@ -98,7 +98,7 @@ class Awkward(Doorman):
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
         if u.stop_length == 13.0:
             raise KeyError("thirteen")
-        return np.zeros(3) if u.stop_length == 3.0 else super().jump(event, t, x, u, p)
+        return {"doors": np.zeros(3)} if u.stop_length == 3.0 else super().jump(event, t, x, u, p)
 
 
 def test_failures_of_outputs_and_jumps_are_refused_calls_too() -> None:
@@ -112,7 +112,7 @@ def test_failures_of_outputs_and_jumps_are_refused_calls_too() -> None:
     with pytest.raises(BlockCallError, match=r"^updateDiscreteStates: .*the model failed: KeyError"):
         driven.event("stop", None, {"stop_length": 13.0})
     driven.block.enterStepMode()
-    with pytest.raises(BlockCallError, match=r"jump\('stop'\) returns 3 values, expected 2"):
+    with pytest.raises(BlockCallError, match=r"jump\('stop'\) returns 'doors' of shape \(3,\); expected one number"):
         driven.event("stop", None, {"stop_length": 3.0})
 
 

@@ -145,7 +145,7 @@ def test_an_integer_output_is_a_whole_number_to_the_outside() -> None:
         outputs = (*Swing.outputs, output_signal("marks_count", "1", variability="discrete", integer=True))
 
         def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-            return super().output(t, x, u, p) | {"marks_count": x[4]}
+            return super().output(t, x, u, p) | {"marks_count": x.marks[0]}
 
     assert [_by_name(describe(Counting(), v))["marks_count"].type for v in (2, 3)] == ["Integer", "Int32"]  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="'speed' is an integer; only a discrete output can be one"):
@@ -417,6 +417,6 @@ def test_options_of_one_class_give_different_tokens() -> None:
 def test_other_equations_give_another_token() -> None:
     class Stiffer(Swing):
         def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return 2.0 * super().flow(t, x, u, p)
+            return {name: 2.0 * value for name, value in super().flow(t, x, u, p).items()}
 
     assert describe(Stiffer(), 3).instantiationToken != describe(SWING, 3).instantiationToken

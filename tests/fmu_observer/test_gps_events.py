@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fmu_observer.block import make_block
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, state
 from plant_models.railway.sensors.gps import Gps
 
 SPEED, STEP = 3.0, 0.04  # [m/s], [s]; fixes at 10 Hz lie inside communication steps
@@ -17,8 +17,6 @@ SPEED, STEP = 3.0, 0.04  # [m/s], [s]; fixes at 10 Hz lie inside communication s
 class Corrected(HybridSystem):
     """Dead reckoning that takes the place of each fix."""
 
-    by_name = False
-
     name = "corrected"
     description = "Dead reckoning, reset at fixes"
     source = "a test"
@@ -26,14 +24,14 @@ class Corrected(HybridSystem):
     outputs = (output_signal("position", "m"), output_signal("heard", "1"))
     events = (TriggeredEvent("gps", (input_signal("gps_position", "m", variability="discrete"),)),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(SPEED + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": SPEED}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.gps_position, x[1] + 1.0)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.gps_position, "fixes": x.fixes + 1.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "heard": x[1]}
+        return {"position": x.place, "heard": x.fixes}
 
 
 class Wired:

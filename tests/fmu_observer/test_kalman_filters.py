@@ -31,7 +31,6 @@ from plant_models.hybrid import (
     parameter,
     scalar_names,
     state,
-    vector,
 )
 from plant_models.hybrid.runtime import Runtime as Moving
 
@@ -247,18 +246,16 @@ def test_noise_through_an_input_by_hand() -> None:
 class Scaled(HybridSystem):
     """A mass whose sensor has a noise that grows with the speed, ``y = x + (1 + rate) disturbance``."""
 
-    by_name = False
-
     name = "scaled"
     states = (state("place", "m"), state("rate", "m/s", 2.0))
     inputs = (input_signal("push", "m/s2"), input_signal("disturbance", "m"))
     outputs = (output_signal("seen", "m"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], u.push)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": x.rate, "rate": u.push}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"seen": x[0] + (1.0 + x[1]) * u.disturbance}
+        return {"seen": x.place + (1.0 + x.rate) * u.disturbance}
 
 
 @pytest.mark.parametrize("kind", [ExtendedKalmanFilter, UnscentedKalmanFilter])
@@ -276,8 +273,6 @@ def test_measurement_noise_through_an_input_by_hand(kind: type[GaussianFilter]) 
 class Read(HybridSystem):
     """A decay that a periodic event reads with noise; with `resets` the event sets it back too."""
 
-    by_name = False
-
     name = "read"
     states = (state("level", "1", 1.0), memory("reading", "1"))
     outputs = (output_signal("now", "1"), output_signal("read", "1"))
@@ -288,14 +283,14 @@ class Read(HybridSystem):
         self.resets = resets
         super().__init__(resets=resets)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(-x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"level": -x.level}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"now": x[0], "read": x[1]}
+        return {"now": x.level, "read": x.reading}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(1.0 if self.resets else x[0] + p.noise * u.jitter, x[0])
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"level": 1.0 if self.resets else x.level + p.noise * u.jitter, "reading": x.level}
 
 
 def test_events_of_a_plant_that_only_read_or_disturb_do_no_harm() -> None:
@@ -394,18 +389,16 @@ def test_a_late_measurement_that_is_replayed_is_as_one_in_time() -> None:
 class Vehicle(HybridSystem):
     """A train as a point with an acceleration that is told."""
 
-    by_name = False
-
     name = "vehicle"
     states = (state("way", "m"), state("pace", "m/s", 10.0))
     inputs = (input_signal("drive", "m/s2"),)
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], u.drive)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"way": x.pace, "pace": u.drive}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "speed": x[1]}
+        return {"position": x.way, "speed": x.pace}
 
 
 def test_balises_are_gated_and_the_odometer_is_sampled() -> None:

@@ -20,15 +20,13 @@ from fmu_observer.observers.generic.discrete.extended_kalman_filter import Exten
 from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from plant_models import PLANTS
-from plant_models.hybrid import HybridSystem, Runtime, input_signal, output_signal, scalar_names, state, vector
+from plant_models.hybrid import HybridSystem, Runtime, input_signal, output_signal, scalar_names, state
 
 MOTOR: dict[str, Any] = {"outputs": ["current_d", "current_q"]}
 
 
 class Fast(HybridSystem):
     """A linear plant that forgets within 20 ms."""
-
-    by_name = False
 
     name = "fast"
     description = "dx/dt = -50 x + u"
@@ -38,11 +36,11 @@ class Fast(HybridSystem):
     inputs = (input_signal("u", "1"),)
     outputs = (output_signal("y", "1", "State"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(-50.0 * x[0] + u.u)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -50.0 * x.x + u.u}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"y": x[0]}
+        return {"y": x.x}
 
 
 def known_of(model: FilterModel, u: np.ndarray | None = None) -> Known:

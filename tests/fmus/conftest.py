@@ -38,8 +38,6 @@ from plant_models.hybrid import (
 class Oscillator(HybridSystem):
     """A damped oscillator: smooth, rk4, a tunable parameter, an output that depends directly on the input."""
 
-    by_name = False
-
     name = "oscillator"
     description = "Damped oscillator"
     states = (state("position", "m", 1.0), state("speed", "m/s"))
@@ -53,19 +51,17 @@ class Oscillator(HybridSystem):
     internal_step = 0.002
 
     def _acceleration(self, x: Any, u: Any, p: Any) -> Any:
-        return u.force - p.stiffness * x[0] - p.damping * x[1] + 0.1 * np.sin(3.0 * x[0])
+        return u.force - p.stiffness * x.position - p.damping * x.speed + 0.1 * np.sin(3.0 * x.position)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], self._acceleration(x, u, p))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"position": x.speed, "speed": self._acceleration(x, u, p)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position_mm": 1000.0 * x[0], "acceleration": self._acceleration(x, u, p)}
+        return {"position_mm": 1000.0 * x.position, "acceleration": self._acceleration(x, u, p)}
 
 
 class Slider(HybridSystem):
     """A stiff slider with dry friction: rosenbrock, set-valued friction."""
-
-    by_name = False
 
     name = "slider"
     states = (state("position", "m"), state("speed", "m/s", 0.5), state("filtered", "m/s"))
@@ -76,20 +72,18 @@ class Slider(HybridSystem):
     method = "rosenbrock"
     internal_step = 0.005
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], u.force / p.mass, 2000.0 * (x[1] - x[2]) + 0.1 * t)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"position": x.speed, "speed": u.force / p.mass, "filtered": 2000.0 * (x.speed - x.filtered) + 0.1 * t}
 
     def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         return vector(p.grip / p.mass)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed_out": x[1], "filtered_out": x[2]}
+        return {"speed_out": x.speed, "filtered_out": x.filtered}
 
 
 class Sampler(HybridSystem):
     """Two noisy periodic events with different periods, one with an offset; memory and a vector; nothing flows."""
-
-    by_name = False
 
     name = "sampler"
     states = (memory("held", "m/s", 0.25), memory("ring", "m/s", (1.0, 2.0, 3.0), size=3))
@@ -107,19 +101,17 @@ class Sampler(HybridSystem):
     )
     internal_step = 0.01
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if event == "sample":
-            return vector(u.wheel_speed + p.deviation * (u.first_noise + 0.5 * u.second_noise), x[1], x[2], x[3])
-        return vector(x[0], x[0] + u.third_noise, x[1], x[2])
+            return {"held": u.wheel_speed + p.deviation * (u.first_noise + 0.5 * u.second_noise)}
+        return {"ring": vector(x.held + u.third_noise, x.ring[0], x.ring[1])}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"reading": x[0], "mean": (x[1:4] + x[0]) / 2.0}
+        return {"reading": x.held, "mean": (x.ring + x.held) / 2.0}
 
 
 class Tracker(HybridSystem):
     """A small observer: flows, jumps at two triggered events with payloads and at a periodic one."""
-
-    by_name = False
 
     name = "tracker"
     states = (state("position", "m"), state("speed", "m/s", 10.0), memory("innovation", "m"))
@@ -139,26 +131,24 @@ class Tracker(HybridSystem):
     )
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], 2.0 * (u.odometer - x[1]) + 0.3 * np.cos(t))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"position": x.speed, "speed": 2.0 * (u.odometer - x.speed) + 0.3 * np.cos(t)}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if event == "balise":
-            innovation = u.balise_position - x[0]
-            return vector(x[0] + p.gain * innovation, x[1], innovation)
+            innovation = u.balise_position - x.position
+            return {"position": x.position + p.gain * innovation, "innovation": innovation}
         if event == "telegram":
             # order matters
-            return vector(x[0], x[1] + u.telegram_weight * (u.telegram_speed - x[1]) + 0.1 * x[2], x[2])
-        return vector(x[0], x[1], 0.9 * x[2])
+            return {"speed": x.speed + u.telegram_weight * (u.telegram_speed - x.speed) + 0.1 * x.innovation}
+        return {"innovation": 0.9 * x.innovation}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position_out": x[0], "innovation_out": x[2]}
+        return {"position_out": x.position, "innovation_out": x.innovation}
 
 
 class Gain(HybridSystem):
     """No state at all: what goes in comes out."""
-
-    by_name = False
 
     name = "gain"
     inputs = (input_signal("force", "N", 3.0),)
@@ -173,8 +163,6 @@ class Booster(HybridSystem):
     switches.
     """
 
-    by_name = False
-
     name = "booster"
     states = (state("place", "m"), state("rate", "m/s", 1.0))
     outputs = (output_signal("speed", "m/s"), output_signal("pushed", "m/s2"))
@@ -183,7 +171,8 @@ class Booster(HybridSystem):
     internal_step = 0.01
 
     def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0] - p.stretch[0], x[0] - p.stretch[1], t - p.span[0] + 0.0 * x[0], t - p.span[1] + 0.0 * x[0])
+        place, now = x.place, t + 0.0 * x.place
+        return vector(place - p.stretch[0], place - p.stretch[1], now - p.span[0], now - p.span[1])
 
     def requirements(self, p: Any) -> dict[str, Any]:
         return {"the stretch has no length": np.where(p.stretch[1] > p.stretch[0], 1.0, 0.0)}
@@ -192,19 +181,17 @@ class Booster(HybridSystem):
         passed = self.switches(t, x, u, p)
         return 3.0 * (passed[0] - passed[1]) + 2.0 * (passed[2] - passed[3])
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], self._push(t, x, u, p))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": x.rate, "rate": self._push(t, x, u, p)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed": x[1], "pushed": self._push(t, x, u, p)}
+        return {"speed": x.rate, "pushed": self._push(t, x, u, p)}
 
 
 class Hopper(HybridSystem):
     """Everything that can be part of a replay: friction, a tunable parameter, noise, communication events, an integer
     output.
     """
-
-    by_name = False
 
     name = "hopper"
     states = (
@@ -242,23 +229,26 @@ class Hopper(HybridSystem):
     frictions = ("speed",)
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], 5.0 * u.force + u.wind[0] * t - u.wind[1] - p.drag * x[1] - 3.0 * x[0] + 0.1 * x[3])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {
+            "position": x.speed,
+            "speed": 5.0 * u.force + u.wind[0] * t - u.wind[1] - p.drag * x.speed - 3.0 * x.position + 0.1 * x.handed,
+        }
 
     def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         return vector(p.grip)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position_out": x[0] + p.lift[1] * x[2], "marks_out": x[5]}
+        return {"position_out": x.position + p.lift[1] * x.sample, "marks_out": x.marks}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if event == "kick":
-            return vector(x[0], 0.9 * x[1] + u.kick_share[0] * u.kick_impulse, x[2] + u.kick_share[1], x[3], x[4], x[5])
+            return {"speed": 0.9 * x.speed + u.kick_share[0] * u.kick_impulse, "sample": x.sample + u.kick_share[1]}
         if event == "mark":
-            return vector(x[0], p.lift[0] * x[1], x[2], x[3], x[4], x[5] + 1.0)
+            return {"speed": p.lift[0] * x.speed, "marks": x.marks + 1.0}
         if event == "handover":
-            return vector(x[0], x[1], x[2], 0.5 * x[3] + x[0], x[4] + 1.0, x[5])
-        return vector(x[0], x[1], x[0] + 0.1 * u.jitter, x[3], x[4], x[5])
+            return {"handed": 0.5 * x.handed + x.position, "steps": x.steps + 1.0}
+        return {"sample": x.position + 0.1 * u.jitter}
 
 
 SMALL: dict[str, type[HybridSystem]] = {

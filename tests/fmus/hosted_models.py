@@ -23,8 +23,6 @@ from plant_models.hybrid import (
 class Gatekeeper(HybridSystem):
     """Counts train crossings and decides with loops and branches; sampled, marked and noisy."""
 
-    by_name = False
-
     name = "gatekeeper"
     description = "Ordinary Python with every kind of event"
     states = (state("place", "m", 1.0), memory("passed", "1"), memory("sample", "m"), memory("last", "m"))
@@ -38,22 +36,22 @@ class Gatekeeper(HybridSystem):
     traceable = False
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if u.speed < 0.0:
             mean(())  # FAILS HERE, and deeper inside a library
         speed, share = 0.0, u.speed
         while share > 0.1:
             share /= 2.0
             speed += share
-        return np.array([min(speed, p.limit) - 0.01 * x[0] * x[1]])
+        return {"place": min(speed, p.limit) - 0.01 * x.place * x.passed}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"doubled": 2.0 * x[0], "passed_out": x[1]}
+        return {"doubled": 2.0 * x.place, "passed_out": x.passed}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if event == "balise":
-            return np.array([0.7 * x[0] + 0.3 * u.balise_position, x[1] + 1.0, x[2], t * x[0]])
-        return np.array([x[0], x[1], x[0] + 0.1 * u.jitter, x[3]])
+            return {"place": 0.7 * x.place + 0.3 * u.balise_position, "passed": x.passed + 1.0, "last": t * x.place}
+        return {"sample": x.place + 0.1 * u.jitter}
 
 
 class Needy(Gatekeeper):

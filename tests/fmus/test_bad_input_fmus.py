@@ -20,7 +20,7 @@ from fmus.cli import main
 from fmus.cli.failures import in_words
 from fmus.content.names import NameRefusedError
 from fmus.pack import check_target
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state
 
 Output = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[2]
@@ -145,19 +145,18 @@ def test_options_of_a_users_system_are_checked(own_model: Callable[..., Path], c
 
 def named(name: str, event: str = "ping") -> HybridSystem:
     class Named(HybridSystem):
-        by_name = False
         states = (state("place", "m"),)
         outputs = (output_signal("out", "m"),)
         events = (TriggeredEvent(event, (input_signal(f"{event}_value", "m", variability="discrete"),)),)
 
-        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(1.0 + 0.0 * x[0])
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"place": 1.0}
 
-        def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(x[0] + 1.0)
+        def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"place": x.place + 1.0}
 
         def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-            return {"out": x[0]}
+            return {"out": x.place}
 
     Named.name = name
     return Named()

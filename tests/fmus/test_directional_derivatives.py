@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from fmu_observer.block import make_block
 from fmu_observer.description import can_exchange
 from fmus import RECIPES, recipe
-from plant_models.hybrid import HybridSystem, TracedSystem, output_signal, scalar_names, state, vector
+from plant_models.hybrid import HybridSystem, TracedSystem, output_signal, scalar_names, state
 
 pytestmark = pytest.mark.compiler
 
@@ -30,8 +30,6 @@ RAW = {2: "Real", 3: "Float64"}
 class Kinked(HybridSystem):
     """A root at its end, where it has no derivative, and a whole number among the outputs."""
 
-    by_name = False
-
     name = "kinked"
     states = (state("level", "m"),)
     outputs = (
@@ -39,11 +37,11 @@ class Kinked(HybridSystem):
         output_signal("count", "1", variability="discrete", integer=True),
     )
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(1.0 + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"level": 1.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"root_of_level": np.sqrt(x[0]), "count": np.floor(t)}
+        return {"root_of_level": np.sqrt(x.level), "count": np.floor(t)}
 
 
 def _names(system: HybridSystem) -> tuple[list[str], list[str]]:

@@ -22,7 +22,7 @@ from fmus.documentation.page import page
 from fmus.documentation.prose import blocks, pieces
 from fmus.toolchain.platforms import host_platform
 from fmus.toolchain.targets import Target, choose_targets
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, parameter, state
 
 pytestmark = pytest.mark.compiler
 
@@ -126,8 +126,6 @@ class Odd(HybridSystem):
         ValueError: never told to the user of an FMU.
     """
 
-    by_name = False
-
     name = "odd"
     description = 'A <model> & "more"'
     source = "K&R, <1978>"
@@ -140,14 +138,14 @@ class Odd(HybridSystem):
     def __init__(self) -> None:
         super().__init__(kind="<none>")
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.push)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.push}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0] + u.hiss)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": x.place + u.hiss}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"out": x[0]}
+        return {"out": x.place}
 
     def certify(self, max_gap: float, preset: str | None = None) -> Any:
         raise ArithmeticError("1 < 0")

@@ -25,21 +25,19 @@ from plant_models.hybrid import (
 class Hasty(HybridSystem):
     """Its flow reads the payload of an event, which is not known before the event."""
 
-    by_name = False
-
     name = "hasty"
     states = (state("place", "m"),)
     outputs = (output_signal("place_out", "m"),)
     events = (TriggeredEvent("tell", (input_signal("tell_place", "m", variability="discrete"),)),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.tell_place - x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.tell_place - x.place}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.tell_place + 0.0 * x[0])
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.tell_place}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"place_out": x[0]}
+        return {"place_out": x.place}
 
 
 def test_a_payload_read_outside_its_event_is_refused() -> None:
@@ -52,47 +50,45 @@ def test_a_payload_read_outside_its_event_is_refused() -> None:
 class Plain(HybridSystem):
     """What the wrong ones below are derived from."""
 
-    by_name = False
-
     name = "plain"
     states = (state("x", "1", 1.0),)
     outputs = (output_signal("y", "1"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return -x
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -x.x}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return {"y": x[0]}
+        return {"y": x.x}
 
 
 class Mathematical(Plain):
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return -x + math.sin(x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -x.x + math.sin(x.x)}
 
 
 class Numerical(Plain):
     def output(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return {"y": float(x[0])}
+        return {"y": float(x.x)}
 
 
 class Listing(Plain):
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return [-x[0]]
+        return vector(-x.x)
 
 
 class Long(Plain):
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0], x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": vector(x.x, x.x)}
 
 
 class Bare(Plain):
     def output(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return x[0]
+        return x.x
 
 
 class Misspelt(Plain):
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return -x * u.frce
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -x.x * u.frce}
 
 
 ADVICE = "Write it in plain NumPy without branching on values"
@@ -101,12 +97,12 @@ ADVICE = "Write it in plain NumPy without branching on values"
 @pytest.mark.parametrize(
     ("system", "message", "line", "advised"),
     [
-        (Mathematical, "cannot trace flow: a traced value has no number", "return -x + math.sin", True),
+        (Mathematical, "cannot trace flow: a traced value has no number", 'return {"x": -x.x + math.sin', True),
         (Numerical, "cannot trace output: a traced value has no number", 'return {"y": float', True),
-        (Listing, "cannot trace flow: flow() returns a list; expected an array of 1 values", "", False),
-        (Long, "cannot trace flow: flow() returns 2 values, expected 1", "", False),
+        (Listing, "cannot trace flow: flow() returns a ArrayInterfaceSX; expected a dictionary", "", False),
+        (Long, "cannot trace flow: flow() returns 'x' of shape (2,); expected one number", "", False),
         (Bare, "cannot trace output: output() returns a ArrayInterfaceSX; expected a dictionary", "", False),
-        (Misspelt, "cannot trace flow: 'Inputs' object has no attribute 'frce'", "return -x * u.frce", False),
+        (Misspelt, "cannot trace flow: 'Inputs' object has no attribute 'frce'", 'return {"x": -x.x * u.frce}', False),
     ],
 )
 def test_what_cannot_be_traced_is_said_with_its_own_line(
@@ -123,16 +119,16 @@ def test_what_cannot_be_traced_is_said_with_its_own_line(
 
 def test_constants_may_be_turned_into_numbers() -> None:
     class Constant(Plain):
-        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return -x * math.sqrt(2.0) * float(np.float64(3.0))
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"x": -x.x * math.sqrt(2.0) * float(np.float64(3.0))}
 
     assert trace_equations(Constant()).derivative is not None
 
 
 def test_equations_that_differ_each_time_are_refused() -> None:
     class Dicing(Plain):
-        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return -x * random.random()
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"x": -x.x * random.random()}
 
     with pytest.raises(GenerationError, match="plain: its functions give other equations each time they are traced"):
         trace_equations(Dicing())

@@ -25,7 +25,7 @@ from fmu_observer.event_protocol import EventProtocol
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.build import build_fmu, plan_fmu, write_fmu
 from fmus.toolchain.targets import choose_targets
-from plant_models.hybrid import CommunicationEvent, HybridSystem, input_signal, output_signal, state, vector
+from plant_models.hybrid import CommunicationEvent, HybridSystem, input_signal, output_signal, state
 
 pytestmark = pytest.mark.compiler
 
@@ -37,24 +37,20 @@ EXCHANGED = ("oscillator", "slider", "sampler", "tracker", "gain", *(n for n in 
 class Root(HybridSystem):
     """A square root that has no value below zero."""
 
-    by_name = False
-
     name = "root"
     states = (state("level", "m", 1.0), state("other", "m", 2.0))
     inputs = (input_signal("offset", "m"),)
     outputs = (output_signal("double_level", "m"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(-1.0 + 0.0 * x[0], np.sqrt(x[0] + u.offset))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"level": -1.0, "other": np.sqrt(x.level + u.offset)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"double_level": 2.0 * x[0]}
+        return {"double_level": 2.0 * x.level}
 
 
 class Follower(HybridSystem):
     """Works on communication steps, so it has no model exchange."""
-
-    by_name = False
 
     name = "follower"
     states = (state("held", "m"),)
@@ -62,11 +58,11 @@ class Follower(HybridSystem):
     outputs = (output_signal("held_out", "m"),)
     events = (CommunicationEvent("reading"),)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.given)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"held": u.given}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"held_out": x[0]}
+        return {"held_out": x.held}
 
 
 def _status(call: Callable[..., Any], *arguments: Any) -> int:

@@ -30,8 +30,6 @@ class SlidingMass(HybridSystem):
     once.
     """
 
-    by_name = False
-
     name = "sliding_mass"
     states = (state("place", "m"), state("speed", "m/s"))
     inputs = (input_signal("force", "N"),)
@@ -45,25 +43,23 @@ class SlidingMass(HybridSystem):
     events = (TriggeredEvent("blow", (input_signal("blow_speed", "m/s", variability="discrete"),)),)
     frictions = ("speed",)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], (u.force + p.amplitude * np.sin(p.pulsation * t)) / p.mass)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": x.speed, "speed": (u.force + p.amplitude * np.sin(p.pulsation * t)) / p.mass}
 
     def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         return vector(p.grip / p.mass)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0], u.blow_speed)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"speed": u.blow_speed}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed_out": x[1], "place_out": x[0]}
+        return {"speed_out": x.speed, "place_out": x.place}
 
 
 class SwitchedMass(HybridSystem):
     """A mass at rest on dry friction. By a switch a force of twice the friction begins, which then fades at a rate of
     one friction a second.
     """
-
-    by_name = False
 
     name = "switched_mass"
     states = (state("speed", "m/s"),)
@@ -72,10 +68,10 @@ class SwitchedMass(HybridSystem):
     switchings = ("begin",)
 
     def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(t - p.begin + 0.0 * x[0])
+        return vector(t - p.begin + 0.0 * x.speed)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(GRIP / MASS * (2.0 - (t - p.begin)) * self.switches(t, x, u, p)[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"speed": GRIP / MASS * (2.0 - (t - p.begin)) * self.switches(t, x, u, p)[0]}
 
     def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         return vector(GRIP / MASS)

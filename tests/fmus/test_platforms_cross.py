@@ -126,8 +126,6 @@ def test_nothing_but_the_system_is_needed(everywhere: tuple[int, Path], tmp_path
 class Exponent(HybridSystem):
     """Functions of which glibc has newer versions than 2.17: exp, pow and log of 2.29."""
 
-    by_name = False
-
     name = "exponent"
     inputs = (input_signal("x", "1", 1.0),)
     outputs = (output_signal("y", "1"),)

@@ -62,8 +62,6 @@ def test_zones_moved_a_little_change_little(component: Callable[..., Any], excha
 class Chattering(HybridSystem):
     """Pushed back wherever it goes: its switch changes without end, beside a clock."""
 
-    by_name = False
-
     name = "chattering"
     states = (state("place", "m"), state("elapsed", "s"))
     outputs = (output_signal("clock", "s"),)
@@ -72,21 +70,21 @@ class Chattering(HybridSystem):
     internal_step = 0.01
 
     def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return x[:1] - p.middle
+        return vector(x.place - p.middle)
 
     def requirements(self, p: Any) -> dict[str, Any]:
         between = np.where(p.middle > p.left, np.where(p.middle < p.right, 1.0, 0.0), 0.0)
         return {"middle must lie between left and right": between}
 
     def start_requirements(self, x: Any, p: Any) -> dict[str, Any]:
-        return {"elapsed must begin with zero, whatever middle": np.where(x[1] == 0.0, 1.0, 0.0)}
+        return {"elapsed must begin with zero, whatever middle": np.where(x.elapsed == 0.0, 1.0, 0.0)}
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         push = 50.0 - 100.0 * self.switches(t, x, u, p)[0]
-        return vector(push, 1.0 + 0.0 * push)
+        return {"place": push, "elapsed": 1.0 + 0.0 * push}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"clock": x[1]}
+        return {"clock": x.elapsed}
 
 
 def test_switches_that_chatter_do_not_stop_time(component: Callable[..., Any]) -> None:

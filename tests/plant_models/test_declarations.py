@@ -20,7 +20,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 
 
@@ -83,7 +82,7 @@ def test_presets_fill_vectors_and_states() -> None:
 def test_missing_and_undeclared_outputs_are_named() -> None:
     class Forgetful(Hyperbola):
         def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-            return {"z": x[0]}
+            return {"z": x.x}
 
     system = Forgetful()
     with pytest.raises(ValueError, match=r"leaves out \['y'\] and returns undeclared \['z'\]"):
@@ -99,7 +98,7 @@ def test_an_event_without_a_jump_is_named() -> None:
 def test_branching_on_values_is_explained_when_traced() -> None:
     class Branching(Hyperbola):
         def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(1.0 if x[0] > 0 else -1.0)
+            return {"x": 1.0 if x.x > 0 else -1.0}
 
     with pytest.raises(TracingError, match=r"cannot trace .*np\.where instead of 'if'"):
         _ = TracedSystem(Branching()).step

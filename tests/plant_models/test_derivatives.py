@@ -80,7 +80,7 @@ def test_the_tangent_agrees_with_central_differences(system: HybridSystem) -> No
 def test_dependencies_of_the_derivative_include_the_friction() -> None:
     class Slowed(Slider):
         def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(p.friction_level * (1.0 + x[0] ** 2))
+            return vector(p.friction_level * (1.0 + x.x**2))
 
     assert TracedSystem(Slider()).dependencies("derivative", "x").tolist() == [[False, True], [False, False]]
     assert TracedSystem(Slowed()).dependencies("derivative", "x").tolist() == [[False, True], [True, False]]
@@ -90,15 +90,13 @@ def test_dependencies_of_the_derivative_include_the_friction() -> None:
 class Listener(HybridSystem):
     """Remembers what it was told at the end of each communication step, and when."""
 
-    by_name = False
-
     name = "listener"
     states = (memory("heard", "1"), memory("heard_at", "s", -1.0), memory("times", "1"))
     inputs = (input_signal("word", "1"),)
     events = (CommunicationEvent("hearing"),)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.word, t + 0.0 * x[0], x[2] + 1.0)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"heard": u.word, "heard_at": t, "times": x.times + 1.0}
 
 
 def test_communication_events_happen_at_the_start_and_when_told() -> None:

@@ -158,7 +158,6 @@ def test_a_file_counts_by_its_content(tmp_path: Path) -> None:
 
 def test_what_is_not_known_by_its_content_has_no_identity() -> None:
     class Own(HybridSystem):
-        by_name = False
         name = "own"
 
     circle: list[Any] = []

@@ -90,41 +90,49 @@ def test_a_preset_sets_a_seed_only_where_there_is_noise() -> None:
 
 
 class _Sized(HybridSystem):
-    by_name = False
     name = "sized"
     states = (state("x", "1"), state("y", "1"), memory("m", "1"))
     outputs = (output_signal("o", "1"),)
     events = (TriggeredEvent("tell"),)
 
-    def __init__(self, flow: int = 2, jump: int = 3, output: int = 0) -> None:
-        self.sizes = flow, jump, output
+    def __init__(self, output: int = 0) -> None:
+        self.size = output
         super().__init__()
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(*(x[0] + i for i in range(self.sizes[0])))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": x.x, "y": x.x + 1.0}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(*(x[0] + i for i in range(self.sizes[1])))
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"m": x.x}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"o": vector(*(x[0] for _ in range(self.sizes[2]))) if self.sizes[2] else x[0]}
+        return {"o": vector(*(x.x for _ in range(self.size))) if self.size else x.x}
+
+
+class _FlatFlow(_Sized):
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(x.x, x.y)
+
+
+class _FlatJump(_Sized):
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(x.x, x.y, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("sizes", "message"),
-    [
-        ({"flow": 1}, r"flow\(\) returns 1 values, expected 2"),
-        ({"flow": 3}, r"flow\(\) returns 3 values, expected 2"),
-        ({"jump": 1}, r"jump\('tell'\) returns 1 values, expected 3"),
-        ({"jump": 4}, r"jump\('tell'\) returns 4 values, expected 3"),
-    ],
+    ("kind", "where"), [(_FlatFlow, r"flow\(\)"), (_FlatJump, r"jump\('tell'\)")], ids=["flow", "jump"]
 )
-def test_functions_that_return_the_wrong_number_of_values_are_named(sizes: dict[str, int], message: str) -> None:
-    with pytest.raises(TracingError, match=message):
-        TracedKernel(_Sized(**sizes))
-    kernel = NumpyKernel(_Sized(**sizes))
-    with pytest.raises(ValueError, match=message):
-        kernel.step(0.0, 1.0) if "flow" in sizes else kernel.jump("tell", 0.0)
+def test_one_array_of_all_states_is_refused_with_what_to_return(kind: type[_Sized], where: str) -> None:
+    """Symbols alike: both kernels say which function of which system it is, and what it is to return."""
+    wanted = r"expected a dictionary of values by name of the state, \{'x': \.\.\., 'y': \.\.\.\}, not one array of all"
+    with pytest.raises(
+        TracingError, match=f"^sized: cannot trace .*: {where} returns a ArrayInterfaceSX; {wanted}"
+    ) as caught:
+        TracedKernel(kind())
+    assert "test_hybrid_guards.py:" in str(caught.value)
+    kernel = NumpyKernel(kind())
+    with pytest.raises(TypeError, match=f"^sized: {where} returns a ndarray; {wanted}"):
+        kernel.step(0.0, 1.0) if kind is _FlatFlow else kernel.jump("tell", 0.0)
     TracedKernel(_Sized())
 
 
@@ -134,7 +142,6 @@ def test_an_output_that_is_no_scalar_does_not_write_past_its_place() -> None:
 
 
 class _Reader(HybridSystem):
-    by_name = False
     name = "reader"
     states = (state("x", "1"), memory("m", "1"))
     outputs = (output_signal("told", "1"),)
@@ -149,11 +156,11 @@ class _Reader(HybridSystem):
         self.reads = reads
         super().__init__()
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.tell_value if self.reads == "flow" else x[1])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": u.tell_value if self.reads == "flow" else x.m}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0], u.tell_value if event in ("tell", self.reads) else x[1])
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"m": u.tell_value if event in ("tell", self.reads) else x.m}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {"told": u.tell_value}

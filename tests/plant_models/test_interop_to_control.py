@@ -35,8 +35,6 @@ DAVIS_B, DAVIS_C = 32.0, 1.7
 class Chain(HybridSystem):
     """Two masses with a spring and a damper between them, and a force on the first."""
 
-    by_name = False
-
     name = "chain"
     states = (state("p", "m", (0.0, 0.0), size=2), state("v", "m/s", (1.0, 0.0), size=2))
     inputs = (input_signal("force", "N"),)
@@ -47,27 +45,25 @@ class Chain(HybridSystem):
         parameter("damping", "kg/s", 4.0),
     )
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         pull = self.output(t, x, u, p)["pull"]
-        return vector(x[2], x[3], (u.force - pull) / p.mass[0], pull / p.mass[1])
+        return {"p": x.v, "v": vector((u.force - pull) / p.mass[0], pull / p.mass[1])}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        stretch = x[0] - x[1]
-        return {"stretch": stretch, "pull": p.stiffness * stretch + p.damping * (x[2] - x[3])}
+        stretch = x.p[0] - x.p[1]
+        return {"stretch": stretch, "pull": p.stiffness * stretch + p.damping * (x.v[0] - x.v[1])}
 
 
 class Counter(HybridSystem):
     """Nothing in it flows."""
-
-    by_name = False
 
     name = "counter"
     states = (memory("count", "1"),)
     parameters = (parameter("period", "s", 1.0),)
     events = (PeriodicEvent("tick", "period"),)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0] + 1.0)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"count": x.count + 1.0}
 
 
 def rolling(speed: float) -> tuple[dict[str, float], dict[str, float]]:

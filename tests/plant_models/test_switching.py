@@ -16,7 +16,7 @@ from toy_systems import Booster, ImplicitBooster
 from train_runs import start
 
 from plant_models import Locomotive
-from plant_models.hybrid import HybridSystem, Runtime, state
+from plant_models.hybrid import HybridSystem, Runtime, state, vector
 from plant_models.railway.vehicle import Train
 
 STOP, STEP, EFFORT = 3.0, 0.01, 80e3
@@ -107,14 +107,14 @@ class Chattering(Booster):
     switchings = ("middle",)
 
     def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return x[:1] - 0.1
+        return vector(x.place - 0.1)
 
     def _push(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         return 50.0 - 100.0 * self.switches(t, x, u, p)[0]
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         push = self._push(t, x, u, p)
-        return np.stack([push, push, 1.0 + 0.0 * push])
+        return {"place": push, "rate": push, "elapsed": 1.0}
 
 
 def test_switches_that_chatter_do_not_stop_time() -> None:

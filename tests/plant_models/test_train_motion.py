@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from railway_runs import outputs, parameters, started
 from train_runs import NO_DRAG, recorded, running, start
 
-from plant_models.hybrid import HybridSystem, NumpyKernel, TracedKernel, state, vector
+from plant_models.hybrid import HybridSystem, NumpyKernel, TracedKernel, state
 from plant_models.hybrid.integration import effective_flow
 from plant_models.railway.vehicle.train import Train
 
@@ -170,13 +170,12 @@ def test_plain_numpy_and_the_traced_step_agree_where_a_part_is_implicit() -> Non
 
 def test_stiff_names_states_that_flow() -> None:
     class Faulty(HybridSystem):
-        by_name = False
         name = "faulty"
         states = (state("x", "m"),)
         stiff = ("y",)
 
-        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(-x[0])
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"x": -x.x}
 
     with pytest.raises(ValueError, match=r"stiff names \['y'\]; expected names of continuous states"):
         Faulty()

@@ -22,18 +22,16 @@ from plant_models.hybrid import (
 class Hyperbola(HybridSystem):
     """``dx = -2 t x^2`` with ``x(0) = 1``: ``x = 1 / (1 + t^2)``. Nonlinear and explicit in time."""
 
-    by_name = False
-
     name = "hyperbola"
     states = (state("x", "1", 1.0),)
     outputs = (output_signal("y", "1"),)
     internal_step = 0.1
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(-2.0 * t * x[0] * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -2.0 * t * x.x * x.x}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"y": x[0]}
+        return {"y": x.x}
 
 
 class ImplicitHyperbola(Hyperbola):
@@ -45,22 +43,18 @@ class ImplicitHyperbola(Hyperbola):
 class Stiff(HybridSystem):
     """``dx = -rate (x - cos t) - sin t`` with ``x(0) = 1``: ``x = cos t`` at any rate."""
 
-    by_name = False
-
     name = "stiff"
     states = (state("x", "1", 1.0),)
     parameters = (parameter("rate", "1/s", 1e6),)
     method = "rosenbrock"
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(-p.rate * (x[0] - np.cos(t)) - np.sin(t))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -p.rate * (x.x - np.cos(t)) - np.sin(t)}
 
 
 class Clockwork(HybridSystem):
     """A damped oscillator that is sampled, kicked and measured: every feature of the foundation at once."""
-
-    by_name = False
 
     name = "clockwork"
     states = (
@@ -85,17 +79,22 @@ class Clockwork(HybridSystem):
     )
     internal_step = 0.01
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        spring = p.stiffness[0] * x[0] + p.stiffness[1] * x[0] ** 3
-        return vector(x[1], u.force + np.sin(t) - spring - 0.2 * x[1])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        spring = p.stiffness[0] * x.position_state + p.stiffness[1] * x.position_state**3
+        return {"position_state": x.speed_state, "speed_state": u.force + np.sin(t) - spring - 0.2 * x.speed_state}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"energy": 0.5 * x[1] ** 2 + 0.5 * p.stiffness[0] * x[0] ** 2, "last": x[2]}
+        return {"energy": 0.5 * x.speed_state**2 + 0.5 * p.stiffness[0] * x.position_state**2, "last": x.sample}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         if event == "sampling":
-            return vector(x[0], x[1], x[0] + 0.1 * u.jitter, t, x[4] + 1.0, u.jitter, x[6])
-        return vector(x[0], x[1] + u.kick_impulse, x[2], x[3], x[4], x[5], x[6] + 1.0)
+            return {
+                "sample": x.position_state + 0.1 * u.jitter,
+                "sample_time": t,
+                "samples": x.samples + 1.0,
+                "drawn": u.jitter,
+            }
+        return {"speed_state": x.speed_state + u.kick_impulse, "kicks": x.kicks + 1.0}
 
 
 class ImplicitClockwork(Clockwork):
@@ -109,8 +108,6 @@ class Slider(HybridSystem):
     starts.
     """
 
-    by_name = False
-
     name = "slider"
     states = (state("x", "m"), state("v", "m/s", 1.0))
     inputs = (input_signal("push", "m/s2"),)
@@ -119,22 +116,20 @@ class Slider(HybridSystem):
     frictions = ("v",)
     internal_step = 1e-2
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], u.push)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": x.v, "v": u.push}
 
     def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         return vector(p.friction_level)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed": x[1]}
+        return {"speed": x.v}
 
 
 class Booster(HybridSystem):
     """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between
     switches.
     """
-
-    by_name = False
 
     name = "booster"
     states = (state("place", "m"), state("rate", "m/s", 1.0))
@@ -144,7 +139,8 @@ class Booster(HybridSystem):
     internal_step = 0.01
 
     def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[0] - p.stretch[0], x[0] - p.stretch[1], t - p.span[0] + 0.0 * x[0], t - p.span[1] + 0.0 * x[0])
+        place, now = x.place, t + 0.0 * x.place
+        return vector(place - p.stretch[0], place - p.stretch[1], now - p.span[0], now - p.span[1])
 
     def requirements(self, p: Any) -> dict[str, Any]:
         return {"the stretch has no length": np.where(p.stretch[1] > p.stretch[0], 1.0, 0.0)}
@@ -153,11 +149,11 @@ class Booster(HybridSystem):
         passed = self.switches(t, x, u, p)
         return 3.0 * (passed[0] - passed[1]) + 2.0 * (passed[2] - passed[3])
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], self._push(t, x, u, p))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": x.rate, "rate": self._push(t, x, u, p)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed": x[1], "pushed": self._push(t, x, u, p)}
+        return {"speed": x.rate, "pushed": self._push(t, x, u, p)}
 
 
 class ImplicitBooster(Booster):

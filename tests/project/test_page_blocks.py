@@ -15,7 +15,7 @@ from pages import PAGES, TUTORIALS, Block, blocks
 import cosim.cli
 import fmus.cli
 import plant_models
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 
 PROGRAMS = {"cosim": cosim.cli.main, "fmus": fmus.cli.main}
 WITH_CODE = [
@@ -27,8 +27,6 @@ WITH_CODE = [
 
 class Engine(HybridSystem):
     """Its torque falls with the speed of the shaft."""
-
-    by_name = False
 
     name = "engine"
     description = "An engine"
@@ -43,8 +41,6 @@ class Engine(HybridSystem):
 class Load(HybridSystem):
     """A mass that turns."""
 
-    by_name = False
-
     name = "load"
     description = "A load"
     source = "tests"
@@ -53,11 +49,11 @@ class Load(HybridSystem):
     outputs = (output_signal("speed", "rad/s"),)
     parameters = (parameter("inertia", "kg.m2", 1.0, min=1e-3),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.torque / p.inertia)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"turning": u.torque / p.inertia}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed": x[0]}
+        return {"speed": x.turning}
 
 
 OF_THE_READER: dict[str, Callable[[str], Any]] = {

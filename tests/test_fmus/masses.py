@@ -37,7 +37,7 @@ from scipy.linalg import expm
 from test_fmus.build import linear_fmu
 from test_fmus.description import Version
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, state
 
 UNITS = {"p": "m", "v": "m/s", "f": "N", "a": "m/s2"}
 """By the first letter of a signal."""
@@ -95,13 +95,12 @@ def linear_system(part: Part, step: float) -> HybridSystem:
 
     def rows(left: np.ndarray, right: np.ndarray, x: Any, u: Any) -> list[Any]:
         return [
-            sum((float(left[i, j]) * x[j] for j in range(n)), 0.0)
+            sum((float(left[i, j]) * value for j, value in enumerate(x)), 0.0)
             + sum((float(right[i, j]) * getattr(u, name) for j, name in enumerate(part.inputs)), 0.0)
             for i in range(len(left))
         ]
 
     class Linear(HybridSystem):
-        by_name = False
         name = part.name
         description = "A linear test system"
         source = "tests"
@@ -110,8 +109,8 @@ def linear_system(part: Part, step: float) -> HybridSystem:
         outputs = tuple(output_signal(v, units.get(v, "1")) for v in part.outputs)
         internal_step = step
 
-        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(*rows(part.A, part.B, x, u))
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {s.name: row for s, row in zip(self.states, rows(part.A, part.B, x, u), strict=True)}
 
         def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
             return dict(zip(part.outputs, rows(part.C, part.D, x, u), strict=True))

@@ -12,6 +12,7 @@ from shared.sheet import Sheet
 
 from fmu_observer.design.decoupling import decoupling_condition
 from fmu_observer.design.extended_disturbance import extended_gain
+from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
 from fmu_observer.observers.generic.continuous import DecouplingUio, Luenberger, ProportionalIntegralUio
 from plant_models.hybrid import HybridSystem, Runtime, input_signal, output_signal, vector
@@ -24,8 +25,6 @@ OURS = "ours: locomotive and wagon behind a coupler; the thesis shows these two 
 class Beside(HybridSystem):
     """The plant of `coupled_vehicles` under an unknown acceleration, and an observer that sees both speeds."""
 
-    by_name = False
-
     name, description, source = "beside", "A plant and its observer", "docs/gallery"
     inputs = (input_signal("unknown", "m/s2"),)
 
@@ -33,23 +32,19 @@ class Beside(HybridSystem):
         self.model, self.observer = observer.model, observer
         self.states = (*self.model.states, *observer.states)
         self.outputs = (output_signal("error", "m"), output_signal("residual", "m/s"))
-        self._p = observer.start_parameters()
+        self._p = observer.unpack_parameters(observer.start_parameters())
         super().__init__()
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        n = self.model.order
-        moved = self.model.flow(x[:n], vector(0.0 * x[0])) + self.model.H @ vector(u.unknown)
-        return np.hstack([moved, self.observer.state_derivative(t, x[n:], self._seen(x), self._p)])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        moved = self.model.flow(stacked_of(x, self.model.states), vector(0.0)) + self.model.H @ vector(u.unknown)
+        return named_as(self.model.states, moved) | self.observer.flow(t, x, self._seen(x), self._p)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        told = self.observer.output_vector(t, x[self.model.order :], self._seen(x), self._p)
-        found = {s.name: told[i] for i, s in enumerate(self.observer.outputs)}
-        residual = found.get("residual_wagon_speed", 0.0)
-        return {"error": found["elongation"] - x[0], "residual": residual}
+        found = self.observer.output(t, x, self._seen(x), self._p)
+        return {"error": found["elongation"] - x.elongation, "residual": found.get("residual_wagon_speed", 0.0)}
 
     def _seen(self, x: Any) -> Any:
-        y = self.model.C @ x[: self.model.order]
-        return vector(0.0 * x[0], y[0], y[1])
+        return self.observer.unpack_inputs(vector(0.0, *(self.model.C @ stacked_of(x, self.model.states))))
 
 
 def run(observer: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -34,8 +34,6 @@ LOSSES = {
 class ConstantEffort(HybridSystem):
     """The effort that just balances the drag."""
 
-    by_name = False
-
     name = "constant_effort"
     outputs = (output_signal("effort", "N"),)
 

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.localise import choose
 from cosim.errors import CouplingError
-from plant_models.hybrid import HybridSystem, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, output_signal, parameter, state
 
 H = 0.1
 PROMISED = {"rollback": 1e-9, "predict": 1e-6}
@@ -28,19 +28,17 @@ class Slippery(HybridSystem):
     ends.
     """
 
-    by_name = False
-
     name = "slippery"
     states = (state("p", "m"), state("v", "m/s", 5.0))
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
     parameters = (parameter("good", "m/s2", 1.2), parameter("bad", "m/s2", 0.3))
     internal_step = 1e-3
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], np.where(x[0] < 20.0, p.good, np.where(x[0] < 40.0, p.bad, p.good)))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"p": x.v, "v": np.where(x.p < 20.0, p.good, np.where(x.p < 40.0, p.bad, p.good))}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "speed": x[1]}
+        return {"position": x.p, "speed": x.v}
 
 
 def watched(

@@ -17,7 +17,7 @@ from test_fmus.events import awkward_fmu
 
 from cosim import Scenario
 from fmus.build import build_fmu
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal
 
 STEP, COUNT = 0.1, 60
 RECEIVERS = ("takagi_sugeno_cdo", "discrete_uio")
@@ -27,8 +27,6 @@ FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at")
 class Listener(HybridSystem):
     """Remembers all that a telegram says."""
 
-    by_name = False
-
     name = "listener"
     states = tuple(memory(field, "1") for field in FIELDS)
     outputs = tuple(output_signal(f"told_{field}", "1", variability="discrete") for field in FIELDS)
@@ -37,11 +35,11 @@ class Listener(HybridSystem):
     )
     internal_step = 0.1
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(*(getattr(u, f"balise_{field}") for field in FIELDS))
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {field: getattr(u, f"balise_{field}") for field in FIELDS}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {f"told_{field}": x[i] for i, field in enumerate(FIELDS)}
+        return {f"told_{field}": getattr(x, field) for field in FIELDS}
 
 
 @pytest.fixture(scope="module")

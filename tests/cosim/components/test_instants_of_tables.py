@@ -40,7 +40,6 @@ from plant_models.hybrid import (
     parameter,
     scalar_names,
     state,
-    vector,
 )
 from plant_models.hybrid.signal import memory
 
@@ -50,8 +49,6 @@ ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
 class Lag(HybridSystem):
     """``dx/dt = rate * (a - x) + b``: an input that acts over the step, one that also passes through at once."""
 
-    by_name = False
-
     name = "lag"
     description = "A lag"
     source = "a test"
@@ -60,17 +57,15 @@ class Lag(HybridSystem):
     outputs = (output_signal("y", "1"), output_signal("z", "1"))
     parameters = (parameter("rate", "1/s", 0.7),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(p.rate * (u.a - x[0]) + u.b)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": p.rate * (u.a - x.x) + u.b}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"y": x[0], "z": 0.3 * u.b + x[0]}
+        return {"y": x.x, "z": 0.3 * u.b + x.x}
 
 
 class Sampler(HybridSystem):
     """Keeps a sample of its inputs."""
-
-    by_name = False
 
     name = "sampler"
     description = "A sampler"
@@ -81,11 +76,11 @@ class Sampler(HybridSystem):
     parameters = (parameter("period", "s", 0.2), parameter("offset", "s", 0.0))
     events = (PeriodicEvent("sample", "period", "offset"),)
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(0.4 * u.a - 0.3 * u.b + 0.2)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"kept": 0.4 * u.a - 0.3 * u.b + 0.2}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"y": x[0], "z": -x[0]}
+        return {"y": x.kept, "z": -x.kept}
 
 
 STEP, STOP = 0.1, 1.2

@@ -13,13 +13,11 @@ from hypothesis import strategies as st
 import plant_models
 from cosim import Scenario
 from cosim.structure.divergence import _for_good
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 
 
 class Runaway(HybridSystem):
     """``dv = growth v + push``: from 1 mm/s it is beyond 1000 m/s after ``ln(1e6) / growth``."""
-
-    by_name = False
 
     name = "runaway"
     description = "A train that goes its own way"
@@ -29,11 +27,11 @@ class Runaway(HybridSystem):
     outputs = (output_signal("speed", "m/s"),)
     parameters = (parameter("growth", "1/s", 1.0),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(p.growth * x[0] + 1e-9 * u.effort)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"v": p.growth * x.v + 1e-9 * u.effort}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed": x[0]}
+        return {"speed": x.v}
 
 
 class Ranged(Runaway):
@@ -45,8 +43,6 @@ class Ranged(Runaway):
 
 class Limited(HybridSystem):
     """A driver whose effort stays within 100 N, until a power in it overflows."""
-
-    by_name = False
 
     name = "limited"
     description = "A driver"

@@ -13,13 +13,11 @@ from fmu_observer import OBSERVERS
 from fmu_observer.certificates.observer_limits import Trial
 from fmu_observer.observers.generic.sampled import OutputPredictor
 from fmu_observer.observers.train import DelayedTrainObserver, MultirateCdo
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state
 
 
 class Relaxation(HybridSystem):
     """``x -> x - gain * period * (x - y)`` at a packet: lost from ``gain period = 2`` on."""
-
-    by_name = False
 
     name = "relaxation"
     description = "One state that is corrected by its own gain times the period"
@@ -29,10 +27,10 @@ class Relaxation(HybridSystem):
     events = (TriggeredEvent("packet", (input_signal("packet_y", "1", 0.0, "Measured", variability="discrete"),)),)
 
     def jump(self, event, t, x, u, p):  # type: ignore[no-untyped-def]
-        return vector(x[0] - p.gain * p.period * (x[0] - u.packet_y))
+        return {"x": x.x - p.gain * p.period * (x.x - u.packet_y)}
 
     def output(self, t, x, u, p):  # type: ignore[no-untyped-def]
-        return {"value": x[0]}
+        return {"value": x.x}
 
 
 def trial(**changes: object) -> Trial:
@@ -93,10 +91,10 @@ class Told(Relaxation):
     )
 
     def jump(self, event, t, x, u, p):  # type: ignore[no-untyped-def]
-        return vector(u.one_x, x[1]) if event == "one" else vector(x[0], u.other_y)
+        return {"x": u.one_x} if event == "one" else {"y": u.other_y}
 
     def output(self, t, x, u, p):  # type: ignore[no-untyped-def]
-        return {"first": x[0], "second": x[1]}
+        return {"first": x.x, "second": x.y}
 
 
 def test_nodes_may_have_events_of_their_own() -> None:

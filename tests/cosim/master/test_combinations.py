@@ -43,7 +43,7 @@ from cosim.master.control.multirate import set_rates
 from cosim.master.initialisation import initialise
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state
 
 BALISE = TriggeredEvent("balise", (input_signal("balise_position", "m", variability="discrete"),))
 
@@ -51,22 +51,20 @@ BALISE = TriggeredEvent("balise", (input_signal("balise_position", "m", variabil
 class Jumper(HybridSystem):
     """Holds the last balise; nothing flows. With a share the output also follows a feedback at once."""
 
-    by_name = False
-
     name = "jumper"
     states = (state("held", "m"),)
     inputs = (input_signal("speed", "m/s"),)
     outputs = (output_signal("estimate", "m"),)
     events = (BALISE,)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(0.0 * u.speed)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"held": 0.0 * u.speed}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"estimate": x[0]}
+        return {"estimate": x.held}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.balise_position)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"held": u.balise_position}
 
 
 class Looped(Jumper):
@@ -75,17 +73,15 @@ class Looped(Jumper):
     name = "looped"
     inputs = (input_signal("fed", "m"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(0.0)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"held": 0.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"estimate": x[0] - 0.5 * u.fed}
+        return {"estimate": x.held - 0.5 * u.fed}
 
 
 class Gain(HybridSystem):
     """``y = 2 u``."""
-
-    by_name = False
 
     name = "gain"
     inputs = (input_signal("u", "m"),)
@@ -98,19 +94,17 @@ class Gain(HybridSystem):
 class Adder(HybridSystem):
     """A train at constant speed that integrates what it is told: ``di = u``."""
 
-    by_name = False
-
     name = "adder"
     states = (state("sum", "m.s"),)
     inputs = (input_signal("u", "m"),)
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"), output_signal("i", "m.s"))
     parameters = (parameter("v0", "m/s", 10.0),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.u)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"sum": u.u}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": p.v0 * t, "speed": p.v0, "i": x[0]}
+        return {"position": p.v0 * t, "speed": p.v0, "i": x.sum}
 
 
 class Driven(Adder):
@@ -120,11 +114,11 @@ class Driven(Adder):
     states = (state("p", "m"), state("v", "m/s", 10.0))
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], 0.01 * u.u)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"p": x.v, "v": 0.01 * u.u}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "speed": x[1]}
+        return {"position": x.p, "speed": x.v}
 
 
 # -- lines and jumps

@@ -20,7 +20,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 
 STIFFNESS, DAMPING, MASS = 3.0, 0.5, 2.0
@@ -29,8 +28,6 @@ STIFFNESS, DAMPING, MASS = 3.0, 0.5, 2.0
 class Mass(HybridSystem):
     """``m x'' = force``; feeds its acceleration through."""
 
-    by_name = False
-
     name = "mass"
     states = (state("x", "m", 1.0), state("v", "m/s", 0.3))
     inputs = (input_signal("force", "N"),)
@@ -38,16 +35,14 @@ class Mass(HybridSystem):
     internal_step = 1e-3
 
     def flow(self, t, x, u, p):
-        return vector(x[1], u.force / MASS)
+        return {"x": x.v, "v": u.force / MASS}
 
     def output(self, t, x, u, p):
-        return {"position": x[0], "speed": x[1], "acceleration": u.force / MASS}
+        return {"position": x.x, "speed": x.v, "acceleration": u.force / MASS}
 
 
 class Spring(HybridSystem):
     """``force = -k x - d v``: nothing but feedthrough."""
-
-    by_name = False
 
     name = "spring"
     inputs = (input_signal("position", "m"), input_signal("speed", "m/s"))
@@ -60,8 +55,6 @@ class Spring(HybridSystem):
 class Sampler(HybridSystem):
     """Samples at the start time and every 0.5 s."""
 
-    by_name = False
-
     name = "sampler"
     states = (memory("kept", "m", -7.0),)
     inputs = (input_signal("signal", "m"),)
@@ -70,10 +63,10 @@ class Sampler(HybridSystem):
     events = (PeriodicEvent("tick", "period"),)
 
     def output(self, t, x, u, p):
-        return {"sample": x[0]}
+        return {"sample": x.kept}
 
     def jump(self, event, t, x, u, p):
-        return vector(u.signal)
+        return {"kept": u.signal}
 
 
 PAIRS = [("spring.force", "mass.force"), ("mass.position", "spring.position"), ("mass.speed", "spring.speed")]

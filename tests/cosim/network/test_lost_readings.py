@@ -10,7 +10,7 @@ import pytest
 
 import cosim
 from fmu_observer import OBSERVERS
-from plant_models.hybrid import HybridSystem, Runtime, output_signal, scalar_names, state, vector
+from plant_models.hybrid import HybridSystem, Runtime, output_signal, scalar_names, state
 
 TRAIN = {"mass": 90e3, "davis_a": 900.0, "davis_b": 32.0, "davis_c": 1.7}
 EFFORT = {"effort": 60e3}
@@ -106,7 +106,6 @@ def waves_for(signals: Any) -> HybridSystem:
     named = tuple(output_signal(f"wave_{i}", s.unit, "A wave") for i, s in enumerate(signals))
 
     class Waves(HybridSystem):
-        by_name = False
         name = "waves"
         description = "Waves"
         source = "test"
@@ -114,8 +113,8 @@ def waves_for(signals: Any) -> HybridSystem:
         states = (state("elapsed", "s", 0.0, "Time since the start"),)
         outputs = named
 
-        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            return vector(1.0 + 0.0 * x[0])
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"elapsed": 1.0}
 
         def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
             return {s.name: 0.1 * np.sin((1.0 + 0.3 * i) * t + i) for i, s in enumerate(named)}

@@ -24,8 +24,6 @@ STOP = 2.0
 class Source(HybridSystem):
     """Outputs that are known at any time: ``3 sin(2 t)``, ``cos(2 t)`` and a ramp."""
 
-    by_name = False
-
     name = "source"
     description = "Two sines and a ramp"
     source = "test"
@@ -38,17 +36,15 @@ class Source(HybridSystem):
     )
     parameters = (parameter("rate", "m/s", 1.0, "Slope of the ramp"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(p.rate + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"ramp": p.rate}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"sine": 3.0 * np.sin(2.0 * t), "cosine": np.cos(2.0 * t), "ramp_value": x[0]}
+        return {"sine": 3.0 * np.sin(2.0 * t), "cosine": np.cos(2.0 * t), "ramp_value": x.ramp}
 
 
 class Listener(HybridSystem):
     """Integrates `speed`, and is set to what packets of node 2 say; remembers all that it was told."""
-
-    by_name = False
 
     name = "listener"
     description = "Listens to packets"
@@ -78,15 +74,15 @@ class Listener(HybridSystem):
         ),
     )
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.speed + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.speed}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        place = np.where(u.packet_node == 2.0, u.packet_second, x[0])
-        return vector(place, u.packet_first, u.packet_second, x[3] + 1.0)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        place = np.where(u.packet_node == 2.0, u.packet_second, x.place)
+        return {"place": place, "told": vector(u.packet_first, u.packet_second), "count": x.count + 1.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"estimate": x[0], "first": x[1], "second": x[2], "packets": x[3], "passed_on": u.held}
+        return {"estimate": x.place, "first": x.told[0], "second": x.told[1], "packets": x.count, "passed_on": u.held}
 
 
 def scenario(step: float = 0.01, backend: str = "block3", stop: float = STOP, **network: Any) -> Scenario:

@@ -17,15 +17,13 @@ from cosim import Outcome, Scenario
 from cosim.cli import main
 from cosim.errors import FmuLoadError, ScenarioError
 from fmus.build import BuildDraft
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state
 
 pytestmark = pytest.mark.compiler
 
 
 class Reckoning(HybridSystem):
     """Integrates a speed and takes the position of each balise."""
-
-    by_name = False
 
     name = "reckoning"
     description = "Integrated speed, reset at balises"
@@ -34,14 +32,14 @@ class Reckoning(HybridSystem):
     outputs = (output_signal("position", "m"),)
     events = (TriggeredEvent("balise", (input_signal("balise_position", "m", variability="discrete"),)),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.odometer)
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.odometer}
 
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(u.balise_position)
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.balise_position}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0]}
+        return {"position": x.place}
 
 
 class Opaque(Reckoning):
@@ -54,17 +52,15 @@ class Opaque(Reckoning):
 class Rolling(HybridSystem):
     """What is watched: a body that rolls on."""
 
-    by_name = False
-
     name = "rolling"
     states = (state("place", "m"), state("rate", "m/s", 12.0))
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(x[1], -0.3 * x[1])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": x.rate, "rate": -0.3 * x.rate}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"position": x[0], "speed": x[1]}
+        return {"position": x.place, "speed": x.rate}
 
 
 @pytest.fixture(autouse=True)

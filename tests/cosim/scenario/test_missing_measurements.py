@@ -18,7 +18,7 @@ from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmus import cached_fmu
 from fmus.check.run import check_fmu
 from fmus.fmi.description import read_description
-from plant_models.hybrid import HybridSystem, Runtime, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, Runtime, output_signal, state
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.signal import Signal
 
@@ -29,8 +29,6 @@ GONE = np.isin(np.arange(31), (4, 5, 11, 12, 13, 14, 15, 22))
 class Gauge(HybridSystem):
     """An angle that decays, and is not read where a sine is high."""
 
-    by_name = False
-
     name = "gauge"
     description = "Gauge with gaps"
     source = "test"
@@ -38,11 +36,11 @@ class Gauge(HybridSystem):
     states = (state("x", "rad", 1.0, "Angle"),)
     outputs: tuple[Signal, ...] = (output_signal("angle", "rad", "Reading", can_be_missing=True),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(-0.5 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -0.5 * x.x}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"angle": np.where(np.sin(7.0 * t) > 0.5, np.nan, x[0])}
+        return {"angle": np.where(np.sin(7.0 * t) > 0.5, np.nan, x.x)}
 
 
 class Undeclared(Gauge):

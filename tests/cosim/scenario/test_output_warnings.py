@@ -24,14 +24,11 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
-    vector,
 )
 
 
 class Kettle(HybridSystem):
     """Warms up by one kelvin a second."""
-
-    by_name = False
 
     name = "kettle"
     states = (state("warmth", "K", 0.0),)
@@ -44,12 +41,12 @@ class Kettle(HybridSystem):
         output_signal("ready", warning=OutputWarning("was never ready", reaches=0.5), unit="1"),
     )
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(1.0 + u.sun - u.draught + 0.0 * x[0])
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"warmth": 1.0 + u.sun - u.draught}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        hot, empty = np.where(x[0] > p.alarm_at, 1.0, 0.0), np.where(x[0] > p.empty_at, 1.0, 0.0)
-        return {"temperature": x[0], "hot": hot, "empty": empty, "ready": 0.5 * x[0]}
+        hot, empty = np.where(x.warmth > p.alarm_at, 1.0, 0.0), np.where(x.warmth > p.empty_at, 1.0, 0.0)
+        return {"temperature": x.warmth, "hot": hot, "empty": empty, "ready": 0.5 * x.warmth}
 
 
 def _warnings(scenario: cosim.Scenario) -> list[str]:

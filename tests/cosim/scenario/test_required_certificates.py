@@ -36,7 +36,6 @@ def everything(name: str) -> tuple[type[HybridSystem], tuple[tuple[str, str], ..
     fields += [s for s in system.inputs if s.name.startswith(("measured_", "odometer"))]
 
     class Everything(HybridSystem):
-        by_name = False
         name = "everything"
         description = "Constants"
         source = "test"

@@ -27,7 +27,7 @@ from cosim.errors import RunError
 from cosim.master.algorithms.iterate import Iterate
 from cosim.master.control.doubling import DoublingStep
 from cosim.master.master import Master, close
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, state, vector
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, state
 
 METHODS = ["fixed-point", "aitken", "newton"]
 TURN = 2.0
@@ -286,18 +286,16 @@ class Controller(Listener):
 class Driver(HybridSystem):
     """A brake that follows the speed, and rises with the position; nothing in it acts at once."""
 
-    by_name = False
-
     name = "driver"
     states = (state("pull", "m/s2"),)
     inputs = (input_signal("speed", "m/s"), input_signal("position", "m"))
     outputs = (output_signal("push", "m/s2"),)
 
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(5.0 * (-0.3 * u.speed - 0.1 * u.position - x[0]))
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"pull": 5.0 * (-0.3 * u.speed - 0.1 * u.position - x.pull)}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"push": x[0]}
+        return {"push": x.pull}
 
 
 LAYOUTS: dict[str, tuple[list[str], list[tuple[str, str]], list[str]]] = {
