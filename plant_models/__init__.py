@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from plant_models.registry import Registry, load
 
 if TYPE_CHECKING:
+    from plant_models.faults.fault_cause import FaultCause
     from plant_models.hybrid.system import HybridSystem
     from plant_models.railway.control.driver import Driver
     from plant_models.railway.sensors.balise_reader import BaliseReader
@@ -21,11 +22,10 @@ if TYPE_CHECKING:
 ROOMS = (
     "plant_models.railway.vehicle",
     "plant_models.railway.sensors",
-    "plant_models.railway.faults",
     "plant_models.railway.traction",
     "plant_models.railway.network",
     "plant_models.railway.control",
-    "plant_models.signals",
+    "plant_models.faults",
     "plant_models.exhibits",
     "plant_models.exhibits.wind_turbine",
 )
@@ -34,7 +34,15 @@ SYSTEM = "plant_models.hybrid.system:HybridSystem"
 PLANTS: Registry[type[HybridSystem]] = Registry("plant", ROOMS, "plant_models.plants", SYSTEM)
 """Plants, sensors and drivers: model name to class; options are constructor keywords."""
 
-__all__ = ["PLANTS", "BaliseReader", "Driver", "Gps", "Locomotive", "Odometer", "Train"]
+FAULT_CAUSES: Registry[type[FaultCause]] = Registry(
+    "fault cause",
+    ("plant_models.faults.causes",),
+    "plant_models.fault_causes",
+    "plant_models.faults.fault_cause:FaultCause",
+)
+"""Causes of faults by name: what the option `cause` of `wheel_fault` and `signal_fault` takes."""
+
+__all__ = ["FAULT_CAUSES", "PLANTS", "BaliseReader", "Driver", "Gps", "Locomotive", "Odometer", "Train"]
 
 
 def __getattr__(name: str) -> Any:

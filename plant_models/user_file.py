@@ -66,6 +66,15 @@ def split_name(name: str) -> tuple[str, str]:
     return (f"{text}.py", wanted) if colon else (name, "")
 
 
+def option_files(options: Mapping[str, Any]) -> dict[str, str]:
+    """The options of a system that name a class in a file, ``cause = "worn.py:Worn"`` say.
+
+    Args:
+        options: by name.
+    """
+    return {key: value for key, value in options.items() if isinstance(value, str) and names_a_file(value)}
+
+
 def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
     """What ``path/to/file.py:Class`` or ``package.module:Class`` stands for.
 

@@ -21,10 +21,13 @@ from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
 from cosim.run.backends import FAULTS, Request, Tell, cannot_build, realise
 from cosim.scenario.model_name import ModelName
+from cosim.scenario.paths import absolute, move_option_files
 from cosim.scenario.scenario_tables import Backend, ComponentTable
 from fmu_observer.event_protocol import EventProtocol
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import HybridSystem
+from plant_models.hybrid.option import MemberNames
+from plant_models.local_files import files_digest
 from plant_models.registry import descends_from
 from plant_models.user_file import UserFileError, make
 
@@ -73,7 +76,8 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
         return None
     name = table.model or table.observer
     if isinstance(model, type):
-        options = _for_its_period(model, _chosen_options(model, table.options, where), table)
+        chosen = move_option_files(table.options, lambda path: absolute(path, name.folder if name else "."))
+        options = _for_its_period(model, _chosen_options(model, chosen, where), table)
         system: HybridSystem = _made(model, options, where)
     elif table.options != dict(model.options):
         raise ScenarioError(f"{where}: {name} is an instance, which has its options already; give the class instead.")
@@ -243,10 +247,11 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     """The first system of the same class and options in this process: what has been traced need not be traced for each
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
-    given = (table.model or table.observer or ModelName()).given is system
-    if given:
+    name = table.model or table.observer or ModelName()
+    if name.given is system:
         return system
     options = _for_its_period(type(system), table.options, table)
+    options = move_option_files(options, lambda path: f"{path} {files_digest(name.folder / path)}")
     lasting = _systems.setdefault((type(system), repr(sorted(options.items()))), system)
     while len(_systems) > LASTING:
         _systems.pop(next(iter(_systems)))
@@ -302,7 +307,7 @@ def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], whe
             )
         choices = factory.option_choices[key]
         same = [choice for choice in choices if choice == value and isinstance(choice, bool) == isinstance(value, bool)]
-        if choices and not same:
+        if choices and not same and not (isinstance(value, str) and value in choices):
             raise ScenarioError(f"{where}: option {key} = {value!r} of {factory.name}; choose {_legal(choices)}.")
         chosen[key] = same[0] if same else value
     return chosen
@@ -318,7 +323,10 @@ def _for_its_period(factory: type[HybridSystem], options: dict[str, Any], table:
 
 
 def _legal(choices: Sequence[Any]) -> str:
-    return f"{choices[0]} to {choices[-1]}" if isinstance(choices, range) else f"from {', '.join(map(repr, choices))}"
+    if isinstance(choices, range):
+        return f"{choices[0]} to {choices[-1]}"
+    own = ", or write file.py:Class" if isinstance(choices, MemberNames) else ""
+    return f"from {', '.join(map(repr, choices))}{own}"
 
 
 def given_parameters(table: ComponentTable, system: HybridSystem) -> dict[str, Any]:

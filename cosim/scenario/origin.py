@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, MODEL_KEYS, NETWORK_PATHS
 from plant_models.local_files import local_files
-from plant_models.user_file import names_a_file, split_name
+from plant_models.user_file import names_a_file, option_files, split_name
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
@@ -118,6 +118,8 @@ def _paths(table: ScenarioTable) -> Iterator[tuple[str, str]]:
         for key in MODEL_KEYS:
             if names_a_file(getattr(component, key) or ""):
                 yield f"components.{name}.{key}", split_name(getattr(component, key))[0]
+        for key, text in option_files(component.options).items():
+            yield f"components.{name}.options.{key}", split_name(text)[0]
     for key in BALISE_PATHS:
         if table.balises is not None and getattr(table.balises, key) is not None:
             yield f"balises.{key}", str(getattr(table.balises, key))

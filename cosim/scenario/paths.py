@@ -10,7 +10,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from plant_models.user_file import names_a_file, split_name
+from plant_models.user_file import names_a_file, option_files, split_name
 
 COMPONENT_PATHS = ("fmu", "recording")
 MODEL_KEYS = ("model", "observer")
@@ -31,6 +31,8 @@ def map_paths(tables: Mapping[str, Any], move: Callable[[str], str]) -> dict[str
     for table in components.values() if isinstance(components, dict) else ():
         _map_keys(table, COMPONENT_PATHS, move)
         _map_keys(table, MODEL_KEYS, lambda name: move_file(name, move))
+        if isinstance(table, dict) and isinstance(table.get("options"), dict):
+            table["options"] = move_option_files(table["options"], move)
     _map_keys(moved.get("balises"), BALISE_PATHS, move)
     _map_keys(moved.get("network"), NETWORK_PATHS, move)
     return moved
@@ -54,6 +56,15 @@ def move_file(name: str, move: Callable[[str], str]) -> str:
         return name
     path, wanted = split_name(name)
     return f"{move(path)}:{wanted}" if wanted else move(path)
+
+
+def move_option_files(options: Mapping[str, Any], move: Callable[[str], str]) -> dict[str, Any]:
+    """The options with the paths of files in them replaced.
+
+    Args:
+        options: of a component. move: as for `move_file`.
+    """
+    return {**options, **{key: move_file(name, move) for key, name in option_files(options).items()}}
 
 
 def absolute(path: str | Path, folder: str | Path) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cosim.scenario.model_name import named, settings_of
-from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file
+from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file, move_option_files
 from cosim.scenario.saving import plain
 
 
@@ -36,4 +36,9 @@ def given_value(name: str, value: Any) -> Any:
         value = absolute(str(value), ".")
     if key in MODEL_KEYS and isinstance(value, str):
         value = move_file(value, lambda path: absolute(path, "."))
+    _, _, below = name.partition(".")
+    if below == "options" or below.startswith("options."):
+        options = value if isinstance(value, Mapping) else {below: value}
+        moved = move_option_files(options, lambda path: absolute(path, "."))
+        value = moved if isinstance(value, Mapping) else moved[below]
     return value

@@ -18,6 +18,7 @@ from cosim.scenario.saving import scenario_text
 from cosim.studies.runnable import RunnableScenario
 from cosim.studies.sampling import Variation
 from cosim.studies.sweep_runs import SweepRun
+from plant_models.user_file import option_files
 
 JOURNAL = "runs.jsonl"
 
@@ -152,7 +153,10 @@ def _files(scenario: RunnableScenario) -> list[Path]:
     """Files that the components are made from."""
     tables = scenario.table().components.values()
     named = [
-        str(entry) for table in tables for entry in (table.fmu, table.recording, table.model, table.observer) if entry
+        str(entry)
+        for table in tables
+        for entry in (table.fmu, table.recording, table.model, table.observer, *option_files(table.options).values())
+        if entry
     ]
     places = [scenario.folder / name.partition(".py:")[0] for name in named]
     python = [place.with_name(f"{place.name}.py") for place in places]

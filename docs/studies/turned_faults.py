@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cosim import Scenario
 from cosim.run.component_models import make_system, values_in_use
+from plant_models.faults.fault_system import FaultSystem
 
 
 class Error(NamedTuple):
@@ -37,27 +37,14 @@ def turned(chosen: Scenario) -> Scenario:
         ValueError: faults are drawn: their signs follow from the effort.
     """
     for name, table in chosen.table().components.items():
-        if str(table.model) not in _TURNS:
+        system = make_system(table, str(chosen)) if table.model is not None else None
+        if not isinstance(system, FaultSystem):
             continue
-        system: Any = make_system(table, str(chosen))
-        if getattr(system, "cause", "given") != "given":
+        values = system.cause.turned(values_in_use(table, system))
+        if values is None:
             raise ValueError(
                 f"{name} draws its faults: jams of a braked and skids of a driven wheel have no other sign"
             )
-        values = values_in_use(table, system)
-        for parameter, turn in _TURNS[str(table.model)].items():
-            chosen.set(f"{name}.{parameter}", turn(values))
+        for parameter, value in values.items():
+            chosen.set(f"{name}.{parameter}", np.asarray(value))
     return chosen
-
-
-def _plain(values: np.ndarray) -> float | Sequence[float]:
-    return float(values) if np.ndim(values) == 0 else np.asarray(values).tolist()  # type: ignore[no-any-return]
-
-
-_TURNS = {
-    "wheel_fault": {"fault_kind": lambda p: _plain(-np.asarray(p.fault_kind))},
-    "signal_fault": {
-        "fault_gain": lambda p: _plain(Error(np.asarray(p.fault_gain)).turned.gain),  # type: ignore[arg-type]
-        "fault_offset": lambda p: _plain(-np.asarray(p.fault_offset)),
-    },
-}

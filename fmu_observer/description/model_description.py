@@ -29,6 +29,7 @@ from fmu_observer.description.variables import FmiVersion, late_policy_type, mod
 from fmu_observer.event_protocol import EventProtocol
 from plant_models.hybrid import HybridSystem
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
+from plant_models.user_file import option_files, split_name
 
 LOG_CATEGORIES = {
     "logStatusError": "Calls that were refused, and why",
@@ -169,11 +170,12 @@ def _unit_definition(name: str, shown: list[str]) -> Unit:
 
 def _token(system: HybridSystem, description: ModelDescription, equations: str) -> str:
     """A name for the content: other equations, variables, starts, options or events, another token."""
+    classes = {key: split_name(name)[1] for key, name in option_files(system.options).items()}  # wherever the file is
     content: list[object] = [
         description.fmiVersion,
         system.name,
         system.method,
-        sorted(map(str, system.options.items())),
+        sorted(map(str, {**system.options, **classes}.items())),
     ]
     content += [
         [getattr(v, name) for name in TOKEN_ATTRIBUTES] + list(v.clocks or ()) for v in description.modelVariables

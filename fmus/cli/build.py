@@ -184,6 +184,8 @@ def _option(text: str, known: Mapping[str, Sequence[Any]]) -> tuple[str, Any]:
     for choice in choices:
         if str(choice) == value:
             return key, choice
+    if value in choices:  # a class of the user's
+        return key, value
     if choices:
         raise ValueError(f"--option {text!r} is not legal: {key}{legal_values(choices)}.")
     return key, _literal(value)

@@ -1,8 +1,38 @@
-"""Options of hybrid systems that are numbers, checked where equations are built from them."""
+"""Options of hybrid systems: numbers, checked where equations are built from them, and names of members."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
 import numpy as np
+
+from plant_models.registry import Registry
+from plant_models.user_file import names_code
+
+
+class MemberNames(Sequence[str]):
+    """The choices of an option that names a member of a registry. ``file.py:Class`` and ``package.module:Class`` are
+    legal too, though not listed.
+
+    Args:
+        registry: read at each look-up.
+    """
+
+    def __init__(self, registry: Registry[Any]) -> None:
+        self.registry = registry
+
+    def __getitem__(self, index: Any) -> Any:
+        return list(self.registry)[index]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.registry)
+
+    def __len__(self) -> int:
+        return len(self.registry)
+
+    def __contains__(self, value: object) -> bool:
+        return isinstance(value, str) and (value in self.registry or names_code(value))
 
 
 def is_number(value: object) -> bool:

@@ -20,6 +20,10 @@ STEP, STEPS = 0.03, 300
     [
         ("drawn", {"jam_rate": 2.0, "skid_rate": 1.0, "mean_length": 0.2, "jam_loss": 0.5}),
         ("adhesion", {"jam_loss": 0.5, "skid_loss": 0.3}),
+        (
+            "gain_and_offset",
+            {"fault_onset[1]": 1.0, "fault_rise[1]": 2.0, "fault_length[1]": 3.0, "fault_gain[1]": 0.5},
+        ),
     ],
 )
 def test_compiled_members_are_the_runtime_with_their_seeds(cause: str, changes: dict[str, float]) -> None:
@@ -54,6 +58,9 @@ def test_compiled_members_are_the_runtime_with_their_seeds(cause: str, changes: 
             runtime.u[:4] = [values[k + 1] for values in inputs.values()]
             # the two know exp and sin of different libraries, to the last place
             np.testing.assert_allclose(runtime.update_outputs()[places], rows[k + 1], rtol=1e-12, atol=1e-12)
+    if cause == "gain_and_offset":
+        assert 0.0 < compiled[..., OUTPUTS.index("active")].mean() < 1.0
+        return
     faults = compiled[..., OUTPUTS.index("depth")]
     assert (faults < 0.0).any()
     assert (faults > 0.0).any()

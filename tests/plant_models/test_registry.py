@@ -30,6 +30,7 @@ from plant_models.user_file import UserFileError, load_class
 
 ALL: tuple[Registry[Any], ...] = (
     plant_models.PLANTS,
+    plant_models.FAULT_CAUSES,
     fmu_observer.OBSERVERS,
     FORMATS,
     FIGURES,
@@ -40,7 +41,7 @@ ALL: tuple[Registry[Any], ...] = (
 
 @pytest.mark.parametrize("members", ALL, ids=lambda r: r.kind)
 def test_every_name_has_one_member_which_loads(members: Registry[Any]) -> None:
-    assert len(members) > 5
+    assert len(members) > 4
     assert [name for name, found in members.members.items() if len(found) > 1] == []
     assert all(registry.descends_from(members[name], members.base) for name in members)
 

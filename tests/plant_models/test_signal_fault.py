@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from plant_models.faults import SignalFault
 from plant_models.hybrid import Runtime, scalar_names
-from plant_models.signals import SignalFault
 
 
 def _course(system: SignalFault, healthy: np.ndarray, step: float = 0.1, **parameters: object) -> np.ndarray:

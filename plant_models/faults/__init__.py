@@ -1,4 +1,4 @@
-"""What stands between any two components: faults of a signal."""
+"""What stands between any two components: faults of a signal, of a wheel."""
 
 from plant_models.registry import lazy_names
 
