@@ -18,6 +18,7 @@ from math import inf, sqrt
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import MARGIN
+from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.quadratic import (
@@ -33,8 +34,8 @@ CELLS = 800  # of x, for checking
 COARSE = 16  # values of x for finding the Lyapunov matrix
 CUTS = 5
 LONGEST_X = 20.0  # theta times gap up to which a constant gap is searched for instability
-LIMIT_TOLERANCE = 1e-3  # relative width of the last bisection interval
-SMALLEST_LIMIT = 1e-5  # of the constant limit: below it no gap was found
+_LIMIT_TOLERANCE = 1e-3  # relative width of the last bisection interval
+_SMALLEST_LIMIT = 1e-5  # of the constant limit: below it no gap was found
 
 
 @dataclass(frozen=True)
@@ -161,11 +162,11 @@ def _aperiodic_limit(adaptation: GainAdaptation, bound: float) -> float:
     """
     if _common_decrease(adaptation, bound)[0] > MARGIN:
         return inf
-    low, high = 0.0, bound
-    while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_LIMIT * bound:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _common_decrease(adaptation, middle)[0] > MARGIN else (low, middle)
-    return low
+
+    def covered(longest: float) -> bool:
+        return _common_decrease(adaptation, longest)[0] > MARGIN
+
+    return bisected(covered, 0.0, bound, width=_LIMIT_TOLERANCE, least=_SMALLEST_LIMIT * bound)[0]
 
 
 @lru_cache(maxsize=256)

@@ -12,6 +12,7 @@ from math import inf
 
 import numpy as np
 
+from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.quadratic import (
@@ -28,9 +29,9 @@ MARGIN = 1e-6
 SHORTEST_HORIZON = 20.0  # [s]
 COARSE, FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
 CUTS = 4
-SMALLEST_LIMIT = 1e-4  # of the constant limit: below it no aperiodic limit was found
+_SMALLEST_LIMIT = 1e-4  # of the constant limit: below it no aperiodic limit was found
 LARGEST_GROWTH = 1e60  # an error that grows more over a gap is beyond what a quadratic form in floating point can judge
-LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
+_LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
 
 
 @dataclass(frozen=True)
@@ -120,11 +121,11 @@ def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: b
     bound = min(first_unstable_gap(vertices, horizon), horizon)
     if bound == horizon and common_decrease(vertices, horizon, switching).margin > MARGIN:
         return inf
-    low, high = 0.0, bound
-    while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_LIMIT * bound:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if common_decrease(vertices, middle, switching).margin > MARGIN else (low, middle)
-    return low
+
+    def covered(longest: float) -> bool:
+        return common_decrease(vertices, longest, switching).margin > MARGIN
+
+    return bisected(covered, 0.0, bound, width=_LIMIT_TOLERANCE, least=_SMALLEST_LIMIT * bound)[0]
 
 
 @lru_cache(maxsize=256)

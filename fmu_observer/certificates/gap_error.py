@@ -13,12 +13,13 @@ from math import inf
 
 import numpy as np
 
+from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
 SCAN_POINTS = 4000
 DECADES, DECADE_POINTS = (1000.0, 100.0, 10.0), 400  # parts of the horizon that are scanned finer before it
 SURELY = 1e-6  # growth over a short gap that is no rounding
-BISECTIONS = 40
+_BISECTIONS = 40
 
 
 class GapError(ABC):
@@ -162,8 +163,5 @@ def _first_unstable_gap_of(vertex: GapError, horizon: float) -> float:
 
 def _boundary(vertex: GapError, low: float, high: float) -> float:
     """Where an error begins to grow between two gaps; 0 where it grows at every one from zero on."""
-    start, first = low, high
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if vertex.spectral_radius(middle) < 1.0 else (low, middle)
-    return 0.0 if low == start and start < 1e-9 * first else high
+    stable, unstable = bisected(lambda gap: vertex.spectral_radius(gap) < 1.0, low, high, _BISECTIONS)
+    return 0.0 if stable == low and low < 1e-9 * high else unstable

@@ -13,10 +13,11 @@ from math import inf
 
 import numpy as np
 
+from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.quadratic import QuadraticCondition, common_quadratic_form, decrease, flow_condition
 
-BISECTIONS = 20
-ROUNDING = 1e-12  # of the largest number in an inequality
+_BISECTIONS = 20
+_ROUNDING = 1e-12  # of the largest number in an inequality
 
 
 @dataclass(frozen=True)
@@ -73,16 +74,22 @@ def polytope_stability(
     abscissa = max(float(np.linalg.eigvals(A).real.max()) for A in matrices)
     if decay is not None:
         found = _proven(matrices, decay)
-        return _answer(found, decay if found else -inf, abscissa, T)
-    low, best = 0.0, _proven(matrices, 0.0)
-    if best is None:
-        return _answer(None, -inf, abscissa, T)
-    high = -abscissa
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        found = _proven(matrices, middle)
-        low, high, best = (middle, high, found) if found else (low, middle, best)
-    return _answer(best, low, abscissa, T)
+        return _stability(found, decay if found else -inf, abscissa, T)
+    return _fastest_proven(matrices, abscissa, T)
+
+
+def _fastest_proven(matrices: list[np.ndarray], abscissa: float, scaling: np.ndarray) -> PolytopeStability:
+    """The largest decay rate with a proof, by bisection."""
+    proofs = {0.0: _proven(matrices, 0.0)}
+    if proofs[0.0] is None:
+        return _stability(None, -inf, abscissa, scaling)
+
+    def provable(decay: float) -> bool:
+        proofs[decay] = _proven(matrices, decay)
+        return proofs[decay] is not None
+
+    fastest, _ = bisected(provable, 0.0, -abscissa, _BISECTIONS)
+    return _stability(proofs[fastest], fastest, abscissa, scaling)
 
 
 def _proven(matrices: list[np.ndarray], decay: float) -> tuple[np.ndarray, float] | None:
@@ -94,12 +101,12 @@ def _proven(matrices: list[np.ndarray], decay: float) -> tuple[np.ndarray, float
     found = common_quadratic_form(conditions)
     if found is None:
         return None
-    rounding = ROUNDING * max(float(np.abs(A).max()) for A in shifted) * float(np.abs(found.P).max())
+    rounding = _ROUNDING * max(float(np.abs(A).max()) for A in shifted) * float(np.abs(found.P).max())
     margin = -float(decrease(conditions, found.P).max()) - rounding
     return (found.P, margin) if margin > 0.0 else None
 
 
-def _answer(
+def _stability(
     found: tuple[np.ndarray, float] | None, decay: float, abscissa: float, scaling: np.ndarray
 ) -> PolytopeStability:
     if found is None:

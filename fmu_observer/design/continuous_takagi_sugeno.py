@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.quadratic import QuadraticCondition, common_quadratic_form, decrease, flow_condition
-from fmu_observer.design.cvxpy_module import load_cvxpy
+from fmu_observer.design.cone_solver import load_cvxpy, solved
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.checks import check_numbers
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
 
-POSITIVE = 1e-6  # of P in the design, whose trace is bounded by the unknowns being free
-SMALLEST, BISECTIONS = 1e-9, 10  # of the search for the nearest decay, relative to what was asked
-SIZE = 1e-3  # weight of the size of the gains in the design [ours]
+_POSITIVE = 1e-6  # of P in the design, whose trace is bounded by the unknowns being free
+_SMALLEST, _BISECTIONS = 1e-9, 10  # of the search for the nearest decay, relative to what was asked
+_SIZE = 1e-3  # weight of the size of the gains in the design [ours]
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:
     if gains is not None:
         return gains
     nearest = _nearest_decay(model, decay)
-    found = f"none down to {SMALLEST * decay:.3g} 1/s" if nearest is None else f"{nearest:.3g} 1/s"
+    found = f"none down to {_SMALLEST * decay:.3g} 1/s" if nearest is None else f"{nearest:.3g} 1/s"
     raise ValueError(
         f"Takagi-Sugeno Luenberger design for {model.name!r}: no common P at the {model.vertices} vertices for decay "
         f"{decay:g} "
@@ -131,10 +131,10 @@ def _nearest_decay(model: TakagiSugenoModel, decay: float) -> float | None:
     """Largest decay below the one asked for with proven gains, by bisection of its logarithm; None down to a
     billionth.
     """
-    low, high = SMALLEST * decay, decay
+    low, high = _SMALLEST * decay, decay
     if not decay or _proven(model, low) is None:
         return None
-    for _ in range(BISECTIONS):
+    for _ in range(_BISECTIONS):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if _proven(model, middle) is not None else (low, middle)
     return low
@@ -149,12 +149,8 @@ def _solve(model: TakagiSugenoModel, decay: float) -> tuple[np.ndarray | None, l
     constraints = [np.eye(n) << P]
     for A, L in zip(model.A, parts, strict=True):
         product = P @ (A * T[:, None] / T) - L @ C
-        constraints.append(product + product.T + 2.0 * decay * P << -POSITIVE * np.eye(n))
-    cost = cp.trace(P) + SIZE * sum(cp.sum_squares(L) for L in parts)
-    try:
-        cp.Problem(cp.Minimize(cost), constraints).solve(solver=cp.CLARABEL)
-    except cp.error.SolverError:
-        return None, []
-    if P.value is None:
+        constraints.append(product + product.T + 2.0 * decay * P << -_POSITIVE * np.eye(n))
+    cost = cp.trace(P) + _SIZE * sum(cp.sum_squares(L) for L in parts)
+    if not solved(cp, cp.Problem(cp.Minimize(cost), constraints)):
         return None, []
     return np.asarray(P.value), [np.asarray(L.value) for L in parts]

@@ -130,7 +130,7 @@ def test_where_no_theta_is_enough_none_is_found(share: float, exists: bool) -> N
     ("module", "proof", "answer", "ask"),
     [
         (continuous_takagi_sugeno, "_proven", None, lambda: continuous_takagi_sugeno.designed_gains(TRAIN, 8.0)),
-        (theorem7, "_checked", None, lambda: theorem7.design_theorem7(TRAIN, 2.0, 8.0)),
+        (theorem7, "_proven", None, lambda: theorem7.design_theorem7(TRAIN, 2.0, 8.0)),
         (proposition_4_1, "margins", {"": -1.0}, lambda: proposition_4_1.design_proposition_4_1(A, B[0], 8.0)),
         (robust_residual, "candidates", (), lambda: robust_residual.design_robust_residual(chapter_5(8.0))),
     ],

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf, isfinite
 
+from fmu_observer.certificates.bisection import bisected
+
 Bound = Callable[[float], float]
 
 HORIZON = 1e4  # [s]: a bound that keeps its limit so long keeps it for ever
 FIRST = 1e-3  # [s]
-HALVINGS = 60  # of the bracket, to rounding
+_HALVINGS = 60  # of the bracket, to rounding
 
 
-def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON, halvings: int = HALVINGS) -> float:
+def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON, halvings: int = _HALVINGS) -> float:
     """Largest gap up to which a bound stays at or below a limit: the use that Aguiar Cota 2019, 4.2 makes of tau_M.
 
     The bounds of this room start at the error of the sample and cross a limit above that once: they are convex, or rise
@@ -38,10 +40,7 @@ def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON, halvings: 
         if high >= horizon:
             return inf
         low, high = high, min(2.0 * high, horizon)
-    for _ in range(halvings):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if bound(middle) <= limit else (low, middle)
-    return low
+    return bisected(lambda gap: bound(gap) <= limit, low, high, halvings)[0]
 
 
 def growth_over_missing_samples(bound: Bound, period: float, missing: int) -> tuple[tuple[int, float, float], ...]:

@@ -4,31 +4,29 @@ overshoot of given gains, checked in NumPy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.proposition_4_1.proposition_inequalities import DECAY, GAIN, Proposition41Problem
-from fmu_observer.design.proposition_4_1.proposition_recomputed import margins
+from fmu_observer.design.cone_solver import RecomputedDesign, first_proven, largest_feasible
+from fmu_observer.design.proposition_4_1.proposition_inequalities import DECAY, GAIN, Proposition41Problem, margins
 from fmu_observer.design.proposition_4_1.proposition_solver import Proposition41Candidate, least_alphas, least_condition
 
-BISECTIONS = 14
-SMALLEST = 1e-3  # of the decay asked for: below it nothing is called feasible
+_BISECTIONS = 14
+_SMALLEST = 1e-3  # of the decay asked for: below it nothing is called feasible
 
 
-@dataclass(frozen=True)
-class Proposition41Design:
+@dataclass(frozen=True, eq=False)
+class Proposition41Design(RecomputedDesign):
     """Gains with their proof.
 
     Attributes:
         m: decay rate of the error, eps / 2 [1/s]. alpha: bound of ``K' P K`` asked for; inf where none was.
         beta: ``sqrt(lambda_2 / lambda_1)``, overshoot of ``|exp((A - K C) t)| <= beta exp(-m t)`` [1].
         gains: K of each vertex, shape (N, n). P: shape (n, n), its smallest eigenvalue 1.
-        margins: every inequality recomputed in NumPy, by name; all positive.
-        status: what the solver called its answer, which is not what was relied on.
     """
 
     m: float
@@ -36,13 +34,6 @@ class Proposition41Design:
     beta: float
     gains: np.ndarray
     P: np.ndarray
-    margins: Mapping[str, float]
-    status: str
-
-    @property
-    def margin(self) -> float:
-        """Smallest margin."""
-        return min(self.margins.values())
 
     @property
     def gain_norm(self) -> float:
@@ -55,7 +46,7 @@ class Proposition41Design:
         gains = "; ".join(" ".join(f"{k:.4g}" for k in K) for K in self.gains)
         return (
             f"Proposition 4-1 holds for m = {self.m:g} 1/s and {asked}: beta = {self.beta:.5g}, K = [{gains}]; "
-            f"{len(self.margins)} inequalities recomputed, smallest margin {self.margin:.2g}."
+            f"{self.recomputed}"
         )
 
 
@@ -102,11 +93,10 @@ def design_proposition_4_1(
     """
     problem = Proposition41Problem.of(A, C, m, alpha)
     kept = None if gains is None else _checked_gains(problem, gains)
-    for candidate in least_condition(problem, kept):
-        found = margins(problem, candidate.P, candidate.gains)
-        if min(found.values()) > 0.0:
-            return _designed(problem, candidate, found)
-    raise _infeasible(problem, kept)
+    found = first_proven(least_condition(problem, kept), lambda found: margins(problem, found.P, found.gains))
+    if found is None:
+        raise _infeasible(problem, kept)
+    return _designed(problem, *found)
 
 
 def smallest_alpha(A: Any, C: Any, m: float, *, gains: Any = None) -> float | None:
@@ -138,7 +128,7 @@ def largest_decay(A: Any, C: Any, most: float, alpha: float | None = None, *, ga
 
 
 def _designed(
-    problem: Proposition41Problem, candidate: Proposition41Candidate, found: dict[str, float]
+    problem: Proposition41Problem, candidate: Proposition41Candidate, proof: dict[str, float]
 ) -> Proposition41Design:
     smallest, *_, largest = np.linalg.eigvalsh(candidate.P)
     return Proposition41Design(
@@ -147,7 +137,7 @@ def _designed(
         beta=sqrt(float(largest / smallest)),
         gains=candidate.gains,
         P=candidate.P / smallest,
-        margins=found,
+        margins=proof,
         status=candidate.status,
     )
 
@@ -168,11 +158,10 @@ def _smallest_alphas(problem: Proposition41Problem, gains: np.ndarray | None) ->
     candidates = least_alphas(problem, gains)
 
     def of_decay(m: float) -> float | None:
-        for candidate in candidates(m):
-            asked = replace(problem, m=m, alpha=candidate.value)
-            if min(margins(asked, candidate.P, candidate.gains).values()) > 0.0:
-                return candidate.value
-        return None
+        found = first_proven(
+            candidates(m), lambda one: margins(replace(problem, m=m, alpha=one.value), one.P, one.gains)
+        )
+        return None if found is None else found[0].value
 
     return of_decay
 
@@ -184,15 +173,7 @@ def _largest_decay(problem: Proposition41Problem, gains: np.ndarray | None) -> f
         least = smallest_alpha_of(m)
         return least is not None and (problem.alpha is None or least <= problem.alpha)
 
-    if feasible(problem.m):
-        return problem.m
-    low, high = SMALLEST * problem.m, problem.m
-    if not feasible(low):
-        return None
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if feasible(middle) else (low, middle)
-    return low
+    return largest_feasible(feasible, problem.m, _SMALLEST * problem.m, _BISECTIONS)
 
 
 def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> InfeasibleBounds:
@@ -200,7 +181,7 @@ def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> Infe
     asked = "" if problem.alpha is None else f" and alpha = {problem.alpha:g}"
     of = "free gains" if gains is None else "the gains given"
     text = f"Proposition 4-1 has no solution for m = {problem.m:g} 1/s{asked} with {of}"
-    slower = f"no decay was found down to {SMALLEST * problem.m:.3g} 1/s" if m is None else f"m = {m:.4g} 1/s at most"
+    slower = f"no decay was found down to {_SMALLEST * problem.m:.3g} 1/s" if m is None else f"m = {m:.4g} 1/s at most"
     at = "" if problem.alpha is None else " at this alpha"
     if alpha is None:
         why = f"the error cannot decay so fast, {DECAY}"

@@ -1,5 +1,5 @@
-"""The matrix inequalities of Proposition 4-1: the same formulas for a solver's unknowns and for numbers. Nothing is
-solved here.
+"""The matrix inequalities of Proposition 4-1: the same formulas for a solver's unknowns and for numbers, and how far
+numbers keep them. Nothing is solved here.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-Matrix = Any  # a NumPy array, or a solver's expression with the same operators
-Rows = list[list[Matrix]]
+from fmu_observer.design.cone_solver import Matrix, Rows, smallest_eigenvalue
 
 DECAY, GAIN, SCALE = "(4.41)", "(4.42)", "(4.44)"
 """Names of the inequalities: decay of the error, size of the gain, P at least the identity."""
@@ -86,6 +85,22 @@ def inequalities(
         if alpha is not None:
             found[f"{GAIN}{where}"] = (GAIN, [[P, product], [product.T, alpha * np.eye(1)]])
     return found
+
+
+def margins(problem: Proposition41Problem, P: np.ndarray, gains: np.ndarray) -> dict[str, float]:
+    """How far every inequality is from failing: the smallest eigenvalue of what must be positive, less rounding.
+
+    Args:
+        problem: the question. P: shape (n, n). gains: K of each vertex, shape (N, n).
+
+    Returns:
+        By name; all positive exactly when the numbers prove what was asked. Of (4.44) only that P is positive definite
+        is asked, for beta follows from the eigenvalues of P as they are.
+    """
+    M = [(P @ K)[:, None] for K in gains]
+    blocks = inequalities(problem, P, M, problem.alpha)
+    found = {name: smallest_eigenvalue(np.block(rows)) for name, (_, rows) in blocks.items()}
+    return found | {SCALE: smallest_eigenvalue(P)}
 
 
 def train_vertices(slopes: Sequence[float]) -> np.ndarray:

@@ -1,7 +1,4 @@
-"""Proposition 4-1 handed to a cone solver. What comes back is only a candidate; whoever asks recomputes it.
-
-The only file of this room that uses cvxpy, the extra `lmi`.
-"""
+"""Proposition 4-1 handed to a cone solver. What comes back is only a candidate; whoever asks recomputes it."""
 
 from __future__ import annotations
 
@@ -11,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.cvxpy_module import load_cvxpy, solved
+from fmu_observer.design.cone_solver import attempts, load_cvxpy, symmetric_value
 from fmu_observer.design.proposition_4_1.proposition_inequalities import Proposition41Problem, inequalities
 
-STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
+_STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +43,7 @@ def least_condition(problem: Proposition41Problem, gains: np.ndarray | None) -> 
     cp = load_cvxpy("Design by Proposition 4-1")
     question = _Question.of(cp, problem, gains, problem.alpha)
     largest = cp.Variable()
-    yield from question.candidates(cp, largest, [question.P << largest * np.eye(problem.order)])
+    yield from question.candidates(cp, largest, [question.P << largest * np.eye(problem.order)])()
 
 
 def least_alphas(
@@ -67,7 +64,7 @@ def least_alphas(
     cp = load_cvxpy("Design by Proposition 4-1")
     m, alpha = cp.Parameter(nonneg=True), cp.Variable()
     question = _Question.of(cp, replace(problem, m=m, alpha=None), gains, alpha)
-    solve = question.candidates_of(cp, alpha, [])
+    solve = question.candidates(cp, alpha, [])
 
     def of_decay(decay: float) -> Iterator[Proposition41Candidate]:
         m.value = decay
@@ -96,9 +93,8 @@ def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[n
         moved = P @ drift
         constraints.append(-(moved + moved.T) - 2.0 * m * P >> strict * np.eye(n))
     question = cp.Problem(cp.Minimize(cp.matrix_frac(np.eye(1, n)[0], P)), constraints)
-    for strict.value in STRICTNESS:
-        if solved(cp, question):
-            yield 0.5 * (P.value + P.value.T), str(question.status)
+    for status in attempts(cp, question, strict, _STRICTNESS):
+        yield symmetric_value(P), status
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,21 +120,14 @@ class _Question:
         matrices = [cp.bmat(rows) for _, rows in inequalities(problem, P, M, alpha).values()]
         return cls(P, M, gains, strict, [matrix >> strict * np.eye(matrix.shape[0]) for matrix in matrices])
 
-    def candidates(self, cp: Any, goal: Any, constraints: list[Any]) -> Iterator[Proposition41Candidate]:
-        yield from self.candidates_of(cp, goal, constraints)()
-
-    def candidates_of(
-        self, cp: Any, goal: Any, constraints: list[Any]
-    ) -> Callable[[], Iterator[Proposition41Candidate]]:
+    def candidates(self, cp: Any, goal: Any, constraints: list[Any]) -> Callable[[], Iterator[Proposition41Candidate]]:
         posed = cp.Problem(cp.Minimize(goal), [*self.constraints, *constraints])
 
         def solve() -> Iterator[Proposition41Candidate]:
-            for self.strict.value in STRICTNESS:
-                if solved(cp, posed):
-                    matrix = 0.5 * (self.P.value + self.P.value.T)
-                    found = self.gains
-                    if found is None:
-                        found = np.linalg.solve(matrix, np.hstack([product.value for product in self.M])).T
-                    yield Proposition41Candidate(matrix, found, float(goal.value), str(posed.status))
+            for status in attempts(cp, posed, self.strict, _STRICTNESS):
+                P, found = symmetric_value(self.P), self.gains
+                if found is None:
+                    found = np.linalg.solve(P, np.hstack([product.value for product in self.M])).T
+                yield Proposition41Candidate(P, found, float(goal.value), status)
 
         return solve

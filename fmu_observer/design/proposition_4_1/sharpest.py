@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.proposition_4_1.proposition_recomputed import smallest_eigenvalue
+from fmu_observer.design.cone_solver import smallest_eigenvalue
 from fmu_observer.design.proposition_4_1.proposition_solver import sharpest
 
 
@@ -31,9 +31,9 @@ class BoundMatrix:
 def bound_matrix(drifts: Any, gain: Sequence[float], m: float) -> BoundMatrix:
     """P for `lyapunov_matrix` of the observers with a held odometer reading [ours].
 
-    A reading that is wrong by g drives the level by ``|K|_P g``, and the level is told as ``sqrt(C inv(P) C')`` of it:
-    the product of the two is what the bound is larger by than it need be, and it is minimised. The overshoot beta of
-    Proposition 4-1, the ratio of the axes of P, plays no part in a bound that is carried.
+    A reading that is wrong by g drives the level by ``|K|_P g``, and ``sqrt(C inv(P) C')`` of the level is what a
+    bound reports: the product of the two is what it is larger by than it need be, and it is minimised. The overshoot
+    beta of Proposition 4-1, the ratio of the axes of P, plays no part in a bound that is carried.
 
     Args:
         drifts: error matrices ``A - K C``, shape (n, n) or (N, n, n) [1/s]. gain: K, shape (n,).

@@ -7,10 +7,10 @@ from math import sqrt
 
 import numpy as np
 
+from fmu_observer.design.cone_solver import first_proven
 from fmu_observer.design.residual_analysis import bands_above, minimum_gain
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.residual_inequalities import sensitivity
-from fmu_observer.design.robust_residual.residual_recomputed import margins
+from fmu_observer.design.robust_residual.residual_inequalities import margins, sensitivity
 from fmu_observer.design.robust_residual.residual_solver import sensitivity_candidates
 
 
@@ -51,10 +51,11 @@ def proven_sensitivity(problem: ResidualProblem, gains: np.ndarray) -> ResidualS
     """
     gains = problem.gains(gains)
     ceiling = min(minimum_gain(channel) for channel in problem.fault_channels(gains))
-    for P, gamma2 in sensitivity_candidates(problem, gains):
-        if gamma2 > 0.0 and min(margins(sensitivity(problem, gains, P, gamma2)).values()) > 0.0:
-            return ResidualSensitivity(sqrt(gamma2), ceiling)
-    return ResidualSensitivity(0.0, ceiling)
+    found = first_proven(
+        sensitivity_candidates(problem, gains),
+        lambda one: {"gamma squared": one[1], **margins(sensitivity(problem, gains, *one))},
+    )
+    return ResidualSensitivity(0.0 if found is None else sqrt(found[0][1]), ceiling)
 
 
 def common_bands(problem: ResidualProblem, gains: np.ndarray, gamma: float) -> list[tuple[float, float]]:

@@ -5,43 +5,40 @@ Every inequality is recomputed in NumPy with the gains that are returned.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 
+from fmu_observer.certificates.bisection import bisected
+from fmu_observer.design.cone_solver import RecomputedDesign, first_proven, smallest_eigenvalue
 from fmu_observer.design.residual_analysis import minimum_gain
 from fmu_observer.design.residual_channel import ResidualChannel
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-from fmu_observer.design.robust_residual.residual_inequalities import robustness
-from fmu_observer.design.robust_residual.residual_recomputed import least, margins
+from fmu_observer.design.robust_residual.residual_inequalities import margins, robustness
 from fmu_observer.design.robust_residual.residual_solver import ResidualCandidate, candidates
 from fmu_observer.models.checks import check_numbers
 from fmu_observer.observability import MeasuredSystem, require_detectable
 
-BISECTIONS = 7
-SLOWEST = 1e-3  # of the decay asked for: below it nothing is sought
-ATTENUATION, SIZE, DECAY = "the attenuation (3.56)", "the size of the gains (3.58)", "the decay rate in (3.56)"
+_BISECTIONS = 7
+_SLOWEST = 1e-3  # of the decay asked for: below it nothing is sought
+_ATTENUATION, _SIZE, _DECAY = "the attenuation (3.56)", "the size of the gains (3.58)", "the decay rate in (3.56)"
 
 
 @dataclass(frozen=True, eq=False)
-class RobustResidualDesign:
+class RobustResidualDesign(RecomputedDesign):
     """Gains with their proof.
 
     Attributes:
         problem: what was asked. gains: K_i, shape (N, n, q) [1/s and the units of the states].
         attenuation: lambda, ``||r|| <= lambda ||eta||`` for every course of the premises.
-        lyapunov_matrix: P, shape (n, n). margins: every inequality recomputed, by name; all positive.
-        status: what the solver called its answer, which is not what was relied on.
+        lyapunov_matrix: P, shape (n, n).
     """
 
     problem: ResidualProblem
     gains: np.ndarray
     attenuation: float
     lyapunov_matrix: np.ndarray
-    margins: Mapping[str, float]
-    status: str
 
     @property
     def size(self) -> float:
@@ -67,8 +64,7 @@ class RobustResidualDesign:
         """One sentence for the user, numbers included."""
         return (
             f"lambda = {self.attenuation:.4g} with M = {self.problem.residual_gain:g}, decay {self.problem.decay:g} "
-            f"1/s and K' P K = {self.size:.4g}; {len(self.margins)} inequalities recomputed, smallest margin "
-            f"{min(self.margins.values()):.2g}."
+            f"1/s and K' P K = {self.size:.4g}; {self.recomputed}"
         )
 
 
@@ -163,13 +159,13 @@ def _proven(
     problem: ResidualProblem, gains: np.ndarray | None = None, sized: bool = True
 ) -> RobustResidualDesign | None:
     """A candidate whose inequalities all hold when recomputed, or None."""
-    for candidate in candidates(problem, gains=gains, sized=sized):
-        found = _margins(problem, candidate, problem.alpha, sized)
-        if min(found.values()) > 0.0:
-            return RobustResidualDesign(
-                problem, candidate.gains, candidate.attenuation, candidate.P, found, candidate.status
-            )
-    return None
+    found = first_proven(
+        candidates(problem, gains=gains, sized=sized), lambda one: _margins(problem, one, problem.alpha, sized)
+    )
+    if found is None:
+        return None
+    candidate, proof = found
+    return RobustResidualDesign(proof, candidate.status, problem, candidate.gains, candidate.attenuation, candidate.P)
 
 
 def _margins(
@@ -178,14 +174,14 @@ def _margins(
     P = candidate.P
     L = [P @ K for K in candidate.gains]
     blocks = robustness(problem, P, L, candidate.attenuation**2, alpha, sized)
-    return {"P > 0": least(P), **margins(blocks)}
+    return {"P > 0": smallest_eigenvalue(P), **margins(blocks)}
 
 
 def _least_alpha(problem: ResidualProblem, attenuation: float | None, gains: np.ndarray | None = None) -> float:
-    for candidate in candidates(problem, "alpha", gains, attenuation):
-        if min(_margins(problem, candidate, candidate.alpha).values()) > 0.0:
-            return candidate.alpha
-    return inf
+    found = first_proven(
+        candidates(problem, "alpha", gains, attenuation), lambda one: _margins(problem, one, one.alpha)
+    )
+    return inf if found is None else found[0].alpha
 
 
 def _largest_decay(problem: ResidualProblem, attenuation: float | None) -> float | None:
@@ -196,27 +192,24 @@ def _largest_decay(problem: ResidualProblem, attenuation: float | None) -> float
         return found is not None and (attenuation is None or found.attenuation <= attenuation)
 
     low, high = 0.5 * problem.decay, problem.decay
-    while low > SLOWEST * problem.decay and not feasible(low):  # towards zero the numbers degenerate
+    while low > _SLOWEST * problem.decay and not feasible(low):  # towards zero the numbers degenerate
         low, high = 0.5 * low, low
-    if low <= SLOWEST * problem.decay:
+    if low <= _SLOWEST * problem.decay:
         return None
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if feasible(middle) else (low, middle)
-    return low
+    return bisected(feasible, low, high, _BISECTIONS)[0]
 
 
 def _without_gains(problem: ResidualProblem) -> InfeasibleResidualDesign:
     alpha, decay = _least_alpha(problem, None), _largest_decay(problem, None)
-    none = f"no decay down to {SLOWEST * problem.decay:.3g} 1/s"
+    none = f"no decay down to {_SLOWEST * problem.decay:.3g} 1/s"
     tried = f"decay {problem.decay:g} 1/s and K' P K <= alpha = {problem.alpha:g}, M = {problem.residual_gain:g}"
     slower = f"{none} with this alpha" if decay is None else f"decay {decay:.3g} 1/s with this alpha"
     if alpha < inf:
         advice = f"Nearest found feasible: alpha = {alpha:.4g} with this decay, or {slower}."
-        message = f"Robust residual: no gains for {tried}: {SIZE} stands against the decay. {advice}"
-        return InfeasibleResidualDesign(message, SIZE, nearest_decay=decay, nearest_alpha=alpha)
-    message = f"Robust residual: no gains for {tried}, nor with any alpha: {DECAY} has no common P at the vertices."
-    return InfeasibleResidualDesign(f"{message} Nearest found feasible: {slower}.", DECAY, nearest_decay=decay)
+        message = f"Robust residual: no gains for {tried}: {_SIZE} stands against the decay. {advice}"
+        return InfeasibleResidualDesign(message, _SIZE, nearest_decay=decay, nearest_alpha=alpha)
+    message = f"Robust residual: no gains for {tried}, nor with any alpha: {_DECAY} has no common P at the vertices."
+    return InfeasibleResidualDesign(f"{message} Nearest found feasible: {slower}.", _DECAY, nearest_decay=decay)
 
 
 def _too_strong(problem: ResidualProblem, found: RobustResidualDesign, attenuation: float) -> InfeasibleResidualDesign:
@@ -224,14 +217,14 @@ def _too_strong(problem: ResidualProblem, found: RobustResidualDesign, attenuati
     tried = f"lambda = {attenuation:g}, decay {problem.decay:g} 1/s, alpha = {problem.alpha:g}"
     near = [f"lambda = {found.attenuation:.4g} at this decay and alpha"]
     near.append(
-        f"no decay down to {SLOWEST * problem.decay:.3g} 1/s at this lambda and alpha"
+        f"no decay down to {_SLOWEST * problem.decay:.3g} 1/s at this lambda and alpha"
         if decay is None
         else f"decay {decay:.3g} 1/s at this lambda and alpha"
     )
     near.append(
         "no alpha at this lambda and decay" if alpha == inf else f"alpha = {alpha:.4g} at this lambda and decay"
     )
-    message = f"Robust residual: no gains for {tried}: {ATTENUATION} is too strong."
+    message = f"Robust residual: no gains for {tried}: {_ATTENUATION} is too strong."
     message = f"{message} Nearest found feasible: {'; '.join(near)}."
     size = None if alpha == inf else alpha
-    return InfeasibleResidualDesign(message, ATTENUATION, found.attenuation, decay, size)
+    return InfeasibleResidualDesign(message, _ATTENUATION, found.attenuation, decay, size)

@@ -1,19 +1,17 @@
-"""The matrix inequalities (3.56)-(3.58): the same formulas for a solver's unknowns and for numbers. Nothing is solved.
+"""The matrix inequalities (3.56)-(3.58): the same formulas for a solver's unknowns and for numbers, and how far numbers
+keep them. Nothing is solved here.
 
 Aguiar Cota 2019, section 3.3. All are to be negative.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fmu_observer.design.cone_solver import Matrix, Rows, smallest_eigenvalue
 from fmu_observer.design.robust_residual.problem import ResidualProblem
-
-Matrix = Any  # a NumPy array, or a solver's expression with the same operators
-Rows = list[list[Matrix]]
 
 
 def robustness(
@@ -68,3 +66,15 @@ def sensitivity(problem: ResidualProblem, gains: np.ndarray, P: Matrix, gamma2: 
             [beside.T, gamma2 * np.eye(F.shape[1]) - weight * F.T @ F],
         ]
     return found
+
+
+def margins(blocks: Mapping[str, Rows]) -> dict[str, float]:
+    """How far each inequality is from failing: the smallest eigenvalue of its negative, less rounding.
+
+    Args:
+        blocks: numbers by name, each to be negative.
+
+    Returns:
+        Margins by name; all positive exactly when the numbers prove what was asked.
+    """
+    return {name: smallest_eigenvalue(-np.block(rows)) for name, rows in blocks.items()}

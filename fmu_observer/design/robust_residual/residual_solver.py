@@ -1,24 +1,21 @@
-"""The inequalities handed to a cone solver. What comes back is only a candidate; `check` decides.
-
-The only file of this folder that uses cvxpy, the extra `lmi`.
-"""
+"""The inequalities handed to a cone solver. What comes back is only a candidate; `margins` decides."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from fmu_observer.design.cvxpy_module import load_cvxpy, solved
+from fmu_observer.design.cone_solver import Rows, attempts, load_cvxpy, symmetric_value
 from fmu_observer.design.robust_residual.problem import ResidualProblem
 from fmu_observer.design.robust_residual.residual_inequalities import robustness, sensitivity
 
 Least = Literal["attenuation", "alpha"]
 
-STRICT = (1e-7, 1e-6, 1e-5, 1e-4)  # asked of every inequality in the scaled problem, one attempt after the other
+_STRICT = (1e-7, 1e-6, 1e-5, 1e-4)  # asked of every inequality in the scaled problem, one attempt after the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,28 +64,25 @@ def candidates(
     P, lambda2, alpha = cp.Variable((n, n), symmetric=True), cp.Variable(), cp.Variable()
     L = [cp.Variable((n, q)) for _ in problem.vertices] if gains is None else [P @ K for K in gains]
     strict = cp.Parameter(nonneg=True)
-    matrices = [cp.bmat(rows) for rows in robustness(scaled, P, L, lambda2, alpha, sized).values()]
-    constraints = [matrix + matrix.T << -2.0 * strict * np.eye(matrix.shape[0]) for matrix in matrices]
+    constraints = _negative(cp, robustness(scaled, P, L, lambda2, alpha, sized), strict)
     constraints.append(P >> strict * np.eye(n))
     if least != "alpha":
         constraints.append(alpha == problem.alpha / M**2)
     if attenuation is not None:
         constraints.append(lambda2 <= (attenuation / (M * size)) ** 2)
     question = cp.Problem(cp.Minimize(lambda2 if least == "attenuation" else alpha), constraints)
-    for strict.value in STRICT:
-        if not solved(cp, question):
-            continue
-        value = 0.5 * (P.value + P.value.T)
+    for status in attempts(cp, question, strict, _STRICT):
+        value = symmetric_value(P)
         if not np.all(np.isfinite(value)) or np.linalg.eigvalsh(value)[0] <= 0.0:
             continue
         found = np.stack([np.linalg.solve(value, part.value) for part in L]) if gains is None else gains
         yield ResidualCandidate(
-            value * M**2, found, M * size * sqrt(float(lambda2.value)), float(alpha.value) * M**2, str(question.status)
+            value * M**2, found, M * size * sqrt(float(lambda2.value)), float(alpha.value) * M**2, status
         )
 
 
 def sensitivity_candidates(problem: ResidualProblem, gains: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Seek P_f of (3.57) with the largest gamma, for gains that are given.
+    """Seek P_f of (3.57) with the largest gamma, for fixed gains.
 
     Args:
         problem: the question. gains: K_i, shape (N, n, q).
@@ -103,10 +97,14 @@ def sensitivity_candidates(problem: ResidualProblem, gains: np.ndarray) -> Itera
     scaled = replace(problem, residual_gain=1.0)
     P, gamma2 = cp.Variable((problem.order, problem.order), symmetric=True), cp.Variable()
     strict = cp.Parameter(nonneg=True)
-    matrices = [cp.bmat(rows) for rows in sensitivity(scaled, gains, P, gamma2).values()]
-    constraints = [matrix + matrix.T << -2.0 * strict * np.eye(matrix.shape[0]) for matrix in matrices]
-    question = cp.Problem(cp.Maximize(gamma2), constraints)
+    question = cp.Problem(cp.Maximize(gamma2), _negative(cp, sensitivity(scaled, gains, P, gamma2), strict))
     weight = problem.residual_gain**2
-    for strict.value in (0.0, *STRICT):
-        if solved(cp, question) and np.all(np.isfinite(P.value)):
+    for _ in attempts(cp, question, strict, (0.0, *_STRICT)):
+        if np.all(np.isfinite(P.value)):
             yield 0.5 * weight * (P.value + P.value.T), float(gamma2.value) * weight
+
+
+def _negative(cp: Any, blocks: Mapping[str, Rows], strict: Any) -> list[Any]:
+    """Every block negative definite, by `strict`."""
+    matrices = [cp.bmat(rows) for rows in blocks.values()]
+    return [matrix + matrix.T << -2.0 * strict * np.eye(matrix.shape[0]) for matrix in matrices]

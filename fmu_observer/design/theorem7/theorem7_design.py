@@ -7,24 +7,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Problem
-from fmu_observer.design.theorem7.theorem7_recomputed import margins
+from fmu_observer.design.cone_solver import RecomputedDesign, first_proven, largest_feasible
+from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Options, Theorem7Problem, margins
 from fmu_observer.design.theorem7.theorem7_solver import Gains, Theorem7Candidate, candidates
 from fmu_observer.models.checks import checked_matrix
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
 
-BISECTIONS = 7
-SMALLEST = 1e-3  # of what was asked: below it nothing is called feasible
+_DEFAULTS = {"disturbance": True, "scaling": None, "two_vertex": False}
+_BISECTIONS = 7
+_SMALLEST = 1e-3  # of what was asked: below it nothing is called feasible
 
 
-@dataclass(frozen=True)
-class Theorem7Design:
+@dataclass(frozen=True, eq=False)
+class Theorem7Design(RecomputedDesign):
     """Gains with their proof.
 
     Attributes:
@@ -32,8 +33,7 @@ class Theorem7Design:
         gamma: attenuation from noise and disturbance to the error, in the exponentially weighted variables; inf where
             only the decay was asked for.
         sampled_gain: K_i1, shape (N, n, q1). continuous_gain: K_i2, shape (N, n, q2).
-        margins: every inequality recomputed in NumPy, by name; all positive.
-        options: the further arguments. status: what the solver called its answer, which is not what was relied on.
+        options: the further arguments.
         lyapunov_matrix: P in the coordinates ``T x``, shape (n, n).
     """
 
@@ -44,15 +44,8 @@ class Theorem7Design:
     gamma: float
     sampled_gain: np.ndarray
     continuous_gain: np.ndarray
-    margins: Mapping[str, float]
     options: Mapping[str, Any]
-    status: str
     lyapunov_matrix: np.ndarray
-
-    @property
-    def margin(self) -> float:
-        """Smallest margin."""
-        return min(self.margins.values())
 
     def parameters(self) -> dict[str, Any]:
         """Parameters of `GeneralTakagiSugenoCdo` with these gains, by name."""
@@ -67,8 +60,7 @@ class Theorem7Design:
         attenuation = "decay only" if self.gamma == inf else f"gamma = {self.gamma:.4g}"
         return (
             f"Theorem 7 holds for {self.model} with gaps up to {self.gap:g} s and eta = {self.eta:g} 1/s: "
-            f"{attenuation}; "
-            f"{len(self.margins)} inequalities recomputed, smallest margin {self.margin:.2g}."
+            f"{attenuation}; {self.recomputed}"
         )
 
 
@@ -95,10 +87,7 @@ def design_theorem7(
     *,
     gains: Gains | None = None,
     performance: bool = True,
-    mu: float = 0.0,
-    disturbance: bool = True,
-    scaling: Sequence[float] | None = None,
-    two_vertex: bool = False,
+    **options: Unpack[Theorem7Options],
 ) -> Theorem7Design:
     """Gains of the observer (2.6) with the least gamma, or the least gamma of given gains: Bouchama 2024, Theorem 7.
 
@@ -108,11 +97,7 @@ def design_theorem7(
         eta: decay rate of the sampled gain; the error is proven to fall as ``exp(-eta t)`` without noise [1/s].
         gains: K_i1 of shape (N, n, q1) and K_i2 of shape (N, n, q2) to analyse; None to seek them.
         performance: seek the least gamma; False asks for the decay only and seeks the largest margin.
-        mu: bound of the premise mismatch [1/s]; the thesis prints none.
-        disturbance: with the channel of G and w. Without it the least gamma is met by ignoring the continuous output.
-        scaling: n positive numbers T; errors are measured, and the problem solved, in ``T x``; None for the model's
-            own. Needed where states differ by decades.
-        two_vertex: the sharper variant that asks at the beginning and the end of a gap separately.
+        options: mu, disturbance, scaling and two_vertex of `Theorem7Options`.
 
     Returns:
         The design; every inequality recomputed with the returned gains.
@@ -125,50 +110,38 @@ def design_theorem7(
         ImportError: cvxpy (extra `lmi`) is not installed.
     """
     chosen = find_takagi_sugeno_model(model)
-    options: dict[str, Any] = {"disturbance": disturbance, "scaling": scaling, "two_vertex": two_vertex}
-    problem = Theorem7Problem.of(chosen, gap, eta, mu=mu, **options)
+    problem = Theorem7Problem.of(chosen, gap, eta, **options)
     if performance and not (problem.noises or problem.channel):
         raise ValueError(
             f"Theorem 7: {chosen.name} has neither noise nor disturbance to attenuate; ask with performance=False."
         )
     scaled = None if gains is None else _scaled(chosen, problem, gains)
-    found = _checked(problem, performance, scaled)
+    found = _proven(problem, performance, scaled)
     if found is None:
         raise _infeasible(chosen, problem, performance, scaled)
-    numbers: dict[str, Any] = {"model": chosen.name, "gap": gap, "eta": eta, "mu": mu}
-    return _design(problem, *found, options | {"performance": performance}, numbers)
-
-
-def _design(
-    problem: Theorem7Problem,
-    candidate: Theorem7Candidate,
-    checked: Mapping[str, float],
-    options: Mapping[str, Any],
-    numbers: Mapping[str, Any],
-) -> Theorem7Design:
-    """The design in the model's own states."""
+    candidate, proof = found
     T = problem.T[None, :, None]
     return Theorem7Design(
-        **numbers,
-        gamma=sqrt(candidate.unknowns.gamma2) if options["performance"] else inf,
+        margins=proof,
+        status=candidate.status,
+        model=chosen.name,
+        gap=gap,
+        eta=eta,
+        mu=problem.mu,
+        gamma=sqrt(candidate.unknowns.gamma2) if performance else inf,
         sampled_gain=candidate.sampled_gain / T,
         continuous_gain=candidate.continuous_gain / T,
-        margins=checked,
-        options=options,
-        status=candidate.status,
+        options={name: options.get(name, value) for name, value in _DEFAULTS.items()} | {"performance": performance},
         lyapunov_matrix=candidate.unknowns.P,
     )
 
 
-def _checked(
+def _proven(
     problem: Theorem7Problem, performance: bool, gains: Gains | None
 ) -> tuple[Theorem7Candidate, dict[str, float]] | None:
     """A candidate whose inequalities all hold when recomputed, or None."""
-    for candidate in candidates(problem, performance, gains):
-        found = margins(problem, candidate.unknowns, performance)
-        if min(found.values()) > 0.0:
-            return candidate, found
-    return None
+    found = candidates(problem, performance, gains)
+    return first_proven(found, lambda candidate: margins(problem, candidate.unknowns, performance))
 
 
 def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains) -> Gains:
@@ -235,17 +208,9 @@ def _largest(problem: Theorem7Problem, name: str, most: float, gains: Gains | No
     """
 
     def feasible(value: float) -> bool:
-        return _checked(replace(problem, **{name: value}), False, gains) is not None  # type: ignore[arg-type]
+        return _proven(replace(problem, **{name: value}), False, gains) is not None  # type: ignore[arg-type]
 
-    if feasible(most):
-        return most
-    low, high = SMALLEST * most, most
-    if not feasible(low):
-        return None
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if feasible(middle) else (low, middle)
-    return low
+    return largest_feasible(feasible, most, _SMALLEST * most, _BISECTIONS)
 
 
 def _infeasible(
@@ -261,7 +226,7 @@ def _infeasible(
     if eta == problem.eta:
         advice = "The decay alone is feasible: give other coordinates by `scaling`, or ask with performance=False."
     else:
-        near_eta = f"no eta down to {SMALLEST * problem.eta:.3g} 1/s" if eta is None else f"eta = {eta:.3g} 1/s"
-        near_gap = f"no gap down to {SMALLEST * problem.gap:.3g} s" if gap is None else f"gaps up to {gap:.3g} s"
+        near_eta = f"no eta down to {_SMALLEST * problem.eta:.3g} 1/s" if eta is None else f"eta = {eta:.3g} 1/s"
+        near_gap = f"no gap down to {_SMALLEST * problem.gap:.3g} s" if gap is None else f"gaps up to {gap:.3g} s"
         advice = f"Nearest found feasible: {near_eta} at this gap; {near_gap} at this eta."
     return InfeasibleDesign(f"Theorem 7 has no solution for {model.name} with {', '.join(tried)}. {advice}", eta, gap)

@@ -1,19 +1,36 @@
-"""The matrix inequalities of Theorem 7: the same formulas for a solver's unknowns and for numbers. Nothing is solved
-here.
+"""The matrix inequalities of Theorem 7: the same formulas for a solver's unknowns and for numbers, and how far numbers
+keep them. Nothing is solved here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict, Unpack
 
 import numpy as np
 
+from fmu_observer.design.cone_solver import Matrix, Rows, smallest_eigenvalue
+from fmu_observer.models.checks import check_numbers
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 
-Matrix = Any  # a NumPy array, or a solver's expression with the same operators
-Rows = list[list[Matrix]]
+
+class Theorem7Options(TypedDict, total=False):
+    """What Theorem 7 may be asked beside gap and decay.
+
+    Attributes:
+        mu: bound of the premise mismatch [1/s], 0 without it; the thesis prints none.
+        disturbance: with the channel of G and w, as without it. Without it the least gamma is met by ignoring the
+            continuous output.
+        scaling: n positive numbers T; errors are measured, and the problem solved, in ``T x``; None for the model's
+            own. Needed where states differ by decades.
+        two_vertex: the sharper variant that asks at the beginning and the end of a gap separately.
+    """
+
+    mu: float
+    disturbance: bool
+    scaling: Sequence[float] | None
+    two_vertex: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,45 +60,33 @@ class Theorem7Problem:
 
     @classmethod
     def of(
-        cls,
-        model: TakagiSugenoModel,
-        gap: float,
-        eta: float,
-        *,
-        mu: float = 0.0,
-        disturbance: bool = True,
-        scaling: Sequence[float] | None = None,
-        two_vertex: bool = False,
+        cls, model: TakagiSugenoModel, gap: float, eta: float, **options: Unpack[Theorem7Options]
     ) -> Theorem7Problem:
         """The question for a model.
 
         Raises:
             ValueError: gap, eta or mu is not a legal number, or the scaling is not n positive numbers.
         """
-        for name, value, legal in (("gap", gap, gap > 0.0), ("eta", eta, eta >= 0.0), ("mu", mu, mu >= 0.0)):
-            if not (legal and np.isfinite(value)):
-                raise ValueError(
-                    f"Theorem 7: {name} must be finite and {'positive' if name == 'gap' else 'not negative'}, got "
-                    f"{value}."
-                )
+        mu, scaling = options.get("mu", 0.0), options.get("scaling")
+        check_numbers("Theorem 7", {"gap": gap}, {"eta": eta, "mu": mu})
         T = np.asarray(model.scaling if scaling is None else scaling, dtype=float)
         if T.shape != (model.order,) or not np.all(T > 0.0):
             raise ValueError(f"Theorem 7: scaling needs {model.order} positive numbers, one a state, got {scaling!r}.")
         assert model.D is not None  # set by the model itself
         assert model.G is not None
         scaled_G = T[:, None] * model.G
-        channel = float(np.linalg.norm(scaled_G, 2)) ** 2 if disturbance and scaled_G.size else 0.0
+        with_channel = options.get("disturbance", True) and scaled_G.size
         return cls(
             model.A * T[:, None] / T,
             model.C_sampled / T,
             model.C_continuous / T,
             model.D,
-            channel,
-            gap,
-            eta,
-            mu,
-            two_vertex,
-            T,
+            channel=float(np.linalg.norm(scaled_G, 2)) ** 2 if with_channel else 0.0,
+            gap=gap,
+            eta=eta,
+            mu=mu,
+            two_vertex=options.get("two_vertex", False),
+            T=T,
         )
 
     @property
@@ -132,6 +137,25 @@ def inequalities(problem: Theorem7Problem, unknowns: Unknowns, performance: bool
         for i in range(len(problem.A))
         for phase, words in phases.items()
     }
+
+
+def margins(problem: Theorem7Problem, unknowns: Unknowns, performance: bool) -> dict[str, float]:
+    """How far every inequality is from failing, by name: the smallest eigenvalue of what must be positive, less
+    rounding.
+
+    Args:
+        problem: the question. unknowns: numbers. performance: as in `inequalities`.
+
+    Returns:
+        Margins; all positive exactly when the numbers prove what was asked.
+    """
+    found = {"P": smallest_eigenvalue(unknowns.P), "Q": smallest_eigenvalue(unknowns.Q)}
+    if problem.mu > 0.0:
+        found["sigma_1"] = float(unknowns.inverse_sigma)
+    if performance:
+        found["gamma squared"] = float(unknowns.gamma2)
+    blocks = inequalities(problem, unknowns, performance)
+    return found | {name: smallest_eigenvalue(-np.block(rows)) for name, rows in blocks.items()}
 
 
 def _vertex(problem: Theorem7Problem, unknowns: Unknowns, i: int, phase: str, performance: bool) -> Rows:

@@ -1,7 +1,4 @@
-"""Theorem 7 handed to a cone solver. What comes back is only a candidate; `check` decides.
-
-The only file that uses cvxpy, the extra `lmi`.
-"""
+"""Theorem 7 handed to a cone solver. What comes back is only a candidate; `margins` decides."""
 
 from __future__ import annotations
 
@@ -11,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.cvxpy_module import load_cvxpy, solved
+from fmu_observer.design.cone_solver import Attempt, attempts, load_cvxpy, symmetric_value
 from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Problem, Unknowns, inequalities
 
 Gains = tuple[np.ndarray, np.ndarray]
 
-ATTEMPTS: tuple[
-    tuple[float, dict[str, float]], ...
-] = (  # strictness asked of every inequality where gamma is minimised, and the solver's tolerances
+# strictness asked of every inequality where gamma is minimised, and the solver's tolerances
+_ATTEMPTS: tuple[Attempt, ...] = (
     (1e-6, {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "tol_ktratio": 1e-6}),
     (1e-6, {}),
     (1e-6, {"static_regularization_constant": 1e-6}),  # for states that differ by decades
@@ -41,7 +37,7 @@ class Theorem7Candidate:
 
 
 def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None = None) -> Iterator[Theorem7Candidate]:
-    """Seek values for the unknowns, once with every setting in `ATTEMPTS`; take the first that proves what is asked.
+    """Seek values for the unknowns, once with every setting in `_ATTEMPTS`; take the first that proves what is asked.
 
     Args:
         problem: the question. performance: minimise gamma squared; without it maximise the margin of the decay at
@@ -66,11 +62,10 @@ def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None 
         question = cp.Problem(cp.Minimize(unknowns.gamma2), [*constraints, margin == strict])
     else:
         question = cp.Problem(cp.Maximize(margin), [*constraints, cp.trace(unknowns.P) == problem.order])
-    for strict.value, settings in ATTEMPTS if performance else ATTEMPTS[:1]:
-        if solved(cp, question, **settings):
-            candidate = _candidate(unknowns, gains, str(question.status))
-            if candidate is not None:
-                yield candidate
+    for status in attempts(cp, question, strict, _ATTEMPTS if performance else _ATTEMPTS[:1]):
+        candidate = _candidate(unknowns, gains, status)
+        if candidate is not None:
+            yield candidate
 
 
 def _unknowns(cp: Any, problem: Theorem7Problem, gains: Gains | None) -> Unknowns:
@@ -99,8 +94,8 @@ def _candidate(unknowns: Unknowns, gains: Gains | None, status: str) -> Theorem7
     else:
         K1, K2 = gains
     numbers = Unknowns(
-        P=0.5 * (unknowns.P.value + unknowns.P.value.T),
-        Q=0.5 * (unknowns.Q.value + unknowns.Q.value.T),
+        P=symmetric_value(unknowns.P),
+        Q=symmetric_value(unknowns.Q),
         M=M,
         N=[[_value(block) for block in blocks] for blocks in unknowns.N],
         w1=[M.T @ K for K in K1],
