@@ -13,6 +13,7 @@ from fmu_observer.detection.slip_ratio import speed_slip_from_odometer_slip
 from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -62,7 +63,7 @@ class AdhesionDetector(HybridSystem):
         input_signal("speed", "m/s", 0.0, "Train speed, estimated or measured"),
     )
     outputs = (
-        output_signal("condition", "1", "1 nominal, 2 degraded adhesion, debounced", variability="discrete"),
+        discrete_output("condition", "1", "1 nominal, 2 degraded adhesion, debounced"),
         output_signal("raw_condition", "1", "The verdict on the filtered slip now"),
         output_signal("nominal_optimum", "1", "Optimal slip on nominal adhesion at this speed"),
         output_signal("degraded_optimum", "1", "Optimal slip on degraded adhesion at this speed"),

@@ -10,6 +10,7 @@ import numpy as np
 from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -53,10 +54,10 @@ class CouplerRisk(HybridSystem):
     )
     inputs = (input_signal("coupler_force", "N", 0.0, "Coupler force, pull positive"),)
     outputs = (
-        output_signal("risk", "1", "0 none, 1 warning, 2 alarm", variability="discrete"),
+        discrete_output("risk", "1", "0 none, 1 warning, 2 alarm"),
         output_signal("utilisation", "1", "Tension over breaking load"),
         output_signal("tension_rate", "N/s", "Filtered rate of the tension"),
-        output_signal("peak_tension", "N", "Largest tension of the hold time", variability="discrete"),
+        discrete_output("peak_tension", "N", "Largest tension of the hold time"),
     )
     parameters = (
         parameter("break_force", "N", 850e3, "Breaking load of the coupling", min=1.0),

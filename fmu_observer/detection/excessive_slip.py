@@ -17,7 +17,15 @@ from fmu_observer.detection.slip_indicator import (
     slip_filter_derivative,
 )
 from fmu_observer.detection.slip_ratio import odometer_slip
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    discrete_output,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+)
 from plant_models.hybrid.system import Array
 
 
@@ -55,9 +63,9 @@ class ExcessiveSlip(HybridSystem):
     )
     outputs = (
         output_signal("slip", "1", "Slip ratio relative to the odometer, (3.49), guarded by slip_floor"),
-        output_signal("slip_indicator", "1", "1 nominal, 2 excessive slip, confirmed and held", variability="discrete"),
+        discrete_output("slip_indicator", "1", "1 nominal, 2 excessive slip, confirmed and held"),
         output_signal("exceedance", "1", "Filtered slip beyond the threshold, 0 within"),
-        output_signal("peak_exceedance", "1", "Largest exceedance of the episode", variability="discrete"),
+        discrete_output("peak_exceedance", "1", "Largest exceedance of the episode"),
     )
     parameters = (
         parameter("slip_floor", "m/s", 0.5, "Smallest denominator of the slip ratio", min=1e-6),

@@ -16,20 +16,18 @@ from fmu_observer.detection.jam_rules import (
     doubt_limit,
 )
 from fmu_observer.detection.printed_jam_rules import PrintedRules
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal
+from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal
 from plant_models.hybrid.system import Array
 
 NOISE = "odometer_noise"
 RuleChoice = Literal["repaired", "printed"]
 RULES: Mapping[str, Rules] = {"repaired": RepairedRules(), "printed": PrintedRules()}
 FAULT_OUTPUTS = (
-    output_signal("odometer_fault", "1", "1 while the odometer is judged to lie, else 0", variability="discrete"),
-    output_signal("recovering", "1", "1 while it begins to be believed again, else 0", variability="discrete"),
-    output_signal("residual_limit", "m/s", "Size of the residual at which the verdict changes", variability="discrete"),
+    discrete_output("odometer_fault", "1", "1 while the odometer is judged to lie, else 0"),
+    discrete_output("recovering", "1", "1 while it begins to be believed again, else 0"),
+    discrete_output("residual_limit", "m/s", "Size of the residual at which the verdict changes"),
 )
-SETTLED_TIME = output_signal(
-    "settled_time", "s", "Time with a small residual; without any no fault is ever judged", variability="discrete"
-)
+SETTLED_TIME = discrete_output("settled_time", "s", "Time with a small residual; without any no fault is ever judged")
 ODOMETER_SAMPLE = PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read")
 
 

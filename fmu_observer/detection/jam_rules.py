@@ -11,22 +11,23 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from plant_models.hybrid import Signal, memory, parameter
+from plant_models.hybrid.arrays import indicator
 from plant_models.hybrid.system import Array
 
 TRUSTED, HELD, UNCONFIRMED = 0.0, 1.0, 2.0
 """Modes: the odometer is believed; it is not, and the model alone runs on; the model alone has run too long, and the
 odometer is followed again although nothing has confirmed it.
 """
-UNSETTLED = 1000.0  # faults since the residual was last small: so many that none is judged before it is
-REFUTATIONS = 2.0  # ways in a row that must be wrong before an odometer that is believed is held to lie
-VOUCHED = 0.25  # of the time for which an odometer has rolled that speaks against a jump before it is proven [ours]
+_UNSETTLED = 1000.0  # faults since the residual was last small: so many that none is judged before it is
+_REFUTATIONS = 2.0  # ways in a row that must be wrong before an odometer that is believed is held to lie
+_VOUCHED = 0.25  # of the time for which an odometer has rolled that speaks against a jump before it is proven [ours]
 ROUNDING = 1e-9  # of times that are sums of periods
 
 PERIOD = parameter("odometer_period", "s", 0.2, "Time between two readings of the odometer", min=1e-3)
 THRESHOLD = parameter("threshold", "m/s", 0.9, "Residual beyond which the odometer is doubted, eps", min=1e-6)
-RESIDUAL_GAIN = parameter("residual_gain", "1", 2.3, "Residual over speed difference, M", min=1e-6)
-ARMING_DELAY = parameter("arming_delay", "s", 6.0, "Time after the start before any fault is judged", min=0.0)
-SHARED_PARAMETERS = (PERIOD, THRESHOLD, RESIDUAL_GAIN, ARMING_DELAY)
+_RESIDUAL_GAIN = parameter("residual_gain", "1", 2.3, "Residual over speed difference, M", min=1e-6)
+_ARMING_DELAY = parameter("arming_delay", "s", 6.0, "Time after the start before any fault is judged", min=0.0)
+SHARED_PARAMETERS = (PERIOD, THRESHOLD, _RESIDUAL_GAIN, _ARMING_DELAY)
 
 
 class Reading(NamedTuple):
@@ -92,19 +93,20 @@ class Rules(Protocol):
     memory: tuple[Signal, ...]
     parameters: tuple[Signal, ...]
 
-    def at_sample(self, m: Any, told: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, reading: Reading, p: Any) -> Judgement:
         """Judge an odometer sample.
 
         Args:
-            m: named tuple with the `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. reading: the sample. p: parameters, as in `HybridSystem.flow`.
         """
 
-    def at_balise(self, m: Any, told: Passing, p: Any) -> Judgement:
-        """Judge the way between two balises.
+    def at_balise(self, m: Any, passing: Passing, p: Any) -> Judgement:
+        """Judge the way between two balises; nothing follows where the rules know no balises.
 
         Args:
-            m: named tuple with the `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. passing: the way. p: parameters, as in `HybridSystem.flow`.
         """
+        return Judgement({})
 
     def fault(self, m: Any) -> Array:
         """1 while the odometer is judged to lie or is not confirmed.
@@ -114,11 +116,12 @@ class Rules(Protocol):
         """
 
     def discarded(self, m: Any) -> Array:
-        """1 while the estimate must not follow the odometer.
+        """1 while the estimate must not follow the odometer: while it is judged to lie, unless the rules tell more.
 
         Args:
             m: named tuple with the `memory`.
         """
+        return self.fault(m)
 
     def recovering(self, m: Any) -> Array:
         """1 while it begins to be believed again.
@@ -142,7 +145,7 @@ class Rules(Protocol):
         """
 
 
-class RepairedRules:
+class RepairedRules(Rules):
     """Recovery by agreement within a widening threshold, by balises, and in bounded time, for faults of both signs
     [ours].
 
@@ -186,7 +189,7 @@ class RepairedRules:
         memory("hold_time", "s", 0.0, "Time for which the model has run alone, as its error counts"),
         memory("agreeing", "1", 0.0, "Samples in a row that speak for the odometer"),
         memory("settled", "1", 0.0, "Samples in a row with a small residual while the odometer was followed"),
-        memory("faults", "1", UNSETTLED, "Faults since the residual was last small; 1000 after the start"),
+        memory("faults", "1", _UNSETTLED, "Faults since the residual was last small; 1000 after the start"),
         memory("last_odometer", "m/s", 0.0, "Reading before"),
         memory("unchanged_time", "s", 0.0, "Time since mode or rolling last changed"),
         memory("refutations", "1", 0.0, "Ways between balises in a row that the odometer had wrong"),
@@ -214,107 +217,58 @@ class RepairedRules:
         parameter("way_time", "s", 1.0, "Shortest time between balises for the odometer's way to be judged", min=1e-3),
     )
 
-    def at_sample(self, m: Any, told: Reading, p: Any) -> Judgement:
-        """Judge an odometer sample; it takes effect at once.
-
-        Args:
-            m: named tuple with the `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
-        """
-        rolls = _is(np.abs(told.odometer - m.last_odometer) <= rolling_limit(p)) * _is(m.samples > 0.0)
-        held, open_ = _is(m.odometer_mode == HELD), _is(m.odometer_mode == UNCONFIRMED)
-        size = np.abs(told.residual)
-        small = _is(size <= settled_limit(p))
-        sign = _is(told.effort > 0.0) - _is(told.effort < 0.0)
-        effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
-        # Of a period in which the sign changes a part is unknown, and a reading tells of the period before it.
-        brief = p.release_time + p.odometer_period
-        lasting = sign * _is(np.abs(effort_time) + ROUNDING >= brief)
-        large = _is(size > doubt_limit(p))
-        against = large * _against(told, lasting, p) * (1.0 + rolls * m.against)
-        # followed: when are faults judged, and does one begin
-        settled = np.where(held > 0.0, 0.0, np.where(small > 0.0, m.settled + 1.0, 0.0))
-        passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
-        faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
-        armed = _is(m.odometer_mode == TRUSTED) * _is(faults < p.fault_limit) * passed
-        moves = _is(np.abs(told.speed) > p.least_speed)
-        onset = armed * moves * large
-        # held: is the odometer believed again
-        hold = np.where(held > 0.0, m.hold_time + p.odometer_period, 0.0)
-        agrees = held * _is(size <= agreement_limit(hold, p))
-        row = np.where(agrees > 0.0, np.where(rolls > 0.0, m.agreeing + 1.0, 1.0), 0.0)
-        believed = held * _is(row >= p.recover_samples)
-        proven = _is(m.proven_time + ROUNDING >= p.trust_time)
-        lasts = _is((against + ROUNDING) * p.odometer_period >= brief)
-        doubtful = np.maximum(1.0 - proven, lasts)
-        vouched = np.maximum(brief, (1.0 - lasts) * VOUCHED * m.proven_time)
-        limit = np.where(doubtful > 0.0, np.minimum(vouched, p.hold_limit), p.hold_limit)
-        over = held * (1.0 - believed) * _is(hold + ROUNDING >= limit)
-        # Balises began the hold, at no jump of the wheel: what they corrected the speed by was a mean, and is outlived.
-        outlived = over * lasts * _is(m.refutations >= REFUTATIONS)
-        believed, expired = believed + outlived, over - outlived
-        # unconfirmed: has the wheel rolled for long
-        quiet = np.where(open_ * rolls * small > 0.0, m.agreeing + 1.0, 0.0)
-        trusted = open_ * _is((quiet + ROUNDING) * p.odometer_period >= p.trust_time) * _is(settled >= p.settle_samples)
-        rolling = _is(np.maximum(told.speed, told.odometer) > p.least_speed) * _is(m.samples > 0.0)
-        unjudged = (1.0 - proven) * (1.0 - armed) * (1.0 - held) * rolling * large
-        jumped = np.maximum(open_, unjudged) * (1.0 - rolls)
+    def at_sample(self, m: Any, reading: Reading, p: Any) -> Judgement:
+        """Judge an odometer sample; it takes effect at once."""
+        now = _compared(m, reading, p)
+        settled, faults, armed, onset = _followed(m, reading, now, p)
+        hold, row, believed, expired, withdrawn = _held(m, now, p)
+        quiet, trusted = _unconfirmed(m, now, settled, p)
+        jumped = _jumped(m, reading, now, armed, p)
         mode = np.where(
             onset > 0.0,
             HELD,
             np.where(expired > 0.0, UNCONFIRMED, np.where(believed + trusted > 0.0, TRUSTED, m.odometer_mode)),
         )
-        changed = np.maximum(_is(mode != m.odometer_mode), open_ * jumped)
-        rolled = self._proven_time(m, told, np.maximum(held, onset), small, p)
+        changed = np.maximum(indicator(mode != m.odometer_mode), now.unconfirmed * jumped)
+        rolled = _proven_time(m, reading, np.maximum(now.held, onset), now.small, p)
         after = {
             "odometer_mode": mode,
             "hold_time": np.where(mode == HELD, hold, 0.0),
-            "agreeing": np.where(changed > 0.0, 0.0, np.where(held > 0.0, row, quiet)),
+            "agreeing": np.where(changed > 0.0, 0.0, np.where(now.held > 0.0, row, quiet)),
             "settled": np.where(onset > 0.0, 0.0, settled),
-            "faults": np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
-            "last_odometer": told.odometer,
+            "faults": np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, _UNSETTLED, faults + onset)),
+            "last_odometer": reading.odometer,
             "unchanged_time": np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
             "samples": m.samples + 1.0,
-            "effort_time": effort_time,
-            "against": against,
+            "effort_time": now.effort_time,
+            "against": now.against,
             "proven_time": np.where(trusted > 0.0, p.trust_time, rolled),
         }
         restart = np.maximum(np.maximum(believed, expired), jumped)
-        return Judgement(after, restart, onset, withdrawn=over * doubtful)
+        return Judgement(after, restart, onset, withdrawn=withdrawn)
 
-    @staticmethod
-    def _proven_time(m: Any, told: Reading, doubted: Array, small: Array, p: Any) -> Array:
-        """How long the odometer has rolled since the last standstill [s]; `trust_time` where it fits the start."""
-        rolled = np.where(m.proven_time >= p.trust_time, p.trust_time, small * (m.proven_time + p.odometer_period))
-        stands = _is(np.maximum(np.abs(told.speed), np.abs(told.odometer)) <= p.odometer_noise)
-        later = np.where(doubted > 0.0, m.proven_time, _is(m.odometer_mode == TRUSTED) * rolled)
-        first = _is(np.abs(told.residual) <= doubt_limit(p)) * p.trust_time
-        return np.where(stands > 0.0, 0.0, np.where(m.samples > 0.0, later, first))
-
-    def at_balise(self, m: Any, told: Passing, p: Any) -> Judgement:
-        """Judge the way between two balises, where nothing changed on it.
-
-        Args:
-            m: named tuple with the `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
-        """
-        clean = told.known * _is(told.duration >= p.way_time) * _is(m.unchanged_time >= told.duration)
-        right = _is(np.abs(told.way - np.abs(told.distance)) <= way_limit(told, p))
-        held, open_ = _is(m.odometer_mode == HELD), _is(m.odometer_mode == UNCONFIRMED)
+    def at_balise(self, m: Any, passing: Passing, p: Any) -> Judgement:
+        """Judge the way between two balises, where nothing changed on it."""
+        long_enough = indicator(passing.duration >= p.way_time)
+        clean = passing.known * long_enough * indicator(m.unchanged_time >= passing.duration)
+        right = indicator(np.abs(passing.way - np.abs(passing.distance)) <= _way_limit(passing, p))
+        held, unconfirmed = indicator(m.odometer_mode == HELD), indicator(m.odometer_mode == UNCONFIRMED)
         row = clean * (1.0 - right) * (m.refutations + 1.0)
         # Once may be a jam that is over; what is not believed anyway is refuted by that.
-        confirmed, refuted = clean * right, _is(row >= np.where(m.odometer_mode == TRUSTED, REFUTATIONS, 1.0))
-        mode = np.where(refuted > 0.0, HELD, np.where(confirmed * (held + open_) > 0.0, TRUSTED, m.odometer_mode))
-        changed = _is(mode != m.odometer_mode)
+        confirmed, refuted = clean * right, indicator(row >= np.where(m.odometer_mode == TRUSTED, _REFUTATIONS, 1.0))
+        mode = np.where(refuted > 0.0, HELD, np.where(confirmed * (held + unconfirmed) > 0.0, TRUSTED, m.odometer_mode))
+        changed = indicator(mode != m.odometer_mode)
         begun = refuted * (1.0 - held)
         # Mean error of the speed over the way; what is left of it grew within the way, half as long as that at most.
         shift = np.where(
-            refuted > 0.0, (np.abs(told.distance) - told.believed) / np.maximum(told.duration, p.way_time), 0.0
+            refuted > 0.0, (np.abs(passing.distance) - passing.believed) / np.maximum(passing.duration, p.way_time), 0.0
         )
         after = {
             "odometer_mode": mode,
-            "hold_time": np.where(refuted > 0.0, 0.5 * told.duration, np.where(changed > 0.0, 0.0, m.hold_time)),
+            "hold_time": np.where(refuted > 0.0, 0.5 * passing.duration, np.where(changed > 0.0, 0.0, m.hold_time)),
             "agreeing": np.where(changed > 0.0, 0.0, m.agreeing),
             "settled": np.where(changed > 0.0, 0.0, m.settled),
-            "faults": np.where(confirmed * changed > 0.0, UNSETTLED, m.faults + begun),
+            "faults": np.where(confirmed * changed > 0.0, _UNSETTLED, m.faults + begun),
             "unchanged_time": np.where(changed > 0.0, 0.0, m.unchanged_time),
             "refutations": row,
             "proven_time": np.where(confirmed > 0.0, p.trust_time, m.proven_time),
@@ -322,45 +276,127 @@ class RepairedRules:
         return Judgement(after, confirmed * held, begun, shift)
 
     def fault(self, m: Any) -> Array:
-        """1 while the odometer is judged to lie or is not confirmed.
-
-        Args:
-            m: named tuple with the `memory`.
-        """
-        return _is(m.odometer_mode > TRUSTED)
+        """1 while the odometer is judged to lie or is not confirmed."""
+        return indicator(m.odometer_mode > TRUSTED)
 
     def discarded(self, m: Any) -> Array:
-        """1 while the estimate must not follow the odometer.
-
-        Args:
-            m: named tuple with the `memory`.
-        """
-        return _is(m.odometer_mode == HELD)
+        """1 while the estimate must not follow the odometer."""
+        return indicator(m.odometer_mode == HELD)
 
     def recovering(self, m: Any) -> Array:
-        """1 while samples agree, and while the odometer is followed without being confirmed.
-
-        Args:
-            m: named tuple with the `memory`.
-        """
-        return np.maximum(_is(m.odometer_mode == UNCONFIRMED), _is(m.odometer_mode == HELD) * _is(m.agreeing > 0.0))
+        """1 while samples agree, and while the odometer is followed without being confirmed."""
+        return np.maximum(
+            indicator(m.odometer_mode == UNCONFIRMED), indicator(m.odometer_mode == HELD) * indicator(m.agreeing > 0.0)
+        )
 
     def limit(self, m: Any, p: Any) -> Array:
-        """Residual beyond which the odometer is doubted, or, while it is held to lie, within which it agrees [m/s].
-
-        Args:
-            m: named tuple with the `memory`. p: parameters.
-        """
+        """Residual beyond which the odometer is doubted, or, while it is held to lie, within which it agrees [m/s]."""
         return agreement_limit(m.hold_time, p)
 
     def settled_time(self, m: Any, p: Any) -> Array:
         """Time for which the residual of an odometer that was followed has been small [s]; `settle_samples` periods of
         it are needed before faults are judged.
-
-        Args:
-            m: named tuple with the `memory`. p: parameters.
         """
         return m.settled * p.odometer_period
+
+
+class _Compared(NamedTuple):
+    """A sample beside the memory: 1 where it is so, else 0, and times of the effort.
+
+    Attributes:
+        held, unconfirmed: mode. size: of the residual [m/s]. rolls: the wheel rolled since the sample before.
+        small, large: the residual. proven: the odometer. brief: least time of a fault that the effort does not cause
+            [s]. effort_time, against: new values of the memory. lasts: what the effort does not cause has lasted.
+    """
+
+    held: Array
+    unconfirmed: Array
+    size: Array
+    rolls: Array
+    small: Array
+    large: Array
+    proven: Array
+    brief: Array
+    effort_time: Array
+    against: Array
+    lasts: Array
+
+
+def _compared(m: Any, reading: Reading, p: Any) -> _Compared:
+    rolls = indicator(np.abs(reading.odometer - m.last_odometer) <= _rolling_limit(p)) * indicator(m.samples > 0.0)
+    size = np.abs(reading.residual)
+    sign = indicator(reading.effort > 0.0) - indicator(reading.effort < 0.0)
+    effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
+    # Of a period in which the sign changes a part is unknown, and a reading tells of the period before it.
+    brief = p.release_time + p.odometer_period
+    lasting = sign * indicator(np.abs(effort_time) + ROUNDING >= brief)
+    large = indicator(size > doubt_limit(p))
+    against = large * _against(reading, lasting, p) * (1.0 + rolls * m.against)
+    return _Compared(
+        held=indicator(m.odometer_mode == HELD),
+        unconfirmed=indicator(m.odometer_mode == UNCONFIRMED),
+        size=size,
+        rolls=rolls,
+        small=indicator(size <= settled_limit(p)),
+        large=large,
+        proven=indicator(m.proven_time + ROUNDING >= p.trust_time),
+        brief=brief,
+        effort_time=effort_time,
+        against=against,
+        lasts=indicator((against + ROUNDING) * p.odometer_period >= brief),
+    )
+
+
+def _followed(m: Any, reading: Reading, now: _Compared, p: Any) -> tuple[Array, Array, Array, Array]:
+    """Of an odometer that is followed: samples settled, faults, whether they are judged, and whether one begins."""
+    settled = np.where(now.held > 0.0, 0.0, np.where(now.small > 0.0, m.settled + 1.0, 0.0))
+    passed = indicator((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
+    faults = np.where(indicator(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
+    armed = indicator(m.odometer_mode == TRUSTED) * indicator(faults < p.fault_limit) * passed
+    moves = indicator(np.abs(reading.speed) > p.least_speed)
+    return settled, faults, armed, armed * moves * now.large
+
+
+def _held(m: Any, now: _Compared, p: Any) -> tuple[Array, Array, Array, Array, Array]:
+    """Of an odometer that is held to lie: time held, samples in a row that agree; 1 where it is believed again, where
+    its time has expired, and where the fault is withdrawn.
+    """
+    hold = np.where(now.held > 0.0, m.hold_time + p.odometer_period, 0.0)
+    agrees = now.held * indicator(now.size <= agreement_limit(hold, p))
+    row = np.where(agrees > 0.0, np.where(now.rolls > 0.0, m.agreeing + 1.0, 1.0), 0.0)
+    believed = now.held * indicator(row >= p.recover_samples)
+    doubtful = np.maximum(1.0 - now.proven, now.lasts)
+    vouched = np.maximum(now.brief, (1.0 - now.lasts) * _VOUCHED * m.proven_time)
+    limit = np.where(doubtful > 0.0, np.minimum(vouched, p.hold_limit), p.hold_limit)
+    over = now.held * (1.0 - believed) * indicator(hold + ROUNDING >= limit)
+    # Balises began the hold, at no jump of the wheel: what they corrected the speed by was a mean, and is outlived.
+    outlived = over * now.lasts * indicator(m.refutations >= _REFUTATIONS)
+    return hold, row, believed + outlived, over - outlived, over * doubtful
+
+
+def _unconfirmed(m: Any, now: _Compared, settled: Array, p: Any) -> tuple[Array, Array]:
+    """Of an odometer that is not confirmed: samples for which its wheel has rolled, and 1 where it is believed."""
+    quiet = np.where(now.unconfirmed * now.rolls * now.small > 0.0, m.agreeing + 1.0, 0.0)
+    long = indicator((quiet + ROUNDING) * p.odometer_period >= p.trust_time)
+    return quiet, now.unconfirmed * long * indicator(settled >= p.settle_samples)
+
+
+def _jumped(m: Any, reading: Reading, now: _Compared, armed: Array, p: Any) -> Array:
+    """1 where an odometer jumps that is followed at once: one that is not confirmed, or not proven before faults are
+    judged.
+    """
+    rolling = indicator(np.maximum(reading.speed, reading.odometer) > p.least_speed) * indicator(m.samples > 0.0)
+    unjudged = (1.0 - now.proven) * (1.0 - armed) * (1.0 - now.held) * rolling * now.large
+    return np.maximum(now.unconfirmed, unjudged) * (1.0 - now.rolls)
+
+
+def _proven_time(m: Any, reading: Reading, doubted: Array, small: Array, p: Any) -> Array:
+    """How long the odometer has rolled since the last standstill [s]; `trust_time` where it fits the start."""
+    rolled = np.where(m.proven_time >= p.trust_time, p.trust_time, small * (m.proven_time + p.odometer_period))
+    stands = indicator(np.maximum(np.abs(reading.speed), np.abs(reading.odometer)) <= p.odometer_noise)
+    later = np.where(doubted > 0.0, m.proven_time, indicator(m.odometer_mode == TRUSTED) * rolled)
+    first = indicator(np.abs(reading.residual) <= doubt_limit(p)) * p.trust_time
+    return np.where(stands > 0.0, 0.0, np.where(m.samples > 0.0, later, first))
 
 
 def agreement_limit(hold_time: Array, p: Any) -> Array:
@@ -372,15 +408,12 @@ def agreement_limit(hold_time: Array, p: Any) -> Array:
     return doubt_limit(p) + p.residual_gain * p.disturbance_bound * hold_time
 
 
-def noise_residual(p: Any) -> Array:
+def _noise_residual(p: Any) -> Array:
     """Residual that noise and quantisation explain [m/s]: ``M sqrt(2) nu``.
 
     A reading of a rolling wheel is within nu of the speed, and so is an estimate that has just been set to one; both
     are independent, so their difference is ``sqrt(2)`` times as large. What gains make of readings later must be no
     worse than a reading (`fmu_observer.design.jam_recovery.estimate_noise`).
-
-    Args:
-        p: parameters.
     """
     return np.sqrt(2.0) * p.residual_gain * p.odometer_noise
 
@@ -391,7 +424,7 @@ def doubt_limit(p: Any) -> Array:
     Args:
         p: parameters.
     """
-    return np.maximum(p.threshold, noise_residual(p))
+    return np.maximum(p.threshold, _noise_residual(p))
 
 
 def settled_limit(p: Any) -> Array:
@@ -402,7 +435,7 @@ def settled_limit(p: Any) -> Array:
     Args:
         p: parameters.
     """
-    return np.maximum(0.5 * p.threshold, noise_residual(p))
+    return np.maximum(0.5 * p.threshold, _noise_residual(p))
 
 
 def certain_fault(p: Any) -> Array:
@@ -415,37 +448,22 @@ def certain_fault(p: Any) -> Array:
     return doubt_limit(p) / p.residual_gain + p.odometer_noise
 
 
-def rolling_limit(p: Any) -> Array:
-    """Largest change between two readings of a rolling wheel [m/s]: ``a_max period + 2 noise``.
-
-    Args:
-        p: parameters.
-    """
+def _rolling_limit(p: Any) -> Array:
+    """Largest change between two readings of a rolling wheel [m/s]: ``a_max period + 2 noise``."""
     return p.acceleration_limit * p.odometer_period + 2.0 * p.odometer_noise
 
 
-def way_limit(told: Passing, p: Any) -> Array:
+def _way_limit(passing: Passing, p: Any) -> Array:
     """Difference between the odometer's way and the distance that a balise allows [m].
 
     A held reading is late by a period at most, which costs the period times the change of speed.
-
-    Args:
-        told: the way. p: parameters.
     """
-    late = p.odometer_period * np.abs(told.speed_change)
-    return p.way_floor + told.accuracy + p.way_share * np.abs(told.distance) + late
+    late = p.odometer_period * np.abs(passing.speed_change)
+    return p.way_floor + passing.accuracy + p.way_share * np.abs(passing.distance) + late
 
 
-def _against(told: Reading, sign: Array, p: Any) -> Array:
-    """1 where the effort can cause neither the jam nor the skid: a braked wheel too fast, a driven one too slow.
-
-    Args:
-        told: the sample. sign: of the effort, 0 where it has changed of late. p: parameters.
-    """
-    too_fast = _is(told.odometer > told.speed)
-    braked, driven = _is(sign < 0.0), _is(sign > 0.0)
-    return _is(p.sign_rule > 0.5) * (braked * too_fast + driven * (1.0 - too_fast))
-
-
-def _is(condition: Array) -> Array:
-    return np.where(condition, 1.0, 0.0)
+def _against(reading: Reading, sign: Array, p: Any) -> Array:
+    """1 where the effort can cause neither the jam nor the skid: a braked wheel too fast, a driven one too slow."""
+    too_fast = indicator(reading.odometer > reading.speed)
+    braked, driven = indicator(sign < 0.0), indicator(sign > 0.0)
+    return indicator(p.sign_rule > 0.5) * (braked * too_fast + driven * (1.0 - too_fast))

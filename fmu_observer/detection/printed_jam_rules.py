@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.detection.jam_rules import ROUNDING, Judgement, Passing, Reading
+from fmu_observer.detection.jam_rules import ROUNDING, Judgement, Reading, Rules
 from plant_models.hybrid import Signal, memory, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid.arrays import Array, indicator
 
 
-class PrintedRules:
+class PrintedRules(Rules):
     """Algorithm 3-3 with ``|r|`` for r: (3.59) is negative in a jam.
 
     States N, F (measurement diverging), R (converging again); with the sample ``v_k`` and the estimate ``vh``
@@ -47,25 +47,21 @@ class PrintedRules:
         ),
     )
 
-    def at_sample(self, m: Any, told: Reading, p: Any) -> Judgement:
-        """Judge an odometer sample; it takes effect at the next one, or at once.
-
-        Args:
-            m: named tuple with the `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
-        """
+    def at_sample(self, m: Any, reading: Reading, p: Any) -> Judgement:
+        """Judge an odometer sample; it takes effect at the next one, or at once."""
         fault, recovering = m.next_fault_state, m.next_recovering_state  # in force from this sample on
-        y, last = told.odometer, m.last_odometer
-        known = _is(m.samples > 0.0)
-        rises, falls = known * _is(last < y), known * _is(last > y)
-        first = _is(np.abs(told.residual) > p.threshold) * _is(told.speed > y)
-        fourth = (1.0 - fault) * rises * _is(p.rule_4 > 0.5)
+        y, last = reading.odometer, m.last_odometer
+        known = indicator(m.samples > 0.0)
+        rises, falls = known * indicator(last < y), known * indicator(last > y)
+        first = indicator(np.abs(reading.residual) > p.threshold) * indicator(reading.speed > y)
+        fourth = (1.0 - fault) * rises * indicator(p.rule_4 > 0.5)
         new_fault, new_recovering = np.where(first > 0.0, 1.0, fault), np.where(fault * rises > 0.0, 1.0, recovering)
         done = recovering * falls
         new_fault, new_recovering = np.where(done > 0.0, 0.0, new_fault), np.where(done > 0.0, 0.0, new_recovering)
         new_fault = np.where(fourth > 0.0, 1.0, new_fault)
         new_recovering = np.where(fourth > 0.0, 1.0, new_recovering)
-        new_fault = np.where(fault * _is(y == 0.0) > 0.0, 1.0, new_fault)
-        armed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
+        new_fault = np.where(fault * indicator(y == 0.0) > 0.0, 1.0, new_fault)
+        armed = indicator((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         new_fault, new_recovering, late = armed * new_fault, armed * new_recovering, p.rule_delay > 0.5
         after = {
             "fault_state": np.where(late, fault, new_fault),
@@ -77,54 +73,18 @@ class PrintedRules:
         }
         return Judgement(after)
 
-    def at_balise(self, m: Any, told: Passing, p: Any) -> Judgement:
-        """Nothing: the printed rules know no balises.
-
-        Args:
-            m: named tuple with the `memory`. told: the way. p: parameters.
-        """
-        return Judgement({})
-
     def fault(self, m: Any) -> Array:
-        """1 while F is in force.
-
-        Args:
-            m: named tuple with the `memory`.
-        """
-        return m.fault_state
-
-    def discarded(self, m: Any) -> Array:
-        """The same: the odometer is discarded while F is in force.
-
-        Args:
-            m: named tuple with the `memory`.
-        """
+        """1 while F is in force."""
         return m.fault_state
 
     def recovering(self, m: Any) -> Array:
-        """1 while R is in force.
-
-        Args:
-            m: named tuple with the `memory`.
-        """
+        """1 while R is in force."""
         return m.recovering_state
 
     def limit(self, m: Any, p: Any) -> Array:
-        """eps [m/s], always.
-
-        Args:
-            m: named tuple with the `memory`. p: parameters.
-        """
+        """eps [m/s], always."""
         return p.threshold
 
     def settled_time(self, m: Any, p: Any) -> Array:
-        """Time since the start [s]: `arming_delay` is all that the printed rules wait for.
-
-        Args:
-            m: named tuple with the `memory`. p: parameters.
-        """
+        """Time since the start [s]: `arming_delay` is all that the printed rules wait for."""
         return m.samples * p.odometer_period
-
-
-def _is(condition: Array) -> Array:
-    return np.where(condition, 1.0, 0.0)

@@ -11,14 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal, memory, parameter
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -121,11 +114,9 @@ class ThresholdDetector(HybridSystem):
     states = THRESHOLD_MEMORY
     inputs = (input_signal("residual", "m/s", 0.0, "Measured minus estimated speed"),)
     outputs = (
-        output_signal("odometer_fault", "1", "1 while a fault is detected", variability="discrete"),
-        output_signal(
-            "recovering", "1", "1 while the residual of a fault has fallen: its end is awaited", variability="discrete"
-        ),
-        output_signal("residual_level", "m/s", "Magnitude of the residual as judged", variability="discrete"),
+        discrete_output("odometer_fault", "1", "1 while a fault is detected"),
+        discrete_output("recovering", "1", "1 while the residual of a fault has fallen: its end is awaited"),
+        discrete_output("residual_level", "m/s", "Magnitude of the residual as judged"),
     )
     parameters = (
         *THRESHOLD_PARAMETERS,

@@ -14,14 +14,7 @@ from fmu_observer.detection.train_diagnosis_signals import EVENTS, INPUTS, OUTPU
 from fmu_observer.detection.train_efficiency import MotionWindow, Share, brake_share, traction_share
 from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, RESIDUALS, WHEEL, isolability
 from fmu_observer.detection.train_memory import CONTINUOUS, remembered
-from fmu_observer.detection.train_residuals import (
-    HUGE,
-    Readings,
-    readings,
-    speed_ratios,
-    voted_speed,
-    way_ratios,
-)
+from fmu_observer.detection.train_residuals import HUGE, Readings, readings, speed_ratios, voted_speed, way_ratios
 from fmu_observer.detection.train_verdict import (
     alarms_after,
     availability,

@@ -9,6 +9,7 @@ from plant_models.hybrid import (
     PeriodicEvent,
     Signal,
     TriggeredEvent,
+    discrete_output,
     input_signal,
     output_signal,
     parameter,
@@ -46,16 +47,15 @@ _TITLES = {
 _CODES = "0 none, 1 suspected, 2 wheel, 3 wrong, 4 stuck, 5 loss"
 
 OUTPUTS = (
-    *(output_signal(f"{fault}_fault", "1", f"{_TITLES[fault]}: {_CODES}", variability="discrete") for fault in FAULTS),
-    output_signal("fault", "1", "1 while a fault is detected, whether it is isolated or not", variability="discrete"),
-    output_signal("odometer_fault", "1", "1 while the first odometer is suspected or at fault", variability="discrete"),
-    output_signal("fault_count", "1", "How many faults are suspected or isolated", variability="discrete"),
-    output_signal(
+    *(discrete_output(f"{fault}_fault", "1", f"{_TITLES[fault]}: {_CODES}") for fault in FAULTS),
+    discrete_output("fault", "1", "1 while a fault is detected, whether it is isolated or not"),
+    discrete_output("odometer_fault", "1", "1 while the first odometer is suspected or at fault"),
+    discrete_output("fault_count", "1", "How many faults are suspected or isolated"),
+    discrete_output(
         "several_faults",
         "1",
         "1 while no single fault explains the alarms, or not that which is isolated; two odometers that are off alike "
         "under an effort that may slip both are told as the rail",
-        variability="discrete",
         warning=OutputWarning(
             "detected faults that it could not isolate: no single fault of its table moves all the residuals that are "
             "above their thresholds. Look at the ratios: several sensors are at fault, or one in a way that the table "
@@ -63,20 +63,17 @@ OUTPUTS = (
             ("fault", "fault_count"),
         ),
     ),
-    output_signal("detection_time", "s", "Instant of the last detection; -1 none", variability="discrete"),
-    output_signal(
-        "confidence", "1", "1 less threshold over the weakest alarm of the verdict, 0..1", variability="discrete"
-    ),
-    output_signal("speed", "m/s", "Speed that is believed", variability="discrete", display_unit="km/h"),
+    discrete_output("detection_time", "s", "Instant of the last detection; -1 none"),
+    discrete_output("confidence", "1", "1 less threshold over the weakest alarm of the verdict, 0..1"),
+    discrete_output("speed", "m/s", "Speed that is believed", display_unit="km/h"),
     output_signal("position", "m", "Position by dead reckoning from the last balise used"),
-    output_signal("traction_efficiency", "1", "Share of traction that reaches the train", variability="discrete"),
-    output_signal("brake_performance", "1", "Share of brake force, by the measured pressure", variability="discrete"),
-    output_signal("brake_by_demand", "1", "Share of brake force, by the demand", variability="discrete"),
-    output_signal(
+    discrete_output("traction_efficiency", "1", "Share of traction that reaches the train"),
+    discrete_output("brake_performance", "1", "Share of brake force, by the measured pressure"),
+    discrete_output("brake_by_demand", "1", "Share of brake force, by the demand"),
+    discrete_output(
         "isolation_limited",
         "1",
         "1 where a sensor is missing that isolation needs",
-        variability="discrete",
         warning=OutputWarning(
             "a sensor was not connected that isolation needs: without the second odometer a fault of the first is not "
             "told from slip of all wheels, without the radar a false balise is not told from that slip, without the "
@@ -85,19 +82,15 @@ OUTPUTS = (
         ),
     ),
     *(
-        output_signal(
-            f"{share}_unknown",
-            "1",
-            f"1 until {share} was found, and while it lies outside of what is looked through",
-            variability="discrete",
+        discrete_output(
+            f"{share}_unknown", "1", f"1 until {share} was found, and while it lies outside of what is looked through"
         )
         for share in SHARES
     ),
-    output_signal(
+    discrete_output(
         "shares_unknown",
         "1",
         "How many of the three shares of traction and brake are unknown",
-        variability="discrete",
         warning=OutputWarning(
             "not every share of traction and brake is known: the run is shorter than the window of force_window coarse "
             "steps, no such effort changed the speed by least_excitation within one while the speeds agreed, or the "
@@ -106,10 +99,7 @@ OUTPUTS = (
             at_end=True,
         ),
     ),
-    *(
-        output_signal(f"ratio_{name}", "1", f"Residual {name} over its threshold", variability="discrete")
-        for name in RESIDUALS
-    ),
+    *(discrete_output(f"ratio_{name}", "1", f"Residual {name} over its threshold") for name in RESIDUALS),
 )
 
 _BRAKES = {

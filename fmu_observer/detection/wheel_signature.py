@@ -14,7 +14,7 @@ from fmu_observer.formulas.signatures.classification import Plane, SignatureClas
 from fmu_observer.formulas.signatures.clouds import Coordinate
 from fmu_observer.formulas.signatures.pencil import pencil_point
 from fmu_observer.formulas.signatures.properties import PROPERTIES
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal, memory, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -43,12 +43,10 @@ class WheelSignature(HybridSystem):
     internal_step = 1e-2
     inputs = (input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),)
     outputs = (
-        output_signal(
-            "odometer_fault", "1", "1 while the wheel is judged to jam or skid, else 0", variability="discrete"
-        ),
-        output_signal("kind", "1", "-1 a jam, 1 a skid, 0 neither", variability="discrete"),
-        output_signal("change", "1", "The newest record: -1 a drop, 1 a rise, 0 steady", variability="discrete"),
-        output_signal("fault_time", "s", "Time since the fault was told", variability="discrete"),
+        discrete_output("odometer_fault", "1", "1 while the wheel is judged to jam or skid, else 0"),
+        discrete_output("kind", "1", "-1 a jam, 1 a skid, 0 neither"),
+        discrete_output("change", "1", "The newest record: -1 a drop, 1 a rise, 0 steady"),
+        discrete_output("fault_time", "s", "Time since the fault was told"),
     )
     parameters = (
         parameter("odometer_period", "s", TRAINED_PERIOD, "Time between two readings of the odometer", min=1e-3),

@@ -36,8 +36,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import memory, parameter
+from plant_models.hybrid.arrays import Array, indicator
 from plant_models.hybrid.event import DOUBTED, IGNORED, USED
-from plant_models.hybrid.system import Array
 
 OFF, WARN, REJECT = 0.0, 1.0, 2.0
 """Values of the parameter `gate`: every telegram is used; doubted ones are used and counted; they are ignored and
@@ -213,12 +213,12 @@ def judge(before: GateMemory, told: Told, p: Any) -> GateJudgement:
     """
     size, accuracy = np.abs(told.estimate - told.position), known_accuracy(told.accuracy)
     granted = granted_error(before, told, p)
-    settled = _is(before.settled >= p.gate_recover)
-    outside = _is(size > gate_limit(before, told, p))
-    doubted = outside * settled * _is(p.gate > OFF)
-    refused = doubted * _is(p.gate >= REJECT)
+    settled = indicator(before.settled >= p.gate_recover)
+    outside = indicator(size > gate_limit(before, told, p))
+    doubted = outside * settled * indicator(p.gate > OFF)
+    refused = doubted * indicator(p.gate >= REJECT)
     row = _row(before, told, p)
-    restart = refused * _is(row[0] >= p.gate_recover)
+    restart = refused * indicator(row[0] >= p.gate_recover)
     used = 1.0 - refused + restart
     # nothing is known of an estimate that has not settled, so nothing speaks against the telegram
     weight = np.where(settled * (1.0 - restart) > 0.0, gain_ratio(granted, accuracy, p.gate_floor), 1.0)
@@ -248,27 +248,23 @@ def _row(before: GateMemory, told: Told, p: Any) -> tuple[Array, ...]:
     spacing, passed = told.position - before.last_position, told.t - before.last_time
     places = p.gate_floor + accuracy + before.last_accuracy
     tolerance = places + p.gate_drift * np.abs(spacing)
-    is_first = _is(before.doubted <= 0.0)
-    by_way = (1.0 - is_first) * _is(np.abs(innovation - before.last_innovation) <= tolerance)
+    is_first = indicator(before.doubted <= 0.0)
+    by_way = (1.0 - is_first) * indicator(np.abs(innovation - before.last_innovation) <= tolerance)
     if told.odometer is not None:
         beyond = spacing - 0.5 * (told.odometer + before.last_odometer) * passed
         # an odometer that agrees with both says nothing against the estimate
-        against = _is(np.abs(beyond + innovation - before.last_innovation) > tolerance)
-        by_way = np.maximum(by_way, _is(np.abs(beyond) <= tolerance) * np.maximum(against, 1.0 - is_first))
+        against = indicator(np.abs(beyond + innovation - before.last_innovation) > tolerance)
+        by_way = np.maximum(by_way, indicator(np.abs(beyond) <= tolerance) * np.maximum(against, 1.0 - is_first))
     time = np.maximum(passed, LEAST_TIME)
     speed, slack = spacing / time, 0.5 * p.gate_acceleration * time + (p.gate_floor + places) / time
-    by_speed = (1.0 - is_first) * _is(np.abs(speed - before.last_speed) <= slack + before.last_slack)
+    by_speed = (1.0 - is_first) * indicator(np.abs(speed - before.last_speed) <= slack + before.last_slack)
     agreeing = np.maximum(by_way, BY_SPEED * by_speed)
     count = np.where(agreeing > 0.0, np.maximum(before.doubted, 1.0) + agreeing, 1.0)
     odometer = before.last_odometer if told.odometer is None else told.odometer
     new = (count, told.position, accuracy, innovation, told.t, odometer, speed, slack)
-    repeated = (1.0 - is_first) * _is(np.abs(spacing) <= p.gate_floor)
+    repeated = (1.0 - is_first) * indicator(np.abs(spacing) <= p.gate_floor)
     return tuple(np.where(repeated > 0.0, a, b) for a, b in zip(before[6:], new, strict=True))
 
 
 def _root_of_squares(a: Array, b: Array) -> Array:
     return np.sqrt(a * a + b * b)
-
-
-def _is(condition: Array) -> Array:
-    return np.where(condition, 1.0, 0.0)

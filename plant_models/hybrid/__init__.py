@@ -14,6 +14,7 @@ from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import (
     Signal,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -45,6 +46,7 @@ __all__ = [
     "TracedSystem",
     "TracingError",
     "TriggeredEvent",
+    "discrete_output",
     "input_signal",
     "make_kernel",
     "matrix",

@@ -54,3 +54,12 @@ def matrix(*rows: Sequence[Array]) -> Array:
         Array of shape (n, m), or (n, m, members) for a batch.
     """
     return np.stack([vector(*row) for row in rows])
+
+
+def indicator(condition: Array) -> Array:
+    """1 where a condition holds, else 0.
+
+    Args:
+        condition: truth values, or symbols of them.
+    """
+    return np.where(condition, 1.0, 0.0)

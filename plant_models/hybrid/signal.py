@@ -248,6 +248,15 @@ def output_signal(
     return Signal(name, unit, "output", variability, 0.0, *kept, can_be_missing=can_be_missing)
 
 
+def discrete_output(name: str, unit: str, description: str = "", **further: Any) -> Signal:
+    """An output that changes at events only.
+
+    Args:
+        name, unit, description: as of `output_signal`. further: its other arguments.
+    """
+    return output_signal(name, unit, description, variability="discrete", **further)
+
+
 def parameter(
     name: str,
     unit: str,

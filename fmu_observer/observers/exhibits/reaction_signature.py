@@ -19,7 +19,7 @@ from fmu_observer.formulas.signatures.pencil import NextScaling
 from fmu_observer.observers.generic.signature.signature_observer import TABLE_ERROR, InvertedWindow, SignatureObserver
 from fmu_observer.observers.parameter_values import Value
 from plant_models.exhibits.gas_phase_reaction import GasPhaseReaction
-from plant_models.hybrid import memory, output_signal, parameter, vector
+from plant_models.hybrid import discrete_output, memory, parameter, vector
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
@@ -92,8 +92,8 @@ class ReactionSignature(SignatureObserver):
                 memory("looked_up_rate", "1/s", middle, "Of the signature: rate of the reaction"),
             ),
             own_outputs=(
-                output_signal("rate", "1/s", "Estimate: rate of the reaction", variability="discrete"),
-                output_signal("rate_look_up", "1/s", "Of the window alone: rate", variability="discrete"),
+                discrete_output("rate", "1/s", "Estimate: rate of the reaction"),
+                discrete_output("rate_look_up", "1/s", "Of the window alone: rate"),
             ),
             known=("rate",),
         )

@@ -46,9 +46,9 @@ from plant_models.hybrid import (
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
     vector,
 )
@@ -170,23 +170,14 @@ class WindTurbineDiagnosis(HybridSystem):
     )
     outputs = (
         *(
-            output_signal(
-                g.output,
-                "1",
-                f"1 for a fault of {g.text}",
-                variability="discrete",
-                size=g.size if g.size > 1 else None,
-            )
+            discrete_output(g.output, "1", f"1 for a fault of {g.text}", size=g.size if g.size > 1 else None)
             for g in _GROUPS
         ),
-        output_signal(
-            "fault", "1", "1 while a fault is detected, whether it is isolated or not", variability="discrete"
-        ),
-        output_signal(
+        discrete_output("fault", "1", "1 while a fault is detected, whether it is isolated or not"),
+        discrete_output(
             "undecided",
             "1",
             "Pairs of sensors of which one is at fault, not known which, or speeds of rotor and generator apart",
-            variability="discrete",
             warning=OutputWarning(
                 "detected a fault that it could not isolate: two sensors of one quantity disagree by more than their "
                 "limit, and neither contradicts the model by more than its own, compare both with a third; or the two "
@@ -196,18 +187,14 @@ class WindTurbineDiagnosis(HybridSystem):
             ),
         ),
         *(
-            output_signal(
-                f"{g.output}_time",
-                "s",
-                f"Last change of the alarm of {g.text}",
-                variability="discrete",
-                size=g.size if g.size > 1 else None,
+            discrete_output(
+                f"{g.output}_time", "s", f"Last change of the alarm of {g.text}", size=g.size if g.size > 1 else None
             )
             for g in _GROUPS
         ),
-        *(output_signal(name, "1", text, variability="discrete", size=n) for name, n, text in _RATIOS),
+        *(discrete_output(name, "1", text, size=n) for name, n, text in _RATIOS),
         *WARNINGS,
-        *(output_signal(name, unit, text, variability="discrete", size=n) for name, unit, n, text in _RESIDUALS),
+        *(discrete_output(name, unit, text, size=n) for name, unit, n, text in _RESIDUALS),
     )
     parameters = (
         parameter("sample_period", "s", 0.01, "Time between two samples", min=1e-6),

@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_observer.observers.exhibits.drive_train_residuals import GAINS, GAINS_PERIOD, WINDOW
 from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS
-from plant_models.hybrid import OutputWarning, output_signal
+from plant_models.hybrid import OutputWarning, discrete_output
 from plant_models.hybrid.system import Array
 
 OUTSIDE_UPDATES = 12.0
@@ -19,22 +19,20 @@ REPEATED_SHARE = 0.25
 """Share of samples without a new reading that is too large; sensors read half as often repeat every second one."""
 
 WARNINGS = (
-    output_signal(
+    discrete_output(
         "efficiency_unknown",
         "1",
         "1 until the window of the efficiency is full",
-        variability="discrete",
         warning=OutputWarning(
             f"never estimated the efficiency: the run is shorter than the {BLOCKS + 1} times update_period that its "
             "window needs, and no loss can be seen; lower update_period, or let the run go on",
             at_end=True,
         ),
     ),
-    output_signal(
+    discrete_output(
         "efficiency_outside",
         "1",
         "1 where the grid has long not bracketed the efficiency",
-        variability="discrete",
         warning=OutputWarning(
             f"took the end of its grid for the efficiency: for {OUTSIDE_UPDATES:g} updates and more the grid bracketed "
             "no measurement; widen it (grid_lowest, grid_highest, least_efficiency, most_efficiency), and check "
@@ -42,22 +40,20 @@ WARNINGS = (
             shows=("efficiency_estimate",),
         ),
     ),
-    output_signal(
+    discrete_output(
         "efficiency_impossible",
         "1",
         "1 where the efficiency is above 1 by more than its limit",
-        variability="discrete",
         warning=OutputWarning(
             "estimated an efficiency that no drive train has, more than efficiency_limit above 1: the torque of the "
             "wind is estimated wrongly, and the alarm of the efficiency means nothing; check wind_bias and rotor data",
             shows=("efficiency_estimate",),
         ),
     ),
-    output_signal(
+    discrete_output(
         "readings_repeated",
         "1",
         "1 where many samples brought no new reading",
-        variability="discrete",
         warning=OutputWarning(
             "found speeds and torque unchanged at more than a quarter of its samples: sensors are read less often than "
             "its sample_period, or nothing moves and there is no noise; limits and gains hold for sensors that are "

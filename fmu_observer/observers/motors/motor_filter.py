@@ -23,6 +23,7 @@ from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,
     Signal,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -86,26 +87,13 @@ class MotorFilter(HybridSystem):
         )
         self.outputs = (
             *(
-                output_signal(
-                    s.name, s.unit, f"Estimate: {s.description}", variability="discrete", display_unit=s.display_unit
-                )
+                discrete_output(s.name, s.unit, f"Estimate: {s.description}", display_unit=s.display_unit)
                 for s in estimated
             ),
-            *(
-                output_signal(f"{s.name}_std", s.unit, f"Standard deviation of the {s.name}", variability="discrete")
-                for s in estimated
-            ),
-            *(
-                output_signal(f"innovation_{a}", "A", f"Measured less predicted current, {a}", variability="discrete")
-                for a in axes
-            ),
-            output_signal("nis", "1", "Normalised square of the innovation, two degrees", variability="discrete"),
-            output_signal(
-                "innovation_likelihood",
-                "1",
-                "Logarithm of the likelihood of all innovations so far",
-                variability="discrete",
-            ),
+            *(discrete_output(f"{s.name}_std", s.unit, f"Standard deviation of the {s.name}") for s in estimated),
+            *(discrete_output(f"innovation_{a}", "A", f"Measured less predicted current, {a}") for a in axes),
+            discrete_output("nis", "1", "Normalised square of the innovation, two degrees"),
+            discrete_output("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far"),
         )
         self.parameters = (*_variances(estimated), *MOTOR_PARAMETERS)
         read, text = tuple(f"measured_current_{axis}" for axis in axes), "The currents are read"

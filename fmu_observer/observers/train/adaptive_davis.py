@@ -22,11 +22,7 @@ from fmu_observer.formulas.adaptation.adaptation_at_samples import (
     since_flow,
     state_covariance,
 )
-from fmu_observer.formulas.adaptation.adaptive_law import (
-    gentle_gain,
-    learnt_constants,
-    smallest_eigenvalue,
-)
+from fmu_observer.formulas.adaptation.adaptive_law import gentle_gain, learnt_constants, smallest_eigenvalue
 from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -42,7 +38,16 @@ from fmu_observer.observers.train.adaptive_davis_states import (
 )
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
-from plant_models.hybrid import PeriodicEvent, Signal, input_signal, matrix, output_signal, parameter, vector
+from plant_models.hybrid import (
+    PeriodicEvent,
+    Signal,
+    discrete_output,
+    input_signal,
+    matrix,
+    output_signal,
+    parameter,
+    vector,
+)
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -103,7 +108,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     outputs = (
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
-        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
         output_signal("position_deviation", "m", "Standard deviation of the position's error"),
         *(output_signal(n, unit, f"Estimated coefficient {n[6]}") for n, unit in zip(NAMES, UNITS, strict=True)),
         *(

@@ -5,66 +5,31 @@ Ours.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import certified_gains, rounded_down
-from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction
+from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_observer import TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range
-from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES
-from plant_models.hybrid import PeriodicEvent, Signal, memory, output_signal, parameter
+from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, WheelStage
+from plant_models.hybrid import Signal, memory, output_signal, parameter
 from plant_models.hybrid.system import Array
 
-FirstStage = Literal["effort", "differentiator", "multirate"]
-SpeedSource = Literal["odometer", "estimated"]
-SpacingSource = Literal["expected", "learnt"]
+_FirstStage = Literal["effort", "differentiator", "multirate"]
+_SpeedSource = Literal["odometer", "estimated"]
+_SpacingSource = Literal["expected", "learnt"]
 
-ADVISED_RATIO, ADVISED_SHARES = 2.0, (3.0, 1.5)  # what `advise` tries: ratio, and theta_min times the longest gap
-SHORTEST_LEARNT = 0.25  # of the expected spacing: nearer to the last one a balise teaches no spacing
-
-
-class EffortStage:
-    """No stage at all: the applied effort stands for the adhesion force, and the inertia of the wheels is neglected."""
-
-    states: tuple[Signal, ...] = ()
-    parameters: tuple[Signal, ...] = ()
-    events: tuple[PeriodicEvent, ...] = ()
-    stability_parameters: tuple[str, ...] = ()
-
-    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """The effort [N].
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
-        return u.effort
-
-    def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """No states.
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
-        return {}
-
-    def sampled(self, x: Any, u: Any) -> dict[str, Array]:
-        """No states.
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
-        """
-        return {}
+_ADVISED_RATIO, _ADVISED_SHARES = 2.0, (3.0, 1.5)  # what `advise` tries: ratio, and theta_min times the longest gap
+_SHORTEST_LEARNT = 0.25  # of the expected spacing: nearer to the last one a balise teaches no spacing
 
 
-STAGES = {"effort": EffortStage, **WHEEL_STAGES}
+_STAGES = {"effort": WheelStage, **WHEEL_STAGES}
 
 
 class AdaptiveGainCdo(HighGainTrainObserver):
@@ -108,25 +73,23 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         "assumed_spacing_error",
     )
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "first_stage": tuple(STAGES),
+        "first_stage": tuple(_STAGES),
         "gain_speed": ("odometer", "estimated"),
         "spacing": ("expected", "learnt"),
     }
 
     def __init__(
         self,
-        first_stage: FirstStage = "effort",
-        gain_speed: SpeedSource = "odometer",
-        spacing: SpacingSource = "expected",
+        first_stage: _FirstStage = "effort",
+        gain_speed: _SpeedSource = "odometer",
+        spacing: _SpacingSource = "expected",
     ) -> None:
         chosen = {"first_stage": first_stage, "gain_speed": gain_speed, "spacing": spacing}
         for option, value in chosen.items():
             if value not in self.option_choices[option]:
                 choices = ", ".join(map(str, self.option_choices[option]))
                 raise ValueError(f"{self.name}: unknown {option} {value!r}; use one of: {choices}.")
-        self.stage, self.gain_speed, self.spacing = STAGES[first_stage](), gain_speed, spacing
-        self.first_stage_states, self.estimator_events = self.stage.states, self.stage.events
-        self.first_stage_parameters = self.stage.parameters
+        self.stage, self.gain_speed, self.spacing = _STAGES[first_stage](), gain_speed, spacing
         self.stability_parameters = (*type(self).stability_parameters, *self.stage.stability_parameters)
         self.estimator_memory = (memory("theta", "1/s", 1.0, "High gain in force since the last balise"),)
         if spacing == "learnt":
@@ -143,6 +106,7 @@ class AdaptiveGainCdo(HighGainTrainObserver):
 
     def gain_parameters(self) -> tuple[Signal, ...]:
         """The rule of the gain, and what its certificate assumes."""
+        error = "Largest relative error"
         return (
             parameter("ratio", "1", 2.5, "Gain times the expected gap", min=0.0),
             parameter("theta_min", "1/s", 0.1, "Smallest gain, at most 4 / longest gap", min=1e-4),
@@ -150,35 +114,13 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             parameter("expected_spacing", "m", 50.0, "Expected distance between balises", min=1e-3),
             parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2),
             parameter("assumed_acceleration", "m/s2", 0.7, "Largest acceleration, for the certificate only", min=0.0),
-            parameter(
-                "assumed_speed_error",
-                "1",
-                0.05,
-                "Largest relative error of v, for the certificate only",
-                min=0.0,
-                max=1.0,
-            ),
-            parameter(
-                "assumed_spacing_error",
-                "1",
-                0.0,
-                "Largest relative error of d, for the certificate only",
-                min=0.0,
-                max=1.0,
-            ),
+            parameter("assumed_speed_error", "1", 0.05, f"{error} of v, for the certificate only", min=0.0, max=1.0),
+            parameter("assumed_spacing_error", "1", 0.0, f"{error} of d, for the certificate only", min=0.0, max=1.0),
         )
 
     def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain since the last balise [1/s]."""
         return x.theta
-
-    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """Adhesion force of the first stage [N]."""
-        return self.stage.adhesion(x, u, p)
-
-    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the first stage."""
-        return self.stage.flow(x, u, p)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate with slip and indicator, and the gain in force."""
@@ -187,7 +129,7 @@ class AdaptiveGainCdo(HighGainTrainObserver):
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """At a balise innovation and gain are set anew; an odometer sample goes to the first stage."""
         if event != "balise":
-            return self.stage.sampled(x, u)
+            return super().update(event, t, x, u, p)
         speed = np.abs(u.odometer if self.gain_speed == "odometer" else x.estimated_speed)
         spacing, learnt = self._spacing(x, u, p)
         theta = np.clip(p.ratio * speed / spacing, p.theta_min, np.maximum(p.theta_max, p.theta_min))  # as certified
@@ -195,18 +137,15 @@ class AdaptiveGainCdo(HighGainTrainObserver):
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """The ratio and theta_min of a few that are certified; where none is, a constant theta."""
-        for share in ADVISED_SHARES:
-            rule = {"ratio": ADVISED_RATIO, "theta_min": rounded_down(share / max_gap)}
+        for share in _ADVISED_SHARES:
+            rule = {"ratio": _ADVISED_RATIO, "theta_min": rounded_down(share / max_gap)}
             if certify(rule).holds:
-                return (
-                    f"ratio = {ADVISED_RATIO:g} and theta_min = {rule['theta_min']:g} are certified for {max_gap:.3g} s"
-                )
+                values = f"ratio = {_ADVISED_RATIO:g} and theta_min = {rule['theta_min']:g}"
+                return f"{values} are certified for {max_gap:.3g} s"
         gains = certified_gains(max_gap, lambda theta: {"theta_min": theta, "theta_max": theta}, certify)
-        return (
-            None
-            if gains is None
-            else f"theta_min = theta_max = {gains['theta_min']:g} is certified for {max_gap:.3g} s"
-        )
+        if gains is None:
+            return None
+        return f"theta_min = theta_max = {gains['theta_min']:g} is certified for {max_gap:.3g} s"
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate over all gaps, gains and changes of gain that the assumed journey allows."""
@@ -223,21 +162,14 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             spacing_tolerance=float(p.assumed_spacing_error),
             learnt=self.spacing == "learnt",
         )
-        certificate = certify_adapting_gain(adaptation, max_gap, _error_model(adaptation))
-        if not self.stage.events:
-            return certificate
-        gain = correction(float(p.theta_1), p.wheel_high_gain, 1.0)
-        wheel = SampledError.of([[0.0, 1.0], [0.0, 0.0]], gain, float(p.theta_1) * float(p.wheel_high_gain[0]))
-        radius = wheel.spectral_radius(float(p.odometer_period))
-        note = f"wheel stage at its odometer period of {float(p.odometer_period):g} s: spectral radius {radius:.4f}"
-        return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(note,))
+        return self.stage.judged(certify_adapting_gain(adaptation, max_gap, _error_model(adaptation)), p)
 
     def _spacing(self, x: Any, u: Any, p: Any) -> tuple[Array, dict[str, Array]]:
         """Spacing d to expect [m], and the memory of balises after this one."""
         if self.spacing == "expected":
             return p.expected_spacing, {}
         before, distance = x.learnt_spacing, np.abs(u.balise_position - x.last_balise)
-        usable = np.where(distance >= SHORTEST_LEARNT * p.expected_spacing, 1.0, 0.0) * np.where(
+        usable = np.where(distance >= _SHORTEST_LEARNT * p.expected_spacing, 1.0, 0.0) * np.where(
             before >= 0.0, 1.0, 0.0
         )
         learnt = np.where(usable > 0.0, distance, np.maximum(before, 0.0))

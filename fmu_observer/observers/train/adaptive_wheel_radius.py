@@ -25,7 +25,7 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import Signal, input_signal, matrix, memory, output_signal, parameter, state
+from plant_models.hybrid import Signal, discrete_output, input_signal, matrix, memory, output_signal, parameter, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -96,7 +96,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     outputs = (
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Odometer speed, corrected by the estimate", display_unit="km/h"),
-        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
         output_signal("position_deviation", "m", "Standard deviation of the position's error"),
         output_signal(
             "wheel_radius_error", "1", "Estimate of odometer over true speed, minus 1; worn wheels: positive"

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.augmented_gains import augmented_matrix
-from fmu_observer.formulas.correction.decaying_gain import correction
 from fmu_observer.observers.train.augmented_observer import ORDER, WAYS_OF_FIXES, AugmentedTrainObserver, Fixes
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
@@ -19,9 +16,9 @@ from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, MultirateStag
 from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 
-FirstStage = Literal["multirate", "differentiator"]
+_FirstStage = Literal["multirate", "differentiator"]
 
-AUGMENTED_K = (4.0, 6.0, 4.0, 1.0)  # all poles of A - K C at -1
+_AUGMENTED_K = (4.0, 6.0, 4.0, 1.0)  # all poles of A - K C at -1
 
 
 class AugmentedHighGainCdo(AugmentedTrainObserver):
@@ -50,9 +47,9 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
     )
     source = "Bouchama 2024, (4.7)-(4.11); gains ours"
     presets: Mapping[str, Mapping[str, Any]] = {
-        "gps_and_balises": {"theta_balise": 1.5, "theta_gps": 0.7, "high_gain": AUGMENTED_K},
-        "gps": {"theta_balise": 0.0, "theta_gps": 0.7, "high_gain": AUGMENTED_K},
-        "balises": {"theta_balise": 1.75, "theta_gps": 0.0, "high_gain": AUGMENTED_K},
+        "gps_and_balises": {"theta_balise": 1.5, "theta_gps": 0.7, "high_gain": _AUGMENTED_K},
+        "gps": {"theta_balise": 0.0, "theta_gps": 0.7, "high_gain": _AUGMENTED_K},
+        "balises": {"theta_balise": 1.75, "theta_gps": 0.0, "high_gain": _AUGMENTED_K},
     }
     default_preset = "gps_and_balises"
     stability_parameters = (
@@ -64,7 +61,7 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
     )
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"first_stage": tuple(WHEEL_STAGES), "fixes": WAYS_OF_FIXES}
 
-    def __init__(self, first_stage: FirstStage = "multirate", fixes: Fixes = "event") -> None:
+    def __init__(self, first_stage: _FirstStage = "multirate", fixes: Fixes = "event") -> None:
         if first_stage not in WHEEL_STAGES:
             raise ValueError(
                 f"{self.name}: unknown first_stage {first_stage!r}; use one of: {', '.join(WHEEL_STAGES)}."
@@ -76,7 +73,7 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
                 "theta_balise", "1/s", 1.5, "High gain at balises, at most 0.978 / longest gap; 0: not used", min=0.0
             ),
             parameter("theta_gps", "1/s", 0.7, "High gain at satellite fixes; 0: not used", min=0.0),
-            parameter("high_gain", "1", AUGMENTED_K, "Shape K of the high gain", size=ORDER),
+            parameter("high_gain", "1", _AUGMENTED_K, "Shape K of the high gain", size=ORDER),
             *self.stage.parameters,
         )
         self.own_events = self.stage.events
@@ -111,11 +108,4 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         """Certificate of the second stage, and for sampled odometers the exact check of the first at its constant
         period.
         """
-        certificate = super().error_certificate(max_gap, p)
-        if not self.stage.events:
-            return certificate
-        gain = correction(float(p.theta_1), p.wheel_high_gain, 1.0)
-        wheel = SampledError.of([[0.0, 1.0], [0.0, 0.0]], gain, float(p.theta_1) * float(p.wheel_high_gain[0]))
-        radius = wheel.spectral_radius(float(p.odometer_period))
-        note = f"wheel stage at its odometer period of {float(p.odometer_period):g} s: spectral radius {radius:.4f}"
-        return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(*certificate.notes, note))
+        return self.stage.judged(super().error_certificate(max_gap, p), p)

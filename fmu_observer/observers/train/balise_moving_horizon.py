@@ -38,7 +38,7 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     transition,
 )
 from fmu_observer.observers.train.train_observer import BALISE
-from plant_models.hybrid import OutputWarning, memory, output_signal, parameter, vector
+from plant_models.hybrid import OutputWarning, discrete_output, memory, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -52,11 +52,10 @@ WINDOW_PARAMETERS = (
     parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
 )
 
-RESTARTS = output_signal(
+RESTARTS = discrete_output(
     "restarts",
     "1",
     "Times that the position began anew, since most balises were refused",
-    variability="discrete",
     warning=OutputWarning(
         "began its position anew where it had refused most of its balises and these agreed: what it told before was "
         "off by more than its deviation. Look at the first telegrams, and at the deviations",

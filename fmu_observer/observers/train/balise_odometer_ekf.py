@@ -24,7 +24,17 @@ from fmu_observer.observers.made_for import MadeFor
 from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import rolling_drag
-from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    PeriodicEvent,
+    Signal,
+    discrete_output,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
@@ -124,14 +134,12 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
         output_signal("disturbance", "m/s2", "Estimated acceleration that effort and resistance do not explain"),
         output_signal("creep", "m/s", "Estimated creep of the wheel, odometer minus speed"),
-        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
         output_signal("position_std", "m", "Standard deviation of the position's error"),
         output_signal("speed_std", "m/s", "Standard deviation of the speed's error"),
-        output_signal("nis", "1", "Normalised innovation squared of the last measurement used", variability="discrete"),
-        output_signal(
-            "innovation_likelihood", "1", "Logarithm of the likelihood of all innovations", variability="discrete"
-        ),
-        output_signal("odometer_fault", "1", "1 while the last reading was not used", variability="discrete"),
+        discrete_output("nis", "1", "Normalised innovation squared of the last measurement used"),
+        discrete_output("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations"),
+        discrete_output("odometer_fault", "1", "1 while the last reading was not used"),
     )
     events = (
         BALISE,

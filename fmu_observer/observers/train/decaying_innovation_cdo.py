@@ -58,10 +58,6 @@ class DecayingInnovationCdo(HighGainTrainObserver):
         """Theta, the shape of the gain, rate and exponent of the decay."""
         return (*super().gain_parameters(), *decay_parameters(10.0, 0.5))
 
-    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """The effort [N]."""
-        return u.effort
-
     def acting_innovation(self, x: Any, p: Any) -> Array:
         """What is left of the innovation of the last balise [m]."""
         return innovation_left(x.elapsed, p.decay_rate, p.decay_exponent) * x.balise_innovation

@@ -7,9 +7,6 @@ from typing import Any
 
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from fmu_observer.observers.train.wheel_stage import DifferentiatorStage
-from plant_models.hybrid.system import Array
-
-STAGE = DifferentiatorStage()
 
 
 class DifferentiatorCdo(HighGainTrainObserver):
@@ -33,16 +30,7 @@ class DifferentiatorCdo(HighGainTrainObserver):
     name = "differentiator_cdo"
     description = "Filtering sliding-mode differentiator and high-gain continuous-discrete observer"
     source = "Bouchama 2024, (3.17)-(3.43)"
-    first_stage_states = STAGE.states
-    first_stage_parameters = STAGE.parameters
+    stage = DifferentiatorStage()
     stability_parameters = ("theta", "high_gain")
     presets: Mapping[str, Mapping[str, Any]] = {"as_published": {"theta": 8.0, "high_gain": (2.0, 1.0), "n_axles": 1.0}}
     default_preset = "as_published"
-
-    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """``F_ad = effort - (J / r) Z1`` [N], (3.22)."""
-        return STAGE.adhesion(x, u, p)
-
-    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
-        return STAGE.flow(x, u, p)

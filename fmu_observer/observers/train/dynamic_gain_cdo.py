@@ -33,7 +33,7 @@ class DynamicGainCdo(HighGainTrainObserver):
     theta_name = "theta_limit"
     innovation_state = BALISE_INNOVATION
     outputs = (*HighGainTrainObserver.outputs, output_signal("gain", "1/s", "High gain theta in force"))
-    first_stage_states = (state("theta", "1/s", START, "High gain in force"),)
+    gain_states = (state("theta", "1/s", START, "High gain in force"),)
     stability_parameters = ("theta_limit", "high_gain")
     presets: Mapping[str, Mapping[str, Any]] = {
         "dense_balises": {},
@@ -54,13 +54,10 @@ class DynamicGainCdo(HighGainTrainObserver):
         """High gain now [1/s]."""
         return x.theta
 
-    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """The effort [N]."""
-        return u.effort
-
-    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The gain settles."""
-        return {"theta": p.theta_rate * x.theta * (p.theta_limit - x.theta)}
+    def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        """Derivatives of the estimate, and of the gain, which settles."""
+        settles = p.theta_rate * x.theta * (p.theta_limit - x.theta)
+        return super().estimator_flow(t, x, u, p) | {"theta": settles}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, and the gain in force."""

@@ -14,13 +14,7 @@ import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.bounds import ErrorBounds
-from fmu_observer.certificates.bounds.carried import (
-    PACKED,
-    first_component,
-    level,
-    level_of_box,
-    unpacked,
-)
+from fmu_observer.certificates.bounds.carried import PACKED, first_component, level, level_of_box, unpacked
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.observers.innovation_gate import known_accuracy

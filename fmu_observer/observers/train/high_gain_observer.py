@@ -4,7 +4,6 @@ from.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -19,6 +18,7 @@ from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correcti
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
+from fmu_observer.observers.train.wheel_stage import WheelStage
 from plant_models.hybrid import Signal, parameter
 from plant_models.hybrid.system import Array
 
@@ -29,8 +29,7 @@ class HighGainTrainObserver(TrainObserver):
     """Second stage of a cascade: position and speed from an adhesion force and balises (Bouchama 2024, (3.24)-(3.43)).
 
     ``dp = v - theta K1 eta``, ``dv = (F_ad - a sgn(v) - b v - c v|v|)/M - theta^2 K2 eta``, ``d eta = -theta K1 eta``,
-    and at a balise ``eta = p - balise_position``. The first stage, which a subclass writes, gives ``F_ad`` as
-    `adhesion`.
+    and at a balise ``eta = p - balise_position``. The first stage of a subclass, its `stage`, gives ``F_ad``.
 
     With K = (2, 1) and no drag it is stable for constant gaps below ``5.0 / theta``, and for any mixture of gaps up to
     ``4.0 / theta`` (independently measured): theta must fit the longest gap.
@@ -39,15 +38,16 @@ class HighGainTrainObserver(TrainObserver):
         options: of the observer, see its `option_choices`.
     """
 
-    first_stage_states: tuple[Signal, ...] = ()
-    first_stage_parameters: tuple[Signal, ...] = ()
+    stage: WheelStage = WheelStage()
+    gain_states: tuple[Signal, ...] = ()
     theta_name: ClassVar[str] = "theta"
     innovation_state: ClassVar[Signal] = BALISE_INNOVATION
     frictions = (SPEED.name,)
 
     def __init__(self, **options: Any) -> None:
-        self.estimator_states = (POSITION, SPEED, self.innovation_state, *self.first_stage_states)
-        self.estimator_parameters = (*self.gain_parameters(), *self.first_stage_parameters)
+        self.estimator_states = (POSITION, SPEED, self.innovation_state, *self.gain_states, *self.stage.states)
+        self.estimator_parameters = (*self.gain_parameters(), *self.stage.parameters)
+        self.estimator_events = self.stage.events
         super().__init__(**options)
 
     def gain_parameters(self) -> tuple[Signal, ...]:
@@ -60,14 +60,6 @@ class HighGainTrainObserver(TrainObserver):
     def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain at balises [1/s]."""
         return getattr(p, self.theta_name)
-
-    @abstractmethod
-    def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """Adhesion force [N] from the first stage."""
-
-    def first_stage_flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the first-stage states by name."""
-        return {}
 
     def acting_innovation(self, x: Any, p: Any) -> Array:
         """The innovation of the last balise as it acts now [m]."""
@@ -90,44 +82,40 @@ class HighGainTrainObserver(TrainObserver):
         """Derivatives of position, speed, innovation and first stage."""
         theta, speed = self.theta_in_force(x, p), x.estimated_speed
         on_position, on_speed = correction(theta, p.high_gain, self.acting_innovation(x, p))
-        traction = np.maximum(self.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
+        traction = np.maximum(self.stage.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
         acceleration = (traction - rolling_drag(speed, p)) / p.mass
         return {
             POSITION.name: speed - on_position,
             SPEED.name: acceleration - on_speed,
             self.innovation_state.name: self.innovation_flow(x, p),
-        } | self.first_stage_flow(x, u, p)
+        } | self.stage.flow(x, u, p)
 
     def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
         """Position, speed, adhesion force and innovation."""
-        adhesion, innovation = self.adhesion(x, u, p), self.acting_innovation(x, p)
+        adhesion, innovation = self.stage.adhesion(x, u, p), self.acting_innovation(x, p)
         return Estimate(x.estimated_position, x.estimated_speed, adhesion, innovation)
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """At a balise the innovation is set anew; position and speed stay continuous."""
+        """A balise sets the innovation anew, position and speed stay continuous; an odometer sample is the stage's."""
+        if event != "balise":
+            return self.stage.sampled(x, u)
         return {BALISE_INNOVATION.name: x.estimated_position - u.balise_position}
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
-        """The largest theta that is certified.
-
-        Args:
-            max_gap: longest gap between two balises [s].
-        """
+        """The largest theta that is certified."""
         gains = certified_gains(max_gap, lambda theta: {self.theta_name: theta}, certify)
-        return (
-            None
-            if gains is None
-            else f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {max_gap:.3g} s"
-        )
+        if gains is None:
+            return None
+        return f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {max_gap:.3g} s"
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed
-        range.
+        range, and of the first stage.
         """
         vertices = self.vertices(p)
         model = (
             f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a "
-            f"gap; "
-            "standstill and the error of the adhesion force, an input to it, are left out"
+            "gap; standstill and the error of the adhesion force, an input to it, are left out"
         )
-        return with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")
+        found = with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")
+        return self.stage.judged(found, p)

@@ -7,7 +7,7 @@ from typing import Any
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import WARN
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import input_signal, memory, output_signal
+from plant_models.hybrid import discrete_output, input_signal, memory, output_signal
 from plant_models.hybrid.system import Array
 
 
@@ -30,7 +30,7 @@ class OdometerReset(GatedObserver):
     outputs = (
         output_signal("position", "m", "Position of the odometer"),
         output_signal("speed", "m/s", "Speed of the odometer", display_unit="km/h"),
-        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
     )
     events = (BALISE,)
 

@@ -38,7 +38,7 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 
 SPEEDS = 21  # between the vertices, for the certificate
@@ -130,7 +130,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     outputs = (
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
-        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
         output_signal("disturbance", "m/s2", "Estimated deceleration by what the model does not know"),
         output_signal("residual", "m/s", "M times odometer minus estimated speed"),
         *FAULT_OUTPUTS,

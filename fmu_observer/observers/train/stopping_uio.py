@@ -27,6 +27,7 @@ from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import (
     PeriodicEvent,
     Signal,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -93,17 +94,16 @@ class StoppingUio(GatedObserver, GapCertified):
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
         output_signal("disturbance", "m/s2", "Estimated acceleration that the model does not know, forward > 0"),
-        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
-        output_signal("balises", "1", "Number of balises used so far", variability="discrete"),
-        output_signal("residual", "m/s", "Odometer minus estimate at the last sample", variability="discrete"),
-        output_signal("residual_level", "m/s", "Its magnitude as the detector judges it", variability="discrete"),
-        output_signal("odometer_fault", "1", "1 while a jam is detected", variability="discrete"),
-        output_signal("recovering", "1", "1 while the end of a jam is awaited", variability="discrete"),
-        output_signal(
+        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        discrete_output("balises", "1", "Number of balises used so far"),
+        discrete_output("residual", "m/s", "Odometer minus estimate at the last sample"),
+        discrete_output("residual_level", "m/s", "Its magnitude as the detector judges it"),
+        discrete_output("odometer_fault", "1", "1 while a jam is detected"),
+        discrete_output("recovering", "1", "1 while the end of a jam is awaited"),
+        discrete_output(
             "held_odometer",
             "1",
             "1 once the odometer was seen to be held: not for this observer",
-            variability="discrete",
             warning=OutputWarning(
                 "the odometer stands still and then jumps: held data look like a fault at every sample. Give it one "
                 "that is new at every sample_period, by a step that is no longer, or use quasi_lpv_uio",

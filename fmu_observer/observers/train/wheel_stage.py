@@ -6,8 +6,11 @@ A stage reads its own states of an observer's, so that any second stage can stan
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from dataclasses import replace
+from typing import Any
 
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
@@ -15,18 +18,20 @@ from plant_models.hybrid import PeriodicEvent, Signal, parameter, state
 from plant_models.hybrid.system import Array
 
 
-class WheelStage(Protocol):
-    """What a second stage needs of a first one.
+class WheelStage:
+    """What a second stage needs of a first one; this one is none at all: the applied effort stands for the adhesion
+    force, and the inertia of the wheels is neglected.
 
     1. `states` are some of the observer's, which it is handed as ``x``.
     2. `flow` returns the derivative of each by name, `sampled` what an odometer sample changes.
     3. `events` are the odometer samples it needs, if any.
+    4. `judged` adds its own check to the certificate of the second stage.
     """
 
-    states: tuple[Signal, ...]
-    parameters: tuple[Signal, ...]
-    events: tuple[PeriodicEvent, ...]
-    stability_parameters: tuple[str, ...]
+    states: tuple[Signal, ...] = ()
+    parameters: tuple[Signal, ...] = ()
+    events: tuple[PeriodicEvent, ...] = ()
+    stability_parameters: tuple[str, ...] = ()
 
     def adhesion(self, x: Any, u: Any, p: Any) -> Array:
         """Adhesion force [N].
@@ -34,6 +39,7 @@ class WheelStage(Protocol):
         Args:
             x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
+        return u.effort
 
     def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of the stage's states.
@@ -41,6 +47,7 @@ class WheelStage(Protocol):
         Args:
             x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
         """
+        return {}
 
     def sampled(self, x: Any, u: Any) -> dict[str, Array]:
         """The states that an odometer sample changes.
@@ -48,9 +55,18 @@ class WheelStage(Protocol):
         Args:
             x: states of the observer. u: inputs, as in `HybridSystem.flow`.
         """
+        return {}
+
+    def judged(self, certificate: Certificate, p: Any) -> Certificate:
+        """The certificate of the second stage, where the first one holds too.
+
+        Args:
+            certificate: of the second stage. p: parameters, as in `HybridSystem.flow`.
+        """
+        return certificate
 
 
-class DifferentiatorStage:
+class DifferentiatorStage(WheelStage):
     """Filtering differentiator of ``y / r`` (n = 1, nf = 3), ``F_ad = effort - (J / r) Z1``: Bouchama 2024,
     (3.18)-(3.22).
     """
@@ -65,37 +81,19 @@ class DifferentiatorStage:
     parameters: tuple[Signal, ...] = (
         parameter("jerk_bound", "m/s3", 10.0, "Bound of the odometer's second derivative [ours]", min=1e-6),
     )
-    events: tuple[PeriodicEvent, ...] = ()
-    stability_parameters: tuple[str, ...] = ()
 
     def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """``F_ad = effort - (J / r) Z1`` [N], (3.22).
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
+        """``F_ad = effort - (J / r) Z1`` [N], (3.22)."""
         return u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius * x.wheel_acceleration
 
     def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The filtering differentiator of the wheel rate ``y / r``, (3.18).
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
+        """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
         z = stacked_of(x, self.states)
         dw, dz = filtering_differentiator_flow(z[:3], z[3:], u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius)
         return named_as(self.states, (*dw, *dz))
 
-    def sampled(self, x: Any, u: Any) -> dict[str, Array]:
-        """Nothing is sampled.
 
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
-        """
-        return {}
-
-
-class MultirateStage:
+class MultirateStage(WheelStage):
     """High-gain observer of ``r w`` at odometer samples, ``F_ad = -(J / r^2) z2``: Bouchama 2024, (3.50)-(3.67).
 
     The printed scalings of the second state (``-int F_ad``, later ``-(r / J) F_ad``) are dimensionally wrong; the one
@@ -118,19 +116,11 @@ class MultirateStage:
     stability_parameters: tuple[str, ...] = ("theta_1", "wheel_high_gain", "odometer_period")
 
     def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """``F_ad = -(J / r^2) z2`` [N].
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
+        """``F_ad = -(J / r^2) z2`` [N]."""
         return -p.n_axles * p.wheel_inertia / p.wheel_radius**2 * x.adhesion_deceleration
 
     def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """``r w``, its deceleration by adhesion, and the decaying innovation.
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
+        """``r w``, its deceleration by adhesion, and the decaying innovation."""
         innovation = x.odometer_innovation
         on_speed, on_adhesion = correction(p.theta_1, p.wheel_high_gain, innovation)
         driven = p.wheel_radius**2 / (p.n_axles * p.wheel_inertia) * u.effort
@@ -141,15 +131,17 @@ class MultirateStage:
         }
 
     def sampled(self, x: Any, u: Any) -> dict[str, Array]:
-        """The innovation is set anew.
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
-        """
+        """The innovation is set anew."""
         return {"odometer_innovation": x.wheel_speed_estimate - u.odometer}
 
+    def judged(self, certificate: Certificate, p: Any) -> Certificate:
+        """The exact check of this stage at its constant period beside the certificate."""
+        gain = correction(float(p.theta_1), p.wheel_high_gain, 1.0)
+        wheel = SampledError.of([[0.0, 1.0], [0.0, 0.0]], gain, float(p.theta_1) * float(p.wheel_high_gain[0]))
+        period = float(p.odometer_period)
+        radius = wheel.spectral_radius(period)
+        note = f"wheel stage at its odometer period of {period:g} s: spectral radius {radius:.4f}"
+        return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(*certificate.notes, note))
 
-WHEEL_STAGES: dict[str, type[DifferentiatorStage] | type[MultirateStage]] = {
-    "multirate": MultirateStage,
-    "differentiator": DifferentiatorStage,
-}
+
+WHEEL_STAGES: dict[str, type[WheelStage]] = {"multirate": MultirateStage, "differentiator": DifferentiatorStage}

@@ -27,6 +27,7 @@ from plant_models.hybrid import (
     PeriodicEvent,
     Signal,
     TriggeredEvent,
+    discrete_output,
     input_signal,
     matrix,
     output_signal,
@@ -136,7 +137,7 @@ class DelayedStateObserver(HighGainSampled):
         if not self.predictors:
             return tuple(delayed)
         text = "Time until the last predictor is reached"
-        return (*delayed, output_signal("reaching_time", "s", text, variability="discrete"))
+        return (*delayed, discrete_output("reaching_time", "s", text))
 
     @property
     def total_places(self) -> int:

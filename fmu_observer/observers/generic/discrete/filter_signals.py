@@ -8,14 +8,13 @@ import numpy as np
 
 from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.observers.generic.discrete.arrivals import Arrivals
-from plant_models.hybrid import OutputWarning, Signal, output_signal
+from plant_models.hybrid import OutputWarning, Signal, discrete_output
 from plant_models.hybrid import memory as memory_signal
 
-NOT_POSITIVE = output_signal(
+NOT_POSITIVE = discrete_output(
     "covariance_not_positive",
     "1",
     "1 once the covariance was not positive semidefinite, or a measurement left nothing of a variance",
-    variability="discrete",
     warning=OutputWarning(
         "rounding has made its covariance none, so its estimates or deviations mean nothing: take the form joseph or "
         "square_root, or noises and first deviations whose sizes differ less"
@@ -67,7 +66,7 @@ class SignalsOf:
         n, q, found = self.model.order, len(self.model.measurements), []
 
         def told(name: str, unit: str, text: str, size: int | None = None) -> None:
-            found.append(output_signal(name, unit, text, size=size, variability="discrete"))
+            found.append(discrete_output(name, unit, text, size=size))
 
         for s in self.model.states:
             told(s.name, s.unit, f"Estimate: {s.description}")

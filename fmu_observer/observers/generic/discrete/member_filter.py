@@ -20,15 +20,7 @@ from fmu_observer.observers.generic.discrete.filter_condition import steady_cond
 from fmu_observer.observers.generic.discrete.sample_step import PRIMED
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, Signal, discrete_output, input_signal, memory, parameter
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.requirements import within_bounds
@@ -276,7 +268,7 @@ class MemberFilter(HybridSystem):
         ]
         told += [("nis", "1", "Normalised innovation squared of the last sample")]
         told += [("nis_degrees", "1", "Degrees of freedom of the normalised innovation squared")]
-        self.outputs = (*(output_signal(*words, variability="discrete") for words in told), *self.own_outputs)
+        self.outputs = (*(discrete_output(*words) for words in told), *self.own_outputs)
         self.parameters = (
             *self._noises(),
             *self.own_parameters,

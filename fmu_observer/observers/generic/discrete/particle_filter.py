@@ -9,7 +9,7 @@ import numpy as np
 from fmu_observer.formulas.filtering.particles import effective_size, innovation_square, moments, resampled, reweighted
 from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observers.generic.discrete.member_filter import DEFAULT, CorrectedMembers, MemberFilter, Sample
-from plant_models.hybrid import memory, output_signal, parameter
+from plant_models.hybrid import discrete_output, memory, parameter
 from plant_models.hybrid.system import Array
 
 
@@ -41,9 +41,7 @@ class ParticleFilter(MemberFilter):
             max=1.0,
         ),
     )
-    own_outputs = (
-        output_signal("effective_members", "1", "Effective sample size before resampling", variability="discrete"),
-    )
+    own_outputs = (discrete_output("effective_members", "1", "Effective sample size before resampling"),)
 
     def __init__(self, model: Source = "pendulum", members: int = DEFAULT, **options: Any) -> None:
         self.own_memory = (

@@ -26,6 +26,7 @@ from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
     Signal,
     TriggeredEvent,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -106,9 +107,7 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         self.inputs = (*chosen.inputs, *(_renamed(s, "measured_", "continuous") for s in chosen.continuous))
         self.outputs = (
             *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in chosen.states),
-            output_signal(
-                "premise_violations", "1", "Samples at which a premise was outside its bounds", variability="discrete"
-            ),
+            discrete_output("premise_violations", "1", "Samples at which a premise was outside its bounds"),
             output_signal("premise_outside_time", "s", "For how long a premise was outside its bounds"),
         )
         payload = tuple(_renamed(s, f"{chosen.event}_", "discrete") for s in chosen.sampled)

@@ -21,9 +21,9 @@ from plant_models.hybrid import (
     OutputWarning,
     PeriodicEvent,
     Signal,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
     vector,
 )
@@ -303,27 +303,10 @@ def _remembered(pairs: Sequence[tuple[Signal, Signal]], measured: Sequence[Signa
 def _told(named: Sequence[Signal]) -> tuple[Signal, ...]:
     """Estimates, look-ups, and how full the window is and how often it was beyond the table."""
     return (
-        *(output_signal(s.name, s.unit, f"Estimate: {s.description}", variability="discrete") for s in named),
-        *(
-            output_signal(
-                f"{s.name}_look_up", s.unit, f"Of the signature alone: {s.description}", variability="discrete"
-            )
-            for s in named
-        ),
-        output_signal(
-            "window_full",
-            "1",
-            "1 once the window is full, and estimates are corrected",
-            variability="discrete",
-            warning=NEVER,
-        ),
-        output_signal("window_count", "1", "Full windows so far", variability="discrete"),
-        output_signal("outside_count", "1", "Full windows beyond the table so far", variability="discrete"),
-        output_signal(
-            "mostly_outside",
-            "1",
-            "1 where most windows were beyond the table",
-            variability="discrete",
-            warning=MOSTLY,
-        ),
+        *(discrete_output(s.name, s.unit, f"Estimate: {s.description}") for s in named),
+        *(discrete_output(f"{s.name}_look_up", s.unit, f"Of the signature alone: {s.description}") for s in named),
+        discrete_output("window_full", "1", "1 once the window is full, and estimates are corrected", warning=NEVER),
+        discrete_output("window_count", "1", "Full windows so far"),
+        discrete_output("outside_count", "1", "Full windows beyond the table so far"),
+        discrete_output("mostly_outside", "1", "1 where most windows were beyond the table", warning=MOSTLY),
     )

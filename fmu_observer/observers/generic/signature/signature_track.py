@@ -16,6 +16,7 @@ from plant_models.hybrid import (
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -62,17 +63,16 @@ class SignatureTrack(HybridSystem):
     internal_step = 1e-2
     inputs = (input_signal("signal", "1", 0.0, "The signal"),)
     outputs = (
-        output_signal("length", "1", "r1, length of S1 to the middle of its branches", variability="discrete"),
-        output_signal("short_tip", "1", "r2, abscissa of the right tip of S2", variability="discrete"),
-        output_signal("gap", "1", "r3, gap between the right-hand branches of S1", variability="discrete"),
-        output_signal("abscissa", "1", "Abscissa of the newest point of S1", variability="discrete"),
-        output_signal("ready", "1", "1 while the properties count, else 0", variability="discrete"),
-        output_signal("noise", "1", "Deviation of the signal's noise, by third differences", variability="discrete"),
-        output_signal(
+        discrete_output("length", "1", "r1, length of S1 to the middle of its branches"),
+        discrete_output("short_tip", "1", "r2, abscissa of the right tip of S2"),
+        discrete_output("gap", "1", "r3, gap between the right-hand branches of S1"),
+        discrete_output("abscissa", "1", "Abscissa of the newest point of S1"),
+        discrete_output("ready", "1", "1 while the properties count, else 0"),
+        discrete_output("noise", "1", "Deviation of the signal's noise, by third differences"),
+        discrete_output(
             "noisy",
             "1",
             "1 while the noise is above noise_limit",
-            variability="discrete",
             warning=OutputWarning(
                 "found more noise than its verdict bears: with three times noise_limit most verdicts are wrong. "
                 "Filter the signal, or widen the changes that count",
