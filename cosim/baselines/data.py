@@ -100,27 +100,31 @@ def header_from(data: Any, folder: Path) -> Header:
             "Use the package that wrote it, or make the baseline again."
         )
     try:
-        return Header(
-            title=str(data["title"]),
-            recipe=Recipe.from_data(data["run"], folder),
-            span={key: float(data["span"][key]) for key in ("start", "stop", "step")},
-            components=[_known(Identity, entry) for entry in data["components"]],
-            signals=[_known(SignalInfo, entry) for entry in data["signals"]],
-            tolerances=tolerances_from(data["tolerances"]),
-            selection=data.get("selection"),
-            every=data.get("every"),
-            rows=int(data["rows"]),
-            events=data.get("events"),
-            digest=str(data["digest"]),
-            versions=dict(data.get("versions", {})),
-            version=version,
-        )
+        return _header(data, folder, version)
     except KeyError as error:
         raise BaselineError(f"the key {error} is missing.") from error
     except (TypeError, ValueError, AttributeError) as error:
         if isinstance(error, BaselineError | ComparisonError):
             raise BaselineError(str(error)) from error
         raise BaselineError(f"an entry is not what it should be: {error}.") from error
+
+
+def _header(data: Mapping[str, Any], folder: Path, version: str) -> Header:
+    return Header(
+        title=str(data["title"]),
+        recipe=Recipe.from_data(data["run"], folder),
+        span={key: float(data["span"][key]) for key in ("start", "stop", "step")},
+        components=[_known(Identity, entry) for entry in data["components"]],
+        signals=[_known(SignalInfo, entry) for entry in data["signals"]],
+        tolerances=tolerances_from(data["tolerances"]),
+        selection=data.get("selection"),
+        every=data.get("every"),
+        rows=int(data["rows"]),
+        events=data.get("events"),
+        digest=str(data["digest"]),
+        versions=dict(data.get("versions", {})),
+        version=version,
+    )
 
 
 def _known(kind: Any, entry: Mapping[str, Any]) -> Any:

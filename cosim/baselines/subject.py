@@ -124,38 +124,46 @@ def make_subject(
         CosimError: it cannot be set up.
     """
     times = {key: value for key, value in (("start", start), ("stop", stop), ("step", step)) if value is not None}
+    of_fmu = _given(inputs=inputs, parameters=parameters, record=record, interpolation=interpolation)
+    changed = _given(overrides=overrides)
     if isinstance(what, Outcome | Result):
-        _refuse(
-            "a result of a run made already",
-            times
-            | _given(
-                inputs=inputs, parameters=parameters, record=record, overrides=overrides, interpolation=interpolation
-            ),
-        )
-        outcome = what if isinstance(what, Outcome) else None
-        return Subject(Recipe(), what if isinstance(what, Result) else what.result, outcome)
+        _refuse("a result of a run made already", times | of_fmu | changed)
+        return Subject(Recipe(), what, None) if isinstance(what, Result) else Subject(Recipe(), what.result, what)
     if isinstance(what, str | Path) and Path(what).suffix.lower() == ".fmu":
-        _refuse("an FMU alone", _given(overrides=overrides))
-        table = str((folder / inputs).resolve()) if isinstance(inputs, str | Path) else dict(inputs or {})
-        recipe = Recipe(
-            "fmu",
-            str((folder / what).resolve()),
-            start,
-            stop,
-            step,
-            table,
-            dict(parameters or {}),
-            tuple(record),
-            interpolation=interpolation,
-        )
-        return run_recipe(recipe, progress, warn)
-    _refuse("a scenario", _given(inputs=inputs, parameters=parameters, record=record, interpolation=interpolation))
-    changes = {**times, **(overrides or {})}
+        _refuse("an FMU alone", changed)
+        return run_recipe(_fmu_recipe(what, folder, times, of_fmu), progress, warn)
+    _refuse("a scenario", of_fmu)
+    return _scenario_subject(what, folder, {**times, **(overrides or {})}, progress, warn)
+
+
+def _fmu_recipe(what: str | Path, folder: Path, times: Mapping[str, float], chosen: Mapping[str, Any]) -> Recipe:
+    """How an FMU alone is run."""
+    inputs = chosen.get("inputs", {})
+    table = str((folder / inputs).resolve()) if isinstance(inputs, str | Path) else dict(inputs)
+    return Recipe(
+        "fmu",
+        str((folder / what).resolve()),
+        **times,
+        inputs=table,
+        parameters=dict(chosen.get("parameters", {})),
+        record=tuple(chosen.get("record", ())),
+        interpolation=chosen.get("interpolation"),
+    )
+
+
+def _scenario_subject(
+    what: Any,
+    folder: Path,
+    changes: Mapping[str, Any],
+    progress: Progress | None,
+    warn: Callable[[str], None] | None,
+) -> Subject:
+    """A scenario, run."""
     if isinstance(what, Scenario):
         outcome = what.run(progress=progress, overrides=changes, warn=warn)
         return Subject(Recipe(), outcome.result, outcome)
     if isinstance(what, str | Path):
-        return run_recipe(Recipe("scenario", scenario_source(what, folder), overrides=changes), progress, warn)
+        return run_recipe(Recipe("scenario", scenario_source(what, folder), overrides=dict(changes)), progress, warn)
     raise BaselineError(
         "Expected the path of an FMU, the name or path of a scenario, a Scenario, an Outcome or a Result; "
         f"got {type(what).__name__}."
@@ -194,8 +202,8 @@ def _refuse(what: str, given: Mapping[str, Any]) -> None:
 def _about_inputs(recipe: Recipe, warn: Callable[[str], None] | None) -> Callable[[str], None]:
     """Warnings of an FMU alone: that inputs keep their start values is no news where constants were given for them."""
 
-    def tell(text: str) -> None:
+    def warn_of(text: str) -> None:
         if warn is not None and not (recipe.inputs and text.startswith("Unconnected inputs")):
             warn(text)
 
-    return tell
+    return warn_of

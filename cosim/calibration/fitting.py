@@ -131,19 +131,35 @@ def calibrate(
         raise CalibrationError(
             f"{np.isfinite(measured).sum()} measured values for {len(names)} parameters; expected more of them."
         )
-    start = np.array([runs.start[name] for name in names])
     low, high = (np.array([runs.bounds[name][i] for name in names]) for i in (0, 1))
-    deviations = _deviations(noise, recorded)
+    found = _fit(runs, recorded, measured, noise=_deviations(noise, recorded), low=low, high=high)
+    _demand_effects(found, names, recorded)
+    units = {name: runs.unit(name) for name in names}
+    known = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in recorded.units.items()}
+    recorded = replace(recorded, units=known)  # a table without units has those of the model
+    return Calibration(
+        names, units, dict(runs.start), found, recorded, level, tuple(_remarks(found, names, recorded, low, high))
+    )
+
+
+def _fit(runs: Runs, recorded: RecordedSignals, measured: Array, **limits: Any) -> Fit:
+    """The fit, begun at the first guesses."""
+    names = tuple(runs.start)
+    start = np.array([runs.start[name] for name in names])
 
     def simulate(parameters: Array) -> Array:
         return runs.run(dict(zip(names, parameters.tolist(), strict=True)), recorded)
 
     try:
-        found = fit(simulate, start, measured, noise=deviations, low=low, high=high)
+        return fit(simulate, start, measured, **limits)
     except ValueError as error:
         if isinstance(error, CalibrationError):
             raise
         raise CalibrationError(f"The fit cannot begin with these first guesses: {error}") from error
+
+
+def _demand_effects(found: Fit, names: tuple[str, ...], recorded: RecordedSignals) -> None:
+    """Refuse parameters that change nothing that was measured."""
     idle = [name for i, name in enumerate(names) if not np.any(found.jacobian[..., i])]
     if idle:
         signals = ", ".join(recorded.measured)
@@ -152,12 +168,6 @@ def calibrate(
             f"{', '.join(idle)}: changes nothing in {signals} and cannot be calibrated from this recording. Leave it "
             f"out, or record signals, or a run, that it acts on. Inputs that the recording drives: {driven}."
         )
-    units = {name: runs.unit(name) for name in names}
-    told = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in recorded.units.items()}
-    recorded = replace(recorded, units=told)  # a table without units has those of the model
-    return Calibration(
-        names, units, dict(runs.start), found, recorded, level, tuple(_remarks(found, names, recorded, low, high))
-    )
 
 
 def _deviations(noise: Mapping[str, float] | None, recorded: RecordedSignals) -> Array | None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.components.recording_data import Chosen, column_courses, interval_ends, said_of
+from cosim.components.recording_data import Chosen, Interpolation, column_courses, interval_ends, said_of
 from cosim.errors import CosimError, nearest
 from cosim.results.result import Result
 
@@ -70,6 +71,68 @@ def sort_columns(
     """
     columns = [signal.name for signal in recording.signals]
     units = {signal.name: signal.unit for signal in recording.signals}
+    chosen = _fitted(columns, source, outputs, signals)
+    rows = _rows_of(recording.time, begin, end, source)
+    driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
+    ends = _interval_ends(recording, driving, rows, said_of(between, list(driving), source), discrete)
+
+    def sampled(names: Mapping[str, str]) -> dict[str, Array]:
+        return {name: np.asarray(recording[column], dtype=float)[rows.first] for name, column in names.items()}
+
+    return RecordedSignals(
+        recording.time[rows.first],
+        sampled(chosen),
+        sampled(driving),
+        {name: units[column] for name, column in chosen.items()},
+        ends,
+    )
+
+
+class _Rows(NamedTuple):
+    """Rows of each instant: an event has two of the same time.
+
+    Args:
+        first, last: numbers of rows, shape (n,).
+    """
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+
+
+def _rows_of(times: Array, begin: float, end: float, source: str) -> _Rows:
+    """Rows of the instants in the part to use [s]."""
+    time, rows = np.unique(times, return_index=True)
+    part = (time >= begin) & (time <= end)
+    if np.count_nonzero(part) < 2:
+        raise CalibrationError(f"{source}: fewer than two samples in the part to use; there are {len(time)} in all.")
+    last = np.append(rows[1:], len(times)) - 1
+    return _Rows(rows[part], last[part])
+
+
+def _interval_ends(
+    recording: Result,
+    driving: Mapping[str, str],
+    rows: _Rows,
+    said: Mapping[str, Interpolation],
+    discrete: Collection[str],
+) -> dict[str, Array]:
+    """What inputs say at begin and end of each interval, by name, each of shape (2, n - 1)."""
+    courses = column_courses(
+        recording,
+        driving.values(),
+        {driving[name]: kind for name, kind in said.items()},
+        [column for name, column in driving.items() if name in discrete],
+    )
+    return {
+        name: interval_ends(np.asarray(recording[column], dtype=float), rows.first, rows.last, course)
+        for (name, column), course in zip(driving.items(), courses, strict=True)
+    }
+
+
+def _fitted(
+    columns: Sequence[str], source: str, outputs: Sequence[str], signals: Sequence[str] | None
+) -> dict[str, str]:
+    """The column of each signal to fit."""
     chosen: dict[str, str] = {}
     if signals is None:
         chosen = {name: column for name in outputs if (column := _column(name, columns)) is not None}
@@ -88,31 +151,7 @@ def sort_columns(
                 f"{source}: signal {asked or name!r} was not recorded; {nearest(asked or name, columns)}"
             )
         chosen[name] = column
-    time, rows = np.unique(recording.time, return_index=True)  # an event has two rows
-    part = (time >= begin) & (time <= end)
-    if np.count_nonzero(part) < 2:
-        raise CalibrationError(f"{source}: fewer than two samples in the part to use; there are {len(time)} in all.")
-    last = np.append(rows[1:], len(recording.time)) - 1
-    rows, last = rows[part], last[part]
-    driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
-    said = said_of(between, list(driving), source)
-    courses = column_courses(
-        recording,
-        driving.values(),
-        {driving[name]: kind for name, kind in said.items()},
-        [column for name, column in driving.items() if name in discrete],
-    )
-    ends = {
-        name: interval_ends(np.asarray(recording[column], dtype=float), rows, last, course)
-        for (name, column), course in zip(driving.items(), courses, strict=True)
-    }
-    return RecordedSignals(
-        time[part],
-        {name: np.asarray(recording[column], dtype=float)[rows] for name, column in chosen.items()},
-        {name: np.asarray(recording[column], dtype=float)[rows] for name, column in driving.items()},
-        {name: units[column] for name, column in chosen.items()},
-        ends,
-    )
+    return chosen
 
 
 def _column(name: str, columns: Sequence[str]) -> str | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+from fmpy.model_description import ModelVariable
 
 from cosim import ssp
 from cosim.cli.arguments import PLAIN_JSON
@@ -113,16 +114,11 @@ def describe_file(path: Path) -> dict[str, Any]:
         "runs here": runs_here(path),
         "tool": description.generationTool or "",
         "declares": list(read_capabilities(description).declared()),
-        "variables": [
-            {
-                "name": v.name,
-                "causality": v.causality or "local",
-                "variability": v.variability,
-                "type": v.type,
-                "unit": v.unit,
-                "start": v.start,
-                "description": v.description,
-            }
-            for v in description.modelVariables
-        ],
+        "variables": [_variable(v) for v in description.modelVariables],
     }
+
+
+def _variable(variable: ModelVariable) -> dict[str, Any]:
+    keys = ("variability", "type", "unit", "start", "description")
+    known = {key: getattr(variable, key) for key in keys}
+    return {"name": variable.name, "causality": variable.causality or "local"} | known

@@ -65,10 +65,23 @@ def execute(options: argparse.Namespace) -> int:
     """
     result = load_result(options.source)
     name = _odometer(result, options.odometer)
+    found = _smoothed(options, result, name)
+    written = save_result(as_result(found), options.out)
+    if options.json:
+        data = {"odometer": name, "file": str(options.out), "balises": found.balises, "readings": found.readings}
+        print_json(data | {"left_out": found.left_out, "consistency": asdict(found.found)})
+        return DONE
+    print(reference_text(found, name))
+    print(f"written: {', '.join(map(str, written))}")
+    return DONE
+
+
+def _smoothed(options: argparse.Namespace, result: Result, name: str) -> ReferenceTrajectory:
+    """The trajectory by the odometer of this name."""
     stamps, positions, spreads = _balises(result, options)
     rows = sampled_rows(result.time, result[name])
     try:
-        found = reference_trajectory(
+        return reference_trajectory(
             result.time[rows],
             result[name][rows],
             stamps,
@@ -82,14 +95,6 @@ def execute(options: argparse.Namespace) -> int:
         )
     except ScenarioError as error:
         raise CosimError(f"{options.source}, {name}: {error}") from error
-    written = save_result(as_result(found), options.out)
-    if options.json:
-        data = {"odometer": name, "file": str(options.out), "balises": found.balises, "readings": found.readings}
-        print_json(data | {"left_out": found.left_out, "consistency": asdict(found.found)})
-        return DONE
-    print(reference_text(found, name))
-    print(f"written: {', '.join(map(str, written))}")
-    return DONE
 
 
 def as_result(found: ReferenceTrajectory) -> Result:

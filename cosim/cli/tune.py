@@ -10,8 +10,10 @@ from cosim.cli.output import print_json
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError
 from cosim.results.folder import check_writable
+from cosim.simulation.scenario import Scenario
 from cosim.tuning.parameters import Bounds
 from cosim.tuning.tune import tune
+from cosim.tuning.tuning_result import Tuning
 from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar
 
@@ -92,8 +94,20 @@ def execute(options: argparse.Namespace) -> int:
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"
     )
+    found = _tuned(scenario, options, directory)
+    if options.json:
+        print_json(found.to_data())
+    else:
+        print(found.text())
+        print(f"\nTuned scenario: {directory / 'tuned.toml'}")
+    if found.interrupted:
+        raise KeyboardInterrupt  # all there is has been printed
+    return NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
+
+
+def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> Tuning:
     with ProgressBar("run", silent=options.quiet or options.json) as bar:
-        found = tune(
+        return tune(
             scenario,
             dict(_bounds(text) for text in options.parameters),
             observer=options.observer,
@@ -110,14 +124,6 @@ def execute(options: argparse.Namespace) -> int:
             whole_runs=options.whole_runs,
             progress=bar,
         )
-    if options.json:
-        print_json(found.to_data())
-    else:
-        print(found.text())
-        print(f"\nTuned scenario: {directory / 'tuned.toml'}")
-    if found.interrupted:
-        raise KeyboardInterrupt  # all there is has been printed
-    return NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
 
 
 def _bounds(text: str) -> tuple[str, Bounds]:

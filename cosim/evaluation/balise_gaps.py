@@ -176,6 +176,15 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
         )
         for i in judged
     ]
+    errors = _errors_at(result, spec, rows, judged, place)
+    labels = {name: PLAIN_ODOMETER if name == PLAIN_ODOMETER else label(spec, name) for name in errors}
+    return GapErrors(gaps, errors, labels)
+
+
+def _errors_at(
+    result: Result, spec: ReportSpec, rows: np.ndarray, judged: np.ndarray, place: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Position errors at the end of the judged gaps [m], of each observer and of the plain odometer."""
     errors: dict[str, np.ndarray] = {}
     for observer in spec.observers:
         error = estimation_error(result, spec, observer, "position")
@@ -186,8 +195,7 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
         with np.errstate(invalid="ignore"):
             ahead = counted[rows] - place[rows]
             errors[PLAIN_ODOMETER] = ahead[judged] - ahead[judged - 1]
-    labels = {name: PLAIN_ODOMETER if name == PLAIN_ODOMETER else label(spec, name) for name in errors}
-    return GapErrors(gaps, errors, labels)
+    return errors
 
 
 def rows_before(time: np.ndarray, instants: np.ndarray) -> np.ndarray:

@@ -125,10 +125,7 @@ def rerun(
     settings = dict(overrides or {})
     for name, value in settings.items():
         scenario.set(name, value)
-    gone = manifest.missing({f"components.{name}" for name in settings} | set(settings))
-    gone += [f"{told['text']} It cannot be run again." for told in manifest.objects.values() if not told["class"]]
-    if gone:
-        raise ProvenanceError("\n".join(gone))
+    _demand_all_there(manifest, settings)
     stored = load_result(directory)
     outcome = scenario.run(progress, warn=_new_ones(warn, stored), building=building)
     paths = {} if out is None else outcome.write(out)  # before anything can be wrong with the comparison
@@ -162,6 +159,14 @@ def _new_ones(warn: Callable[[str], None] | None, stored: Result) -> Callable[[s
             (warn or LOG.warning)(text)
 
     return tell
+
+
+def _demand_all_there(manifest: Manifest, settings: Mapping[str, Any]) -> None:
+    """Refuse a run of which something is gone that is not set anew."""
+    gone = manifest.missing({f"components.{name}" for name in settings} | set(settings))
+    gone += [f"{made['text']} It cannot be run again." for made in manifest.objects.values() if not made["class"]]
+    if gone:
+        raise ProvenanceError("\n".join(gone))
 
 
 def _check_out(manifest: Manifest, out: str | Path | None) -> None:

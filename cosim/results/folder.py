@@ -107,13 +107,9 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
     except OSError as error:
         hint = "Free the disk, or close the program that has the file open."
         raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
-    packets = {"packets": folder / PACKETS} if result.packets else {}
-    return {name: folder / usual_file(name) for name in dict.fromkeys(formats)} | {
-        "events": folder / EVENTS,
-        "messages": folder / MESSAGES,
-        **packets,
-        "summary": folder / SUMMARY,
-    }
+    names = {name: usual_file(name) for name in dict.fromkeys(formats)} | {"events": EVENTS, "messages": MESSAGES}
+    names |= ({"packets": PACKETS} if result.packets else {}) | {"summary": SUMMARY}
+    return {kind: folder / name for kind, name in names.items()}
 
 
 def _table(folder: Path, name: str | None) -> np.ndarray:

@@ -99,7 +99,11 @@ class Recorder:
         self._filled: Any = [0, 0]
         if stream is None:
             self._use(np.empty((min(max(expected_rows // every + 1, FIRST_ROWS), self._limit), self._width)))
-            return
+        else:
+            self._use_stream(stream)
+
+    def _use_stream(self, stream: RowStream) -> None:
+        """Keep rows where they outlive the process."""
         self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), FIRST_ROWS)
         self._file = stream.open(self._dtype, self._limit)
         self._seconds, self._due = stream.seconds, monotonic() + stream.seconds

@@ -103,13 +103,18 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
         target.write_text(made.text, encoding="utf-8")
     except OSError as error:
         raise OutputError(f"The scenario cannot be written to {target}: {error.strerror or error}.") from error
+    _remark_on_structure(made, target)
+    return made
+
+
+def _remark_on_structure(made: Starter, target: Path) -> None:
+    """What a run of the written file would warn of, or refuse."""
     try:
         structure = Scenario.load(target).structure()
     except CosimError as error:
         made.remarks.append(f"As written it would be refused; edit it first: {error}")
     else:
         made.remarks.extend(structure.warnings)
-    return made
 
 
 def _check_observer(observer: str | None) -> None:

@@ -78,10 +78,7 @@ def make_part(
         clocks: connections between clocks. chain: how it moves over a step, in words.
     """
     description = component.description
-    taken = {n for c in connections if c.target[0] == component.name for n in (c.target[1], c.target_variable[1])}
-    used = {n for c in connections if c.source[0] == component.name for n in (c.source[1], c.source_variable[1])}
-    taken |= {c.target[1] for c in clocks if c.target[0] == component.name}
-    used |= {c.source[1] for c in clocks if c.source[0] == component.name}
+    taken, used = _connected(component.name, connections, clocks)
     hidden = component.event_references()
     inputs = [v for v in description.modelVariables if v.causality == "input" and v.valueReference not in hidden]
     outputs = [
@@ -102,6 +99,18 @@ def make_part(
         rate,
         tuple(chain),
     )
+
+
+def _connected(
+    name: str, connections: Sequence[Connection], clocks: Iterable[ClockConnection]
+) -> tuple[set[str], set[str]]:
+    """Names of the inputs and of the outputs of a component that have a connection, elements and whole arrays."""
+    clocked = list(clocks)
+    taken = {n for c in connections if c.target[0] == name for n in (c.target[1], c.target_variable[1])}
+    used = {n for c in connections if c.source[0] == name for n in (c.source[1], c.source_variable[1])}
+    taken |= {c.target[1] for c in clocked if c.target[0] == name}
+    used |= {c.source[1] for c in clocked if c.source[0] == name}
+    return taken, used
 
 
 def abilities(component: Component) -> tuple[str, ...]:

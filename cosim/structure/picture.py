@@ -266,10 +266,17 @@ def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: 
         zorder=4,
     )
     name_at = box.x + SIDE + 2.7 * BADGE
-    ax.text(
-        name_at, middle + 0.05, _plain(part.name), fontsize=NAME, fontweight="bold", color=INK, va="baseline", zorder=3
-    )
-    ax.text(box.x + SIDE, box.y + 0.385, kind_text(part), fontsize=SMALL, color=QUIET, va="baseline", zorder=3)
+    words = {"va": "baseline", "zorder": 3}
+    ax.text(name_at, middle + 0.05, _plain(part.name), fontsize=NAME, fontweight="bold", color=INK, **words)
+    ax.text(box.x + SIDE, box.y + 0.385, kind_text(part), fontsize=SMALL, color=QUIET, **words)
+    _draw_ports(ax, box)
+    if box.size.foot:
+        at = box.bottom - PAD - FOOT + 0.13
+        ax.text(box.x + SIDE, at, foot_text(part), fontsize=SMALL, color=QUIET, **words)
+    _draw_feedthrough(ax, structure, part, box)
+
+
+def _draw_ports(ax: Axes, box: Box) -> None:
     for names, x, side in ((box.size.inputs, box.x + SIDE, "left"), (box.size.outputs, box.right - SIDE, "right")):
         for name in names:
             event = name == EVENT_PORT
@@ -285,10 +292,6 @@ def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: 
                 color=COLOURS["event"] if event else INK,
                 fontstyle="italic" if event else "normal",
             )
-    if box.size.foot:
-        at = box.bottom - PAD - FOOT + 0.13
-        ax.text(box.x + SIDE, at, foot_text(part), fontsize=SMALL, color=QUIET, va="baseline", zorder=3)
-    _draw_feedthrough(ax, structure, part, box)
 
 
 def _draw_feedthrough(ax: Axes, structure: StructureData, part: Part, box: Box) -> None:

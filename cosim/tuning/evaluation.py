@@ -126,45 +126,56 @@ class Evaluator:
         candidates: Sequence[Mapping[str, Any] | None],
         seeds: Sequence[int],
         label: Mapping[str, Any],
-        tell: Callable[[], None] = lambda: None,
+        step: Callable[[], None] = lambda: None,
     ) -> np.ndarray:
         """Costs of candidates with each seed, shape (m, seeds); infinite where a run failed.
 
         Args:
             candidates: values by name; None for the scenario as it is. seeds: of the benches.
             label: what the journal says of them besides.
-            tell: called after each run.
+            step: called after each run.
 
         Raises:
             ScenarioError: a run that ended does not show the cost.
         """
         found = np.full((len(candidates), len(seeds)), nan)
-        open_: dict[str, list[tuple[int, int]]] = {}  # equal candidates are run once
-        for i, candidate in enumerate(candidates):
-            for j, seed in enumerate(seeds):
-                key = self._key(seed, candidate)
-                if key in self._known:
-                    found[i, j] = self._taken(self._known[key])
-                    tell()
-                else:
-                    open_.setdefault(key, []).append((i, j))
-        if open_:
-            self.prepare(sorted({seeds[places[0][1]] for places in open_.values()}))
-        keys = list(open_)
-        jobs = [self._job(candidates[i], seeds[j]) for (i, j), *_ in open_.values()]
+        unknown = self._take_known(candidates, seeds, found, step)
+        if unknown:
+            self.prepare(sorted({seeds[places[0][1]] for places in unknown.values()}))
+        keys = list(unknown)
+        jobs = [self._job(candidates[i], seeds[j]) for (i, j), *_ in unknown.values()]
         for number, answer in self._answers(jobs):
             key = keys[number]
-            i, j = open_[key][0]
+            i, j = unknown[key][0]
             if answer.unreadable:
                 raise ScenarioError(f"cost: {answer.failure}")
-            for place in open_[key]:
+            for place in unknown[key]:
                 found[place] = answer.cost
-                tell()
+                step()
             self._note(answer.failure)
             entry = {**label, "candidate": i, "seed": seeds[j], "values": candidates[i], "cost": answer.cost}
             self._known[key] = entry | {"failure": answer.failure, "key": key}
             write_lines(self._journal, "a", [self._known[key]])
         return found
+
+    def _take_known(
+        self,
+        candidates: Sequence[Mapping[str, Any] | None],
+        seeds: Sequence[int],
+        found: np.ndarray,
+        step: Callable[[], None],
+    ) -> dict[str, list[tuple[int, int]]]:
+        """Fill in costs that the journal holds; places of the others by key, for equal candidates are run once."""
+        unknown: dict[str, list[tuple[int, int]]] = {}
+        for i, candidate in enumerate(candidates):
+            for j, seed in enumerate(seeds):
+                key = self._key(seed, candidate)
+                if key in self._known:
+                    found[i, j] = self._taken(self._known[key])
+                    step()
+                else:
+                    unknown.setdefault(key, []).append((i, j))
+        return unknown
 
     def estimates(self, candidates: Sequence[Mapping[str, Any]], seed: int, observed: str) -> list[Evaluated]:
         """What the observer estimates with each candidate.

@@ -76,49 +76,59 @@ class Study:
         shown = self._directions(self._inside())
         fixed, why = self._held(shown)
         gradients = self._differentiated()
+        interrupted = self._search_all(searches, fixed)
+        winner = min(self.done, key=lambda search: search.costs[-1])
+        better = dict(winner.best) if winner.costs[-1] < before.mean() else None
+        judged = self._judged(better, before.tolist(), () if interrupted else self.judging)
+        at_best = None if interrupted or better is None else self._directions(better)
+        remarks = [NOTHING_BETTER] if better is None else at_bounds(self.asked.space, better, why)
+        return Tuning(
+            scenario=self._tuned(better),
+            method=self.method,
+            cost=self.evaluator.cost.text,
+            searches=self.done,
+            start=self.asked.start,
+            best=self.asked.start if better is None else better,
+            seeds=self.training,
+            runs=self.evaluator.runs,
+            how=("as members of a batch over what the observer heard" if self.evaluator.replayed else how) + gradients,
+            warnings=[*remarks, *self._warnings(shown, at_best)],
+            fixed=why,
+            interrupted=interrupted,
+            **judged,
+        )
+
+    def _search_all(self, searches: int, fixed: Mapping[str, float]) -> bool:
+        """Search as often as asked for, or until somebody interrupts; whether somebody did."""
         write_lines(self.evaluator.directory / ITERATIONS, "w", [])
-        interrupted = False
         try:
             for seed in range(searches):
                 self._search(seed, self.asked.space.without(fixed), fixed)
         except KeyboardInterrupt:
             if not self.done:
                 raise
-            interrupted = True
-        winner = min(self.done, key=lambda search: search.costs[-1])
-        kept = not winner.costs[-1] < before.mean()
-        best = self.asked.start if kept else winner.best
-        judging = () if interrupted else self.judging
+            return True
+        return False
+
+    def _judged(self, better: dict[str, float] | None, before: list[float], judging: Sequence[int]) -> dict[str, Any]:
+        """Costs before and after, with training seeds and with those that judge; None where nothing is better."""
         self._bar.text = "judge"
-        candidate = None if kept else best
-        after = self.evaluator.costs([candidate], self.training, {"search": "after"}, self._bar.step)[0]
-        judged = self.evaluator.costs([None, candidate], judging, {"search": "judge"}, self._bar.step)
+        after = self.evaluator.costs([better], self.training, {"search": "after"}, self._bar.step)[0]
+        judged = self.evaluator.costs([None, better], judging, {"search": "judge"}, self._bar.step)
+        return {
+            "judged": judging,
+            "before": before,
+            "after": after.tolist(),
+            "judged_before": judged[0].tolist(),
+            "judged_after": judged[1].tolist(),
+        }
+
+    def _tuned(self, better: dict[str, float] | None) -> Scenario:
+        """The scenario with what was found."""
         tuned = self.scenario.copy()
-        for name, value in () if kept else self.asked.settings(best).items():
+        for name, value in () if better is None else self.asked.settings(better).items():
             tuned.set(name, value)
-        return Tuning(
-            scenario=tuned,
-            method=self.method,
-            cost=self.evaluator.cost.text,
-            searches=self.done,
-            start=self.asked.start,
-            best=best,
-            seeds=self.training,
-            judged=judging,
-            before=before.tolist(),
-            after=after.tolist(),
-            judged_before=judged[0].tolist(),
-            judged_after=judged[1].tolist(),
-            runs=self.evaluator.runs,
-            how=("as members of a batch over what the observer heard" if self.evaluator.replayed else how) + gradients,
-            warnings=[
-                *([NOTHING_BETTER] if kept else []),
-                *([] if kept else at_bounds(self.asked.space, best, why)),
-                *self._warnings(shown, None if interrupted or kept else self._directions(best)),
-            ],
-            fixed=why,
-            interrupted=interrupted,
-        )
+        return tuned
 
     def _search(self, seed: int, space: SearchSpace, fixed: Mapping[str, float]) -> None:
         """One search, from this seed of the optimiser; what is found is kept iteration by iteration."""

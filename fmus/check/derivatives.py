@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -52,25 +53,35 @@ def compare(
     pairs = 0
     for name, value in knowns.items():
         said = directional(name)
-        delta = RELATIVE_STEP * max(abs(value), nominal[name])
-        above, here, below = (evaluate(name, value + d) for d in (delta, 0.0, -delta))
-        right, left = (above - here) / delta, (here - below) / delta
-        low, high = np.minimum(left, right), np.maximum(left, right)
-        size = np.max(np.abs([above, here, below]), axis=0)
-        slack = TOLERANCE * np.maximum(np.abs(said), np.maximum(np.abs(low), np.abs(high))) + ROUNDING * size / delta
-        slack += NOTHING / nominal[name]
-        bad = ~((said >= low - slack) & (said <= high + slack))
-        if bad.any() and np.isfinite(size).all():
-            slack = slack + 2.0 * _scatter([evaluate(name, value + share * delta) for share in SCATTERED]) / delta
-            bad = ~((said >= low - slack) & (said <= high + slack))
+        wrong = _wrong(partial(evaluate, name), said, value, nominal[name])
         pairs += len(said)
-        if bad.any():
-            k = int(np.argmax(bad))
-            found = 0.5 * (right[k] + left[k])
+        if wrong is not None:
+            k, found = wrong
             return failed(
                 f"the derivative of {unknowns[k]} along {name} is said to be {said[k]:g}, differences give {found:g}"
             )
     return passed(f"{pairs} derivatives agree with finite differences")
+
+
+def _wrong(
+    evaluate: Callable[[float], np.ndarray], said: np.ndarray, value: float, nominal: float
+) -> tuple[int, float] | None:
+    """The first unknown of a column that disagrees, with its central difference; None where all agree."""
+    delta = RELATIVE_STEP * max(abs(value), nominal)
+    above, here, below = (evaluate(value + d) for d in (delta, 0.0, -delta))
+    right, left = (above - here) / delta, (here - below) / delta
+    low, high = np.minimum(left, right), np.maximum(left, right)
+    size = np.max(np.abs([above, here, below]), axis=0)
+    slack = TOLERANCE * np.maximum(np.abs(said), np.maximum(np.abs(low), np.abs(high))) + ROUNDING * size / delta
+    slack += NOTHING / nominal
+    bad = ~((said >= low - slack) & (said <= high + slack))
+    if bad.any() and np.isfinite(size).all():
+        slack = slack + 2.0 * _scatter([evaluate(value + share * delta) for share in SCATTERED]) / delta
+        bad = ~((said >= low - slack) & (said <= high + slack))
+    if not bad.any():
+        return None
+    k = int(np.argmax(bad))
+    return k, float(0.5 * (right[k] + left[k]))
 
 
 def _scatter(values: Sequence[np.ndarray]) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -121,14 +121,28 @@ def check_fmu(
         )
     chosen = dict(starts or {})
     _demand_settable(description, chosen)
-    start_time = _start_time(description)
     count = _steps(description, size, steps, until)
-    findings: list[Finding] = []
-    left_out: dict[str, str] = {}
+    job = Job("", "", (), size, _start_time(description), timeout, count, chosen)
+    found = _merged([*_static_findings(archive, progress), *_run_findings(archive, job, progress)])
+    return CheckReport(archive, size, chosen, found, tuple(what_to_trust(found)), perf_counter() - begin, count)
+
+
+def _static_findings(archive: Archive, progress: Callable[[str], None]) -> Iterator[Finding]:
+    """Of checks that run nothing of the FMU."""
     for name, static in STATIC.items():
         progress(name)
         outcome = static(archive)
-        findings.append(Finding(name, outcome.verdict or Verdict.NOTE, outcome.detail))
+        yield Finding(name, outcome.verdict or Verdict.NOTE, outcome.detail)
+
+
+def _run_findings(archive: Archive, job: Job, progress: Callable[[str], None]) -> list[Finding]:
+    """Of checks that run the FMU, interface by interface.
+
+    Args:
+        archive: the file. job: what is the same for all interfaces. progress: see `check_fmu`.
+    """
+    findings: list[Finding] = []
+    left_out: dict[str, str] = {}
     with archive.unpacked() as folder:
         for interface in archive.interfaces:
             if interface == SCHEDULED_EXECUTION:
@@ -136,14 +150,13 @@ def check_fmu(
                 continue
             names = tuple(checks_of(interface, left_out.__setitem__))
             places = registered_places(names)
-            job = Job(str(folder), interface, names, size, start_time, timeout, count, chosen, places)
-            findings += _meant(archive, interface, run_isolated(job, progress))
+            one = replace(job, folder=str(folder), interface=interface, checks=names, places=places)
+            findings += _meant(archive, interface, run_isolated(one, progress))
     _demand_runnable(archive, findings)
     findings += [Finding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
     if CO_SIMULATION not in archive.interfaces:
         findings.append(Finding("interface", Verdict.LIMIT, NO_SLAVE, "integrate it with a solver of your own"))
-    found = _merged(findings)
-    return CheckReport(archive, size, chosen, found, tuple(what_to_trust(found)), perf_counter() - begin, count)
+    return findings
 
 
 def check_count(archive: Archive) -> int:

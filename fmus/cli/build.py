@@ -92,6 +92,12 @@ def execute(options: argparse.Namespace) -> int:
     for job in jobs:
         protocol.counts(job.fmi_version)  # refuses clocks in FMI 2 before anything is built
         check_target(fmu_path(job.system, job.target))
+    _build(jobs, protocol, options)
+    return 0
+
+
+def _build(jobs: Sequence[BuildJob], protocol: EventProtocol, options: argparse.Namespace) -> None:
+    """Build one after the other, with a bar over the libraries of all."""
     libraries = len(choose_targets(options.platform)) * len(jobs)
     number = count(1)
     with ProgressBar("library", silent=libraries < 2) as bar:
@@ -100,19 +106,11 @@ def execute(options: argparse.Namespace) -> int:
             def progress(platform: str, job: BuildJob = job) -> None:
                 bar(next(number), libraries, f"{job.system.name} {platform}")
 
-            path = build_fmu(
-                job.system,
-                job.target,
-                job.fmi_version,
-                options.preset,
-                platforms=options.platform,
-                protocol=protocol,
-                progress=progress,
-            )
+            settings: dict[str, Any] = {"platforms": options.platform, "protocol": protocol, "progress": progress}
+            path = build_fmu(job.system, job.target, job.fmi_version, options.preset, **settings)
             bar.clear()
             print(_summary(job, path), file=sys.stderr, flush=True)
             print(path, flush=True)
-    return 0
 
 
 def _run_hosted(options: argparse.Namespace) -> int:

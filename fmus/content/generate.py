@@ -7,7 +7,7 @@ knows them. It touches no files.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,16 +85,19 @@ def trace_equations(system: HybridSystem) -> Equations:
             f"and p "
             "only: no random numbers, no clock, nothing kept on self; declare noise at a periodic event."
         )
-    jumps = {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
-    check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
+    jumps = {event.name: traced.jump(event.name) for event in system.events}
+    named = {f"jump_{name}": function for name, function in jumps.items()}
+    check_payloads(system, {"step": traced.step} | named if system.continuous_count else named)
+    return _densified(system, traced, jumps)
+
+
+def _densified(system: HybridSystem, traced: TracedSystem, jumps: Mapping[str, ca.Function]) -> Equations:
     prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))
     events, (lasting, at_start) = system.frictions or system.switchings, _requirement_texts(system)
     return Equations(
         step=_dense(traced.step, f"{prefix}_step", system.continuous_count) if flows else None,
         output=_dense(traced.output, f"{prefix}_output") if outputs else None,
-        jumps={
-            event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events
-        },
+        jumps={name: _dense(jump, f"{prefix}_jump_{name}") for name, jump in jumps.items()},
         derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
         balance=_dense(traced.balance, f"{prefix}_balance") if events else None,
         tangent=_dense(traced.tangent, f"{prefix}_tangent") if flows or outputs else None,
@@ -262,37 +265,13 @@ def _role(system: HybridSystem, table: VariableTable, variable: ModelVariable) -
 
 
 def _model_table(system: HybridSystem, equations: Equations, description: ModelDescription) -> str:
-    parameters = scalar_names(system.parameter_signals)
-    functions = equations.functions()
     fields = {
         "name": _text(system.name),
         "token": _text(str(description.instantiationToken)),
-        "states": system.state_count,
-        "continuous": system.continuous_count,
-        "inputs": width(system.input_signals),
-        "own_inputs": width(system.inputs),
-        "noise_offset": width(exposed_inputs(system)),
-        "outputs": width(system.outputs),
-        "parameters": len(parameters),
-        "internal_step": parameters.index("internal_step"),
-        "seed": parameters.index("seed") if "seed" in parameters else -1,
-        "purpose": int(system.purpose),
-        "integer_work": max((f.sz_iw() for f in functions), default=0),
-        "real_work": max((f.sz_w() for f in functions), default=0),
-        "start_x": "start_x",
-        "start_u": "start_u",
-        "start_p": "start_p",
+        **_sizes(system, equations),
         "step": _name(equations.step),
         "output": _name(equations.output),
-        "periodic_count": len(system.periodic_events),
-        "periodic": "periodic",
-        "triggered_count": len(system.triggered_events),
-        "triggered": "triggered",
-        **_protocol(system, description),
-        "communication_count": len(system.communication_events),
-        "communications": "communications",
-        "resource_count": len(system.resources),
-        "resources": "resources",
+        **_event_fields(system, description),
         "friction_count": len(system.frictions),
         "frictions": "frictions",
         "switching_count": len(system.switchings),
@@ -309,6 +288,44 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
     }
     rows = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
     return f"#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
+
+
+def _sizes(system: HybridSystem, equations: Equations) -> dict[str, Any]:
+    """Sizes of arrays, places in them, and the arrays of start values."""
+    parameters = scalar_names(system.parameter_signals)
+    functions = equations.functions()
+    return {
+        "states": system.state_count,
+        "continuous": system.continuous_count,
+        "inputs": width(system.input_signals),
+        "own_inputs": width(system.inputs),
+        "noise_offset": width(exposed_inputs(system)),
+        "outputs": width(system.outputs),
+        "parameters": len(parameters),
+        "internal_step": parameters.index("internal_step"),
+        "seed": parameters.index("seed") if "seed" in parameters else -1,
+        "purpose": int(system.purpose),
+        "integer_work": max((f.sz_iw() for f in functions), default=0),
+        "real_work": max((f.sz_w() for f in functions), default=0),
+        "start_x": "start_x",
+        "start_u": "start_u",
+        "start_p": "start_p",
+    }
+
+
+def _event_fields(system: HybridSystem, description: ModelDescription) -> dict[str, Any]:
+    """Tables of events and resources, how events are announced."""
+    return {
+        "periodic_count": len(system.periodic_events),
+        "periodic": "periodic",
+        "triggered_count": len(system.triggered_events),
+        "triggered": "triggered",
+        **_protocol(system, description),
+        "communication_count": len(system.communication_events),
+        "communications": "communications",
+        "resource_count": len(system.resources),
+        "resources": "resources",
+    }
 
 
 def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, str]:

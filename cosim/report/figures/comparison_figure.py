@@ -58,15 +58,8 @@ def comparison_figure(
     ):
         rows = _around(time, begin, end)
         few = window is not None and np.count_nonzero(rows) <= DOTTED
-        curve(
-            ax,
-            time[rows],
-            bounded(values[rows]),
-            limits,
-            label=name,
-            **line,
-            **({"marker": ".", "markersize": 4} if few else {}),
-        )
+        dots = {"marker": ".", "markersize": 4} if few else {}
+        curve(ax, time[rows], bounded(values[rows]), limits, label=name, **line, **dots)
     _mark_findings(ax, signal, begin, end)
     if limits is not None:
         ax.set_ylim(*limits)
@@ -89,25 +82,11 @@ def comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) ->
     largest = float(np.max(np.abs(error[np.isfinite(error)]), initial=0.0))
     limit = ROOM * max(largest, allowed) or 1.0
     if allowed > 0.0:
-        ax.axhspan(
-            -allowed,
-            allowed,
-            color=AMBER,
-            alpha=0.55,
-            linewidth=0,
-            zorder=0.5,
-            label=f"allowed: {number(allowed)}",
-        )
+        band = f"allowed: {number(allowed)}"
+        ax.axhspan(-allowed, allowed, color=AMBER, alpha=0.55, linewidth=0, zorder=0.5, label=band)
     ax.axhline(0.0, color=MARK, linewidth=0.7, zorder=1)
-    curve(
-        ax,
-        curves.error_time,
-        error,
-        (-limit, limit),
-        color=BLUE,
-        linewidth=1.1,
-        label="result minus reference",
-    )
+    looks = {"color": BLUE, "linewidth": 1.1, "label": "result minus reference"}
+    curve(ax, curves.error_time, error, (-limit, limit), **looks)
     if np.isfinite(signal.max_error_at) and not signal.passed:
         ax.axvline(signal.max_error_at, color=ALARM, linewidth=0.8, linestyle=(0, (2, 2)), label="largest")
     ax.set_ylim(-limit, limit)

@@ -23,6 +23,7 @@ from cosim.results.result import Result
 
 SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
 MARKERS = "os^Dv<>p"
+MARK_STYLE = {"linestyle": "none", "markersize": 4.5, "markeredgewidth": 1.0, "alpha": 0.75}
 GRANTED = "SUBSET-041 (5 m + 5 %)"
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
 
@@ -112,17 +113,9 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
     for i, (name, errors) in enumerate(found.errors.items()):
         plain = name == PLAIN_ODOMETER
         colour = BLACK if plain else observer_line(spec.observers, name)["color"]
-        ax.plot(
-            lengths,
-            np.clip(np.abs(errors), SMALLEST, LARGEST),
-            linestyle="none",
-            marker="x" if plain else MARKERS[i % len(MARKERS)],
-            markersize=4.5,
-            markeredgewidth=1.0,
-            color=colour,
-            alpha=0.75,
-            label=found.labels[name],
-        )
+        marker = "x" if plain else MARKERS[i % len(MARKERS)]
+        sizes = np.clip(np.abs(errors), SMALLEST, LARGEST)
+        ax.plot(lengths, sizes, marker=marker, color=colour, label=found.labels[name], **MARK_STYLE)
     # from zero on, so that balises at one distance are a column of marks on a scale that can be read
     way = np.linspace(0.0, max(1.05 * float(np.max(lengths, initial=0.0, where=np.isfinite(lengths))), 1.0), 50)
     ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=GRANTED)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -33,28 +33,9 @@ def errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Ax
     """
     ax = axes_or_new(ax, (8.2, 1.4 + 0.45 * len(scores)))
     names = [score.name for score in scores]
-    seen: set[str] = set()
+    labelled: set[str] = set()
     for place, score in enumerate(scores):
-        colour = observer_line(names, score.name)["color"]
-        points = _points(score)
-        for what, (value, marker, face) in points.items():
-            ax.plot(
-                [value],
-                [place],
-                marker,
-                markersize=8,
-                markeredgecolor=colour,
-                color=colour if face else "none",
-                label=None if what in seen else what,
-                linestyle="none",
-            )
-            seen.add(what)
-        if len(points) > 1:
-            ends = [value for value, _, _ in points.values()]
-            ax.hlines(place, min(ends), max(ends), color=colour, linewidth=1.0, zorder=1)
-        if not points:
-            word = "no numbers" if score.failure else "no speed"
-            ax.annotate(word, (0.02, place), xycoords=("axes fraction", "data"), va="center", color=MARK)
+        _draw_line(ax, place, score, observer_line(names, score.name)["color"], labelled)
     if any(_points(score) for score in scores):
         ax.set_xscale("log")
     ax.set_yticks(range(len(scores)), [score.label for score in scores])
@@ -64,6 +45,29 @@ def errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Ax
     if handles:
         ax.legend(handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     return ax
+
+
+def _draw_line(ax: Axes, place: int, score: ObserverScore, colour: Any, labelled: set[str]) -> None:
+    """The line of one observer; what has no label in the legend yet gets one."""
+    points = _points(score)
+    for what, (value, marker, face) in points.items():
+        ax.plot(
+            [value],
+            [place],
+            marker,
+            markersize=8,
+            markeredgecolor=colour,
+            color=colour if face else "none",
+            label=None if what in labelled else what,
+            linestyle="none",
+        )
+        labelled.add(what)
+    if len(points) > 1:
+        ends = [value for value, _, _ in points.values()]
+        ax.hlines(place, min(ends), max(ends), color=colour, linewidth=1.0, zorder=1)
+    if not points:
+        word = "no numbers" if score.failure else "no speed"
+        ax.annotate(word, (0.02, place), xycoords=("axes fraction", "data"), va="center", color=MARK)
 
 
 def _points(score: ObserverScore) -> dict[str, tuple[float, str, bool]]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from cosim.evaluation.balise_gaps import ENVELOPE, gap_errors
 from cosim.evaluation.cost import was_compiled
@@ -90,10 +91,9 @@ def report_page(
     Returns:
         The page.
     """
-    metrics, details, counts = phase_metrics(result, spec), phase_details(result, spec), count_events(result.events)
+    metrics, counts = phase_metrics(result, spec), count_events(result.events)
     shown = metrics if spec.true_speed or spec.true_position else []  # a turbine has no errors of speed
     judged = [Judged.from_data(data) for data in list_entry(result, "expectations")]
-    certificates, explained = run_tables.certificates(result, spec)
     return render(
         "report.html.j2",
         spec.title,
@@ -108,24 +108,32 @@ def report_page(
         metrics=shown,
         errors=errors_table(shown, spec),
         seed_count=len(mapping_entry(result, "seed_study").get("seeds", [])),
-        seeds=run_tables.seeds_table(result),
         zooms=zooms,
         figures=figures,
-        phases=phases_table(details, spec),
-        certificates=certificates,
-        explained=explained,
+        phases=phases_table(phase_details(result, spec), spec),
         gaps=gaps_table(gap_errors(result, spec)),
         envelope=ENVELOPE,
         counts=counts,
         telegrams=run_tables.telegrams_table(counts.outcomes, spec.labels),
-        packets=run_tables.packets_table(result),
-        indicators=run_tables.indicators_table(result, spec),
-        faults=run_tables.faults_table(result, spec),
-        consistency=run_tables.consistency_table(result, spec),
-        components=run_tables.components_table(result),
         compiled=was_compiled(result),
-        calls=run_tables.calls_table(result),
-        messages=run_tables.messages_table(result),
         notes=list(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")]))),
-        versions=run_tables.versions_table(result),
+        **_run_tables(result, spec),
     )
+
+
+def _run_tables(result: Result, spec: ReportSpec) -> dict[str, Any]:
+    """Tables that follow from result and roles alone, by their names in the template."""
+    certificates, explained = run_tables.certificates(result, spec)
+    return {
+        "seeds": run_tables.seeds_table(result),
+        "certificates": certificates,
+        "explained": explained,
+        "packets": run_tables.packets_table(result),
+        "indicators": run_tables.indicators_table(result, spec),
+        "faults": run_tables.faults_table(result, spec),
+        "consistency": run_tables.consistency_table(result, spec),
+        "components": run_tables.components_table(result),
+        "calls": run_tables.calls_table(result),
+        "messages": run_tables.messages_table(result),
+        "versions": run_tables.versions_table(result),
+    }
