@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from cosim.comparison.tolerance import Tolerance, Tolerances
     from cosim.comparison.verdict import Comparison
     from cosim.errors import CosimError, UnmetError
-    from cosim.observer_benchmark.observers import benchmark_observers
+    from cosim.observer_benchmark.benchmark import benchmark_observers
     from cosim.provenance.rerun import rerun
-    from cosim.results.load import load_result
+    from cosim.results.load_result import load_result
     from cosim.results.result import Result
     from cosim.results.save import save_result
     from cosim.run.outcome import Outcome
@@ -64,9 +64,9 @@ _HOMES = {
     "Tolerances": "cosim.comparison.tolerance",
     "Tuning": "cosim.tuning.tuning_result",
     "UnmetError": "cosim.errors",
-    "benchmark_observers": "cosim.observer_benchmark.observers",
+    "benchmark_observers": "cosim.observer_benchmark.benchmark",
     "compare": "cosim.comparison.compare",
-    "load_result": "cosim.results.load",
+    "load_result": "cosim.results.load_result",
     "log_uniform": "cosim.studies.sampling",
     "rerun": "cosim.provenance",
     "save_result": "cosim.results.save",

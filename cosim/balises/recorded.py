@@ -18,10 +18,10 @@ from cosim.balises.telegram import NO_OUTCOMES, Channel, Crossing
 from cosim.components.recording import RecordingComponent
 from cosim.errors import OutputError, ScenarioError
 from cosim.results.events_file import read_events, require_accuracy
-from cosim.results.folder import EVENTS
 from cosim.results.formats.telegram_csv import holds_telegrams, read_telegrams
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord
+from cosim.results.results_folder import EVENTS
 from fmus.fmi.standard import TIME_TOLERANCE
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cosim.baselines.identity import Identity
+from cosim.baselines.model_identity import Identity
 from cosim.baselines.recipe import Recipe
 from cosim.comparison.tolerance import Tolerances
 from cosim.results.result import Result, SignalInfo

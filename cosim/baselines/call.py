@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.baselines.check import Regression, check, regression, tolerances_of
-from cosim.baselines.files import read_baseline
+from cosim.baselines.baseline_files import read_baseline
+from cosim.baselines.regression import Regression, check, regression, tolerances_of
 from cosim.baselines.subject import Subject, make_subject
 from cosim.baselines.update import Update, plan_update
 from cosim.comparison.tolerance import Tolerances

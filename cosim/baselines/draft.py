@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from cosim.baselines.baseline import Header
-from cosim.baselines.data import VERSION
-from cosim.baselines.identity import identities
-from cosim.baselines.numbers import SHARE, column_text, decimals_for, time_text
+from cosim.baselines.digits import SHARE, column_text, decimals_for, time_text
+from cosim.baselines.header_data import VERSION
+from cosim.baselines.kept_signals import kept_rows, resolve, select_signals
+from cosim.baselines.model_identity import identities
 from cosim.baselines.recipe import Recipe
-from cosim.baselines.selection import kept_rows, resolve, select_signals
-from cosim.comparison.telegrams import TIMES, telegram_limits
+from cosim.comparison.telegram_comparison import TIMES, telegram_limits
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.errors import BaselineError
 from cosim.results.events_file import COLUMNS, record_row

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cosim.baselines.baseline import Baseline
-from cosim.baselines.check import Regression, check
+from cosim.baselines.baseline_files import Change, change_by, draft_texts, read_baseline, summary_of
+from cosim.baselines.baseline_tables import parse_events, parse_table
 from cosim.baselines.draft import BaselineDraft, make_draft
-from cosim.baselines.files import Change, change_by, draft_texts, read_baseline, summary_of
 from cosim.baselines.recipe import Recipe
-from cosim.baselines.tables import parse_events, parse_table
+from cosim.baselines.regression import Regression, check
 from cosim.comparison.tolerance import Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError

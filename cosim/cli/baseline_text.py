@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cosim.baselines.call import Call
 from cosim.baselines.draft import value_range
 from cosim.cli.output import print_json
-from cosim.comparison.text import comparison_text
+from cosim.comparison.comparison_text import comparison_text
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:

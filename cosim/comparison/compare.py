@@ -11,14 +11,14 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.comparison.curve import Curve, check_time, looks_held, rows_to_keep
+from cosim.comparison.curve_comparison import Task, compare_signal
 from cosim.comparison.notes import notes, tells_no_units
 from cosim.comparison.packets import compare_packets
-from cosim.comparison.signal import Task, compare_signal
-from cosim.comparison.telegrams import compare_telegrams
+from cosim.comparison.telegram_comparison import compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
 from cosim.errors import ComparisonError
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.result import Result, SignalInfo
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cosim.comparison.events import Event, compare_events
+from cosim.comparison.event_comparison import Event, compare_events
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.verdict import EventComparison
 from cosim.results.result import PacketRecord, Result

@@ -18,7 +18,7 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.recording_data import Chosen, Recording, make_recording, whole_number_columns
 from cosim.errors import CosimError, CouplingError, ScenarioError
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
 from fmus.fmi.standard import TIME_TOLERANCE
 

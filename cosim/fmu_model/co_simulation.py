@@ -9,7 +9,7 @@ import numpy as np
 from cosim.fmu_model.quick_points import Batch, QuickPoints
 from cosim.fmu_model.quick_restarts import quicken_restarts
 from cosim.fmu_model.sealed import FAR, Array, FmuModelError, SealedModel, Way
-from fmus.check.instance import SlaveError
+from fmus.check.checked_instance import SlaveError
 from fmus.fmi.ports import is_native
 
 

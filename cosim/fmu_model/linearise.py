@@ -17,7 +17,7 @@ from cosim.fmu_model.linearisation import Linearisation, Method
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_states
-from fmus.check.derivatives import RELATIVE_STEP, compare
+from fmus.check.differences import RELATIVE_STEP, compare
 from fmus.check.findings import Verdict
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import CosimError, nearest
-from fmus.check.instance import SlaveError
+from fmus.check.checked_instance import SlaveError
 from fmus.fmi.instance import Instance
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from cosim.coupling.plan import Plan
 from cosim.network.chance import Chance
 from cosim.network.outputs import PacketReader
 from cosim.network.settings import NetworkSettings
-from cosim.results.data import PacketRecord
+from cosim.results.result_data import PacketRecord
 from fmus.fmi.standard import TIME_TOLERANCE
 from plant_models.railway.network.protocols import periodic_sender, quadratic_sender
 

@@ -16,7 +16,7 @@ from cosim.comparison.compare import compare
 from cosim.comparison.verdict import Comparison
 from cosim.errors import OutputError, ProvenanceError
 from cosim.provenance.same import same_result
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.unfinished import DID_NOT_END
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import Manifest, read_manifest

@@ -45,7 +45,7 @@ def write_baselines(session: pytest.Session, exitstatus: int) -> None:
     config.stash[REFUSED] = why if staged and not config.getoption("--fmu-baseline-force") else ""
     if config.stash[REFUSED] or not staged:
         return
-    from cosim.baselines.files import write_texts  # noqa: PLC0415 - only where something is written
+    from cosim.baselines.baseline_files import write_texts  # noqa: PLC0415 - only where something is written
 
     faults = config.stash.setdefault(WRITTEN, [])
     for record in staged:

@@ -14,7 +14,7 @@ import pytest
 
 from cosim.errors import CosimError
 from cosim.pytest_plugin import options
-from cosim.pytest_plugin.names import baseline_name
+from cosim.pytest_plugin.baseline_names import baseline_name
 from cosim.pytest_plugin.records import Records, RegressionRecord, Status
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class FmuRegression:
         return update.after
 
     def _explanation(self, call: Call, found: Regression, files: Mapping[str, str]) -> str:
-        from cosim.comparison.text import comparison_text  # noqa: PLC0415 - only for what differs
+        from cosim.comparison.comparison_text import comparison_text  # noqa: PLC0415 - only for what differs
 
         names = [signal.name for signal in found.failed] or ["telegrams"]
         what = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"

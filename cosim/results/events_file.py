@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote
 
-from cosim.results.data import BaliseRecord
+from cosim.results.result_data import BaliseRecord
 
 Record = TypeVar("Record")
 

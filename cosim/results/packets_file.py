@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Literal
 
-from cosim.results.data import PacketRecord
 from cosim.results.events_file import outcomes_text, parse_outcomes, read_rows
+from cosim.results.result_data import PacketRecord
 
 Kind = Literal["sent", "lost", "duplicate"]
 KINDS: Mapping[str, Kind] = {"sent": "sent", "lost": "lost", "duplicate": "duplicate"}

@@ -18,7 +18,7 @@ import numpy as np
 
 from cosim.errors import OutputError
 from cosim.results.block_file import COUNT, FIRST, BlockFile
-from cosim.results.data import SignalInfo
+from cosim.results.result_data import SignalInfo
 from cosim.results.row_file import RowFile
 from cosim.results.table_layout import table_dtype
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
-from cosim.results.data import BaliseRecord, PacketRecord, ResultData, SignalInfo
+from cosim.results.result_data import BaliseRecord, PacketRecord, ResultData, SignalInfo
 from cosim.results.save import save_result
 from cosim.results.to_frames import events_to_pandas, to_pandas, to_xarray
 
@@ -16,7 +16,7 @@ __all__ = ["BaliseRecord", "PacketRecord", "Result", "SignalInfo"]
 
 @dataclass(frozen=True)
 class Result(ResultData):
-    """Everything a run leaves behind; see `cosim.results.data.ResultData`."""
+    """Everything a run leaves behind; see `cosim.results.result_data.ResultData`."""
 
     @classmethod
     def of(cls, data: ResultData) -> Self:

@@ -9,9 +9,9 @@ from typing import Any
 
 from cosim.errors import CosimError
 from cosim.results.block_file import BLOCK_FILE, read_block
-from cosim.results.folder import SUMMARY, read_results, write_results
-from cosim.results.formats.catalogue import usual_file
 from cosim.results.formats.growing_npy import growing_header, read_grown
+from cosim.results.formats.known_formats import usual_file
+from cosim.results.results_folder import SUMMARY, read_results, write_results
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import DID_NOT_END
 

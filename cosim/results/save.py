@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.results.data import ResultData
 from cosim.results.events_file import EVENTS_SUFFIX, write_events
-from cosim.results.formats.catalogue import check_formats, format_of
 from cosim.results.formats.csv_file import write_csv
 from cosim.results.formats.format import Format
 from cosim.results.formats.headings import with_unit
+from cosim.results.formats.known_formats import check_formats, format_of
+from cosim.results.result_data import ResultData
 
 
 def save_result(result: ResultData, path: str | Path, *, units: bool = True) -> list[Path]:

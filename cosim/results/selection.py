@@ -9,8 +9,8 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from cosim.errors import OutputError, nearest
-from cosim.results.data import SignalInfo
 from cosim.results.result import Result
+from cosim.results.result_data import SignalInfo
 from cosim.results.table_layout import column_names, table_dtype
 
 

@@ -21,12 +21,12 @@ import numpy as np
 from cosim.diagnostics.messages import MessageLog, in_order, write_messages
 from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, BlockFile
-from cosim.results.data import BaliseRecord, PacketRecord, SignalInfo
 from cosim.results.events_file import record_row, write_events
-from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, PACKETS, SUMMARY, check_writable
-from cosim.results.formats.catalogue import table_files, usual_file
 from cosim.results.formats.growing_npy import growing_header
+from cosim.results.formats.known_formats import table_files, usual_file
 from cosim.results.packets_file import packet_row, write_packets
+from cosim.results.result_data import BaliseRecord, PacketRecord, SignalInfo
+from cosim.results.results_folder import EVENTS, LAYOUT, MESSAGES, PACKETS, SUMMARY, check_writable
 from cosim.results.row_file import RowFile
 from cosim.results.si import UnitOf, convert, described, foreign_units
 from cosim.results.summary_file import write_summary

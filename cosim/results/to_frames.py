@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.results.data import ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS
 from cosim.results.optional import optional_module
+from cosim.results.result_data import ResultData, SignalInfo
 
 EVENT_UNITS = {
     "stamp": "s",

@@ -11,10 +11,10 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages
 from cosim.results.block_file import BLOCK_FILE, read_block
-from cosim.results.data import ResultData, SignalInfo
 from cosim.results.events_file import Record, read_events
 from cosim.results.formats.growing_npy import read_grown
 from cosim.results.packets_file import read_packets
+from cosim.results.result_data import ResultData, SignalInfo
 
 SPARE = ".unfinished"
 """The folder, within that of the results, to which a run is streamed in case its process dies."""

@@ -16,7 +16,7 @@ from typing import Any
 import tomli_w
 
 from cosim.errors import OutputError
-from cosim.results.folder import check_writable
+from cosim.results.results_folder import check_writable
 from cosim.results.summary_file import jsonable
 from cosim.run.results_manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
 from cosim.scenario.origin import ForeignFile, Origin, stamp

@@ -28,8 +28,8 @@ from cosim.master.control.multirate import set_rates
 from cosim.master.master import Master
 from cosim.master.system import System
 from cosim.network.service import NetworkService
-from cosim.results.data import SignalInfo
 from cosim.results.recorder import Recorder
+from cosim.results.result_data import SignalInfo
 from cosim.results.stream import Stream
 from cosim.run.signal_roles import switching_signals
 from cosim.scenario.scenario_tables import MasterTable

@@ -19,7 +19,7 @@ from cosim.network.intervals import longest_interval
 from cosim.network.outputs import NAME, NetworkOutputs, PacketReader, arrived_name
 from cosim.network.service import Field, NetworkService, PacketListener, ages
 from cosim.network.settings import NetworkSettings
-from cosim.results.data import PacketRecord
+from cosim.results.result_data import PacketRecord
 from cosim.run.component_models import make_system, values_in_use
 from cosim.scenario.network_table import network_settings
 from cosim.scenario.scenario_tables import ComponentTable

@@ -11,8 +11,8 @@ import numpy as np
 from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged, judged_text
-from cosim.results.folder import write_results
 from cosim.results.result import Result
+from cosim.results.results_folder import write_results
 from cosim.run.made_from import renewed
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class Outcome:
         if self.origin is not None:
             paths["made_from"] = Path(directory) / "made_from" / "manifest.json"
         if report:
-            from cosim.report.page.report import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
+            from cosim.report.page.run_page import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
 
             paths["report"] = write_report(self.result, self.spec, directory)
         else:

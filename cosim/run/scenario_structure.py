@@ -28,7 +28,7 @@ from cosim.run.starts import given_values
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.inspect import group_index, make_links, make_part, rate_text
-from cosim.structure.structure import Structure
+from cosim.structure.run_structure import Structure
 from cosim.structure.structure_data import Balises, Link, Packets
 
 

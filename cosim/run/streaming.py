@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.errors import OutputError
-from cosim.results.folder import check_writable
+from cosim.results.results_folder import check_writable
 from cosim.run.made_from import renewed
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from fmpy.model_description import DefaultExperiment, ModelDescription
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError, nearest
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.scenario.schema import step_count
 
 STEPS = 1000

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Plai
 from cosim.components.recording_data import Interpolation
 from cosim.errors import nearest
 from cosim.fmu_filter.settings import FilterTable
-from cosim.results.formats.catalogue import FORMATS
+from cosim.results.formats.known_formats import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.table import Name, OwnSeed, Table
 from fmu_observer.event_protocol import LatePolicy

@@ -25,7 +25,7 @@ from cosim.scenario.saving import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
 from cosim.scenario.script_values import given_component, given_value
 from cosim.scenario.shipped import shipped_scenarios
-from cosim.structure.structure import Structure
+from cosim.structure.run_structure import Structure
 
 if TYPE_CHECKING:
     from cosim.components.recording_data import Interpolation

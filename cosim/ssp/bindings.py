@@ -13,10 +13,10 @@ from cosim.errors import nearest
 from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
 from cosim.ssp.nets import Nets, Path, Point
+from cosim.ssp.package_data import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
+from cosim.ssp.parameter_values import LISTS
 from cosim.ssp.pipe import BOOLEANS, Pipe
-from cosim.ssp.values import LISTS
 
 Scalar = float | str
 Value = Scalar | list[Scalar]

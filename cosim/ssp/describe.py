@@ -8,10 +8,10 @@ from typing import Any
 
 from cosim.scenario.package_names import split_variant
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.load import find_variant, load_structure
-from cosim.ssp.model import ComponentElement, DictionaryReference, SsdElement, SystemElement
+from cosim.ssp.load_package import find_variant, load_structure
 from cosim.ssp.package import Package, Unpacked
-from cosim.ssp.structure import read_structure
+from cosim.ssp.package_data import ComponentElement, DictionaryReference, SsdElement, SystemElement
+from cosim.ssp.system_structure import read_structure
 
 
 def describe_package(name: str) -> dict[str, Any]:

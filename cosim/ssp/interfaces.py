@@ -11,7 +11,7 @@ from cosim.errors import FmuLoadError, nearest
 from cosim.ssp.common import FAMILIES, NamedUnit
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import ComponentElement, Connector
+from cosim.ssp.package_data import ComponentElement, Connector
 from fmus.fmi.sense import doubled_names
 from fmus.fmi.types import enumeration_items
 from fmus.fmi.units import Units

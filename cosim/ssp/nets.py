@@ -14,7 +14,7 @@ from cosim.ssp.common import NamedUnit, Step
 from cosim.ssp.document import Node, fail
 from cosim.ssp.interfaces import Interface, interface_of
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.model import (
+from cosim.ssp.package_data import (
     ComponentElement,
     Connector,
     DictionaryReference,

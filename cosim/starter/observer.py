@@ -6,9 +6,9 @@ from typing import Any
 
 from cosim.starter.guess import Guess
 from cosim.starter.look import Look
-from cosim.starter.roles import ObserverRoles
+from cosim.starter.signal_roles import ObserverRoles
 from cosim.starter.toml_lines import GuessedLink, guessed, one_line
-from cosim.starter.train import train_times
+from cosim.starter.train_starter import train_times
 
 
 def observer_beside(look: Look, roles: ObserverRoles) -> dict[str, Any]:

@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import CosimError, RunError, ScenarioError
-from cosim.results.folder import write_results
+from cosim.results.results_folder import write_results
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sweep_journal import read_lines, scenario_key, write_lines
 from cosim.studies.workers import Died, Raised, Team, attempt
-from cosim.tuning.bench import Seeded
 from cosim.tuning.costs import Cost
 from cosim.tuning.parameters import Tunable
 from cosim.tuning.replays import Replays, make_replays
+from cosim.tuning.seeded_scenarios import Seeded
 
 JOURNAL = "evaluations.jsonl"
 EARLIER = "evaluations.earlier.jsonl"

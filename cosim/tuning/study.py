@@ -12,7 +12,7 @@ from cosim.studies.sweep_journal import write_lines
 from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.identifiability import Directions, covariances, directions, neighbours
 from cosim.tuning.parameters import Tunable
-from cosim.tuning.progress import Bar, Progress
+from cosim.tuning.search_progress import Bar, Progress
 from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
 from cosim.tuning.tuning_result import Searched, Tuning
 from fmu_observer.design.optimisers.known_optimisers import find_optimiser

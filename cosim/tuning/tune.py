@@ -9,16 +9,16 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from cosim.errors import ScenarioError
-from cosim.results.folder import check_writable
+from cosim.results.results_folder import check_writable
 from cosim.run.outcome import Outcome
 from cosim.run.scenario_structure import describe_component
 from cosim.simulation.scenario import Scenario
-from cosim.tuning.bench import Seeded, seeded, why_whole, with_observer
 from cosim.tuning.costs import Cost, make_cost
 from cosim.tuning.evaluation import Evaluator, closing
 from cosim.tuning.parameters import Bounds, Tunable, tunable
-from cosim.tuning.progress import Progress
-from cosim.tuning.seeds import drawn, with_seed
+from cosim.tuning.search_progress import Progress
+from cosim.tuning.seeded_scenarios import Seeded, seeded, why_whole, with_observer
+from cosim.tuning.shifted_seeds import drawn, with_seed
 from cosim.tuning.study import Study
 from cosim.tuning.tuning_files import write_tuning
 from cosim.tuning.tuning_result import Tuning

@@ -19,7 +19,7 @@ from moving_horizon_solvers import write_table
 from cosim import Outcome, Scenario
 from cosim.evaluation.balise_gaps import gap_errors, largest, root_mean_square
 from cosim.evaluation.numbers import error_number, number
-from cosim.observer_benchmark.observers import benchmark_observers
+from cosim.observer_benchmark.benchmark import benchmark_observers
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.real_time_iteration import TOLD, WINDOW_MEMORY, Iterated
 from fmu_observer.formulas.moving_horizon.robust_loss import SCALES

@@ -13,7 +13,7 @@ import numpy as np
 from manoeuvre import BALISES, INSTANTS, LOCOMOTIVE, PARAMETERS, STEP, Conditions
 
 from cosim import Result
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from plant_models.hybrid import HybridSystem
 
 Make = Callable[[Result, str], Result]

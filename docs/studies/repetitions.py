@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from manoeuvre import ORDER, STEP, Conditions
 
 from cosim import Result
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 
 STEPS = (0.0025, 0.005, 0.02)  # [s]; the effort is constant between the points of all of them
 REPETITIONS = 20
@@ -59,7 +59,7 @@ def in_new_process(how: str = "") -> Result:
 
 
 def _run_and_write(folder: str, how: str = "") -> None:
-    from cosim.results.folder import write_results  # noqa: PLC0415 - only in the new process
+    from cosim.results.results_folder import write_results  # noqa: PLC0415 - only in the new process
 
     conditions = Conditions(order=ORDER[::-1], stepper="python") if how else Conditions()
     write_results(conditions.run(), folder, ["npy"])

@@ -10,8 +10,8 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fmus.batch.batch_library import BatchEvents, Columns, load_batch
 from fmus.batch.error import BatchError
-from fmus.batch.library import BatchEvents, Columns, load_batch
 from fmus.batch.schedule import Schedule
 from fmus.build import plan_fmu
 from fmus.recipes import recipe

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fmus.check.bench import WARM_UP_STEPS, Bench, elsewhere
+from fmus.check.runner import WARM_UP_STEPS, Bench, elsewhere
 
 STEP_TOLERANCE = 0.01
 """A divided step may differ from a whole one by this share of the change: far above any integration error, far below a

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription
 
-from fmus.check.bench import Bench
-from fmus.check.model import FmuModel, make_model
-from fmus.check.slave import FmuSlave, make_slave
+from fmus.check.checked_slave import FmuSlave, make_slave
+from fmus.check.exchange_model import FmuModel, make_model
+from fmus.check.runner import Bench
 
 SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""

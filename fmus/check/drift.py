@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmus.check.bench import Bench
 from fmus.check.restoring import solver_tolerance
+from fmus.check.runner import Bench
 from fmus.fmi.slave import Slave
 
 STEPS = 100

@@ -21,16 +21,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any
 
-from fmus.check.catalogue import CHECKS
 from fmus.check.findings import Finding, Verdict
 from fmus.check.job import Job
+from fmus.check.known_checks import CHECKS
 from fmus.check.worker import unrun
 
 START_LIMIT = 60.0
 """Time a child may take to start before its first check [s]; a loaded machine takes seconds."""
 
 GRACE = 10.0
-"""Time the keeper of a child may take to end all that it keeps [s]."""
+"""Time the watchdog of a child may take to end all that it watches [s]."""
 
 PROCESSES = 32
 """Processes that an FMU may have running at once."""
@@ -128,7 +128,7 @@ def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as folder:
         paths = [str(PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "fmus.check.keeper", str(PROCESSES), str(MEMORY)],
+            [sys.executable, "-P", "-m", "fmus.check.watchdog", str(PROCESSES), str(MEMORY)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=console,
@@ -143,7 +143,7 @@ def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """The keeper ends all that it keeps; where it does not answer, it is killed with its group."""
+    """The watchdog ends all that it watches; where it does not answer, it is killed with its group."""
     process.terminate()
     with suppress(subprocess.TimeoutExpired):
         process.wait(GRACE)
@@ -181,11 +181,11 @@ def _parsed(line: bytes | None) -> dict[str, Any]:
 
 
 def _ending(message: dict[str, Any]) -> str:
-    """How a worker ended, in words, from the keeper's last line; empty where there is none."""
+    """How a worker ended, in words, from the watchdog's last line; empty where there is none."""
     if "stopped" in message:
         return str(message["stopped"])
     if "ended" not in message:
-        return "ended, and its keeper with it,"
+        return "ended, and its watchdog with it,"
     code = int(message["ended"])
     if code < 0:
         try:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from fmus.check.behaviour import ends_of_divided_steps, honest_step, repeatable
-from fmus.check.bench import Bench
 from fmus.check.drift import drift
 from fmus.check.restoring import ROUNDING, Restores, Restoring, largest, restoring
+from fmus.check.runner import Bench
 from fmus.fmi.instance import FAILURES
 from fmus.fmi.slave import Slave
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fmus.check.behaviour import again, continuation, difference, go_elsewhere
-from fmus.check.bench import WARM_UP_STEPS, Bench
+from fmus.check.runner import WARM_UP_STEPS, Bench
 from fmus.fmi.instance import FAILURES
 
 Restores = Literal["exact", "within_tolerance", "no"]

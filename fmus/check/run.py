@@ -11,14 +11,14 @@ from time import perf_counter
 
 from fmpy.model_description import ModelDescription
 
-from fmus.check.bench import end_of_experiment
-from fmus.check.catalogue import checks_of, registered_places
-from fmus.check.checks.static import platforms, validation
+from fmus.check.checked_instance import LOADING
+from fmus.check.checks.archive_checks import platforms, validation
+from fmus.check.conclusions import what_to_trust
 from fmus.check.findings import Class, Finding, Verdict, class_of
-from fmus.check.instance import LOADING
 from fmus.check.isolated import run_isolated
 from fmus.check.job import Job
-from fmus.check.trust import what_to_trust
+from fmus.check.known_checks import checks_of, registered_places
+from fmus.check.runner import end_of_experiment
 from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
 from fmus.fmi.instance import INSTANTIATING
 from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION

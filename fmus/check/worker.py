@@ -1,6 +1,6 @@
 """The child process: runs the checks of a job and tells each finding as one line of JSON.
 
-Forked by `fmus.check.keeper`. What the FMU prints goes to the file that the parent opened
+Forked by `fmus.check.watchdog`. What the FMU prints goes to the file that the parent opened
 for it; the lines go to what was standard output when the process began.
 """
 
@@ -15,12 +15,12 @@ from pathlib import Path
 from traceback import extract_tb
 from typing import Any, NoReturn
 
-from fmus.check.catalogue import CHECKS, EXPECTED
 from fmus.check.check import REPEATED, Check
+from fmus.check.checked_instance import SlaveError
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, Finding, Verdict, failed
-from fmus.check.instance import SlaveError
 from fmus.check.job import Job
+from fmus.check.known_checks import CHECKS, EXPECTED
 from fmus.fmi.description import read_description
 from plant_models.user_file import UserFileError, load_class
 

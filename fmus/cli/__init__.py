@@ -16,10 +16,10 @@ from fmus.plain import plain
 
 FAILED = 2
 COMMANDS = (
-    Command("list", "fmus.cli.listing", "models that can be exported, with their presets and options"),
-    Command("build", "fmus.cli.build", "export models as native FMUs"),
-    Command("check", "fmus.cli.check", "how far an FMU can be trusted: validity and behaviour"),
-    Command("info", "fmus.cli.info", "what an FMU says about itself, and whether it is valid"),
+    Command("list", "fmus.cli.fmu_list_command", "models that can be exported, with their presets and options"),
+    Command("build", "fmus.cli.build_command", "export models as native FMUs"),
+    Command("check", "fmus.cli.check_command", "how far an FMU can be trusted: validity and behaviour"),
+    Command("info", "fmus.cli.fmu_info_command", "what an FMU says about itself, and whether it is valid"),
 )
 
 

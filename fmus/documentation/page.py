@@ -12,7 +12,7 @@ from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
 from fmus.documentation.licences import model_terms
 from fmus.documentation.prose import blocks, pieces
 from fmus.documentation.rebuild import rebuild_commands
-from fmus.documentation.tables import certificate_rows, preset_rows, variable_rows
+from fmus.documentation.variable_tables import certificate_rows, preset_rows, variable_rows
 from fmus.templates import environment
 from fmus.toolchain.targets import Target
 from plant_models.hybrid import HybridSystem

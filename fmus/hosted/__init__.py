@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fmus.hosted.build import HostedExportError, build_hosted_fmu
+    from fmus.hosted.hosted_fmu import HostedExportError, build_hosted_fmu
 
 __all__ = ["HostedExportError", "build_hosted_fmu"]
 
@@ -17,5 +17,5 @@ __all__ = ["HostedExportError", "build_hosted_fmu"]
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module("fmus.hosted.build"), name)
+    value = globals()[name] = getattr(import_module("fmus.hosted.hosted_fmu"), name)
     return value

@@ -30,7 +30,7 @@ import sys, time
 from time import process_time
 marks = [("interpreter", process_time())]
 from cosim import Scenario
-import cosim.simulation.scenario, cosim.cli.run
+import cosim.simulation.scenario, cosim.cli.run_command
 marks.append(("imports", process_time()))
 from cosim.run import scenario_run as running
 parts = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cosim.coupling.strong import strong_groups
-from cosim.structure.structure import Structure
+from cosim.structure.run_structure import Structure
 from cosim.structure.structure_data import Balises, Link, Part, Port
 
 

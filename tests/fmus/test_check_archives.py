@@ -15,7 +15,7 @@ import pytest
 from lying_fmus import description
 
 from fmus.check import Class, check_fmu
-from fmus.check.checks.static import platforms
+from fmus.check.checks.archive_checks import platforms
 from fmus.cli import main
 from fmus.fmi import archive as archives
 from fmus.fmi.archive import NotAnFmuError, open_archive

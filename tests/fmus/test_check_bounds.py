@@ -13,9 +13,9 @@ from lying_fmus import build, description
 
 from fmus.check import Class, Verdict, check_fmu, isolated
 from fmus.check.check import REPEATED, Check
+from fmus.check.checked_instance import FmuInstance
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, class_of, passed
-from fmus.check.instance import FmuInstance
 from fmus.check.worker import findings
 from fmus.cli import main
 from fmus.plain import one_line, plain

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmus.check.derivatives import compare
+from fmus.check.differences import compare
 from fmus.check.findings import CheckOutcome, Verdict
 
 CURVES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {

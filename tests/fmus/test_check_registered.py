@@ -11,10 +11,10 @@ import pytest
 
 from fmus import cached_fmu
 from fmus.check import Verdict, check_fmu
-from fmus.check.catalogue import CHECKS
 from fmus.check.check import Check
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, passed
+from fmus.check.known_checks import CHECKS
 from fmus.recipes import recipe
 from plant_models import registry
 

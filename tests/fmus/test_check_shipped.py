@@ -8,8 +8,8 @@ import pytest
 
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.check import Class, Verdict, check_fmu
+from fmus.check.checked_slave import make_slave
 from fmus.check.probe import probe
-from fmus.check.slave import make_slave
 from fmus.fmi.archive import open_archive
 
 pytestmark = pytest.mark.compiler

@@ -18,12 +18,12 @@ import plant_models
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.report.figures.panels import FIGURES
-from cosim.results.formats.catalogue import FORMATS
+from cosim.results.formats.known_formats import FORMATS
 from cosim.scenario.model_name import EXPECTED
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
-from fmus.check.catalogue import CHECKS
-from fmus.check.catalogue import EXPECTED as CHECK
+from fmus.check.known_checks import CHECKS
+from fmus.check.known_checks import EXPECTED as CHECK
 from plant_models import registry
 from plant_models.registry import Registry, RegistryError
 from plant_models.user_file import UserFileError, load_class

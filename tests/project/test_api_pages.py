@@ -40,5 +40,5 @@ def test_what_a_package_offers_stands_in_it_once(package: str, pages: dict[str, 
 
 
 def test_what_a_page_imports_stands_in_it(pages: dict[str, str]) -> None:
-    assert ":: cosim.results.load.load_result\n" in pages["cosim"]
+    assert ":: cosim.results.load_result.load_result\n" in pages["cosim"]
     assert ":: plant_models.hybrid.runtime.Runtime\n" in pages["plant_models"]

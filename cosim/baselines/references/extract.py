@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from cosim.baselines.baseline import Baseline
+from cosim.baselines.baseline_files import baseline_path, write_draft
 from cosim.baselines.draft import make_draft
-from cosim.baselines.files import baseline_path, write_draft
 from cosim.baselines.references.read import read_reference
 from cosim.errors import OutputError
 

@@ -13,23 +13,23 @@ from typing import Any
 import numpy as np
 
 from cosim.baselines.baseline import Baseline, Header
-from cosim.baselines.data import VERSION, header_from
-from cosim.baselines.files import summary_of
-from cosim.baselines.identity import Identity
+from cosim.baselines.baseline_files import summary_of
+from cosim.baselines.header_data import VERSION, header_from
+from cosim.baselines.model_identity import Identity
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.references.manifest import FOLDER, MANIFEST, Experiment, Related, read_experiments, read_manifest
-from cosim.baselines.references.tables import as_of_a_run, prefix
+from cosim.baselines.references.reference_tables import as_of_a_run, prefix
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.component import Component
 from cosim.components.description import read_description
 from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, CosimError, nearest
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.scenario.fmu_alone import run_times
 from cosim.ssp.document import parse
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.values import read_parameter_set
+from cosim.ssp.parameter_values import read_parameter_set
 
 COMPONENT = "fmu"
 """What the component of an FMU alone is called, see `Scenario.fmu`."""

@@ -12,7 +12,7 @@ from cosim.expectations.expectation import Count, WindowExpectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.time_window import TimeWindow
-from cosim.results.data import BaliseRecord
+from cosim.results.result_data import BaliseRecord
 from cosim.table import Name
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, 
 from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
 from cosim.report.figures.scales import bounded, value_limits
-from cosim.report.overlay.runs import OverlayRun, observers_of, one_each
+from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
 from cosim.results.result import Result
 
 WIDTH, FIRST_PANEL, NEXT_PANEL = 8.2, 3.3, 2.2  # inches

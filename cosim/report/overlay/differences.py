@@ -10,7 +10,7 @@ from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.facts import list_entry, mapping_entry
 from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import phases
-from cosim.report.overlay.runs import OverlayRun
+from cosim.report.overlay.overlaid_runs import OverlayRun
 from cosim.results.result import BaliseRecord, Result
 
 COMPONENT_ENTRIES = {"kind": "kind", "fmi_version": "FMI version", "model": "model", "preset": "preset", "guid": "GUID"}

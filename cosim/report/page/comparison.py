@@ -16,10 +16,10 @@ from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalCompar
 from cosim.drawing.style import png
 from cosim.evaluation.numbers import DASH, number
 from cosim.report.figures.comparison_figure import comparison_picture
-from cosim.report.page.files import explained, page_bytes, write_file
+from cosim.report.page.page_files import explained, page_bytes, write_file
+from cosim.report.page.page_table import PageTable, simple_table
 from cosim.report.page.render import render
-from cosim.report.page.table import PageTable, simple_table
-from cosim.report.page.verdict import Fact
+from cosim.report.page.run_statements import Fact
 from cosim.results.summary_file import jsonable
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cosim.evaluation.balise_gaps import GapErrors, largest
 from cosim.evaluation.numbers import error_number, number
-from cosim.report.page.table import PageTable, simple_table
+from cosim.report.page.page_table import PageTable, simple_table
 
 KMH = 3.6
 

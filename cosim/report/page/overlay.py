@@ -13,12 +13,20 @@ from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
 from cosim.report.overlay.differences import differences, layout_note
-from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
-from cosim.report.overlay.runs import OverlayRun, make_runs
-from cosim.report.page.files import explained, write_file, write_page
+from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
+from cosim.report.overlay.overlay_measures import (
+    DETAIL_HEADINGS,
+    ERROR_HEADINGS,
+    Measured,
+    cell,
+    detailed,
+    headings,
+    measured,
+)
+from cosim.report.page.page_files import explained, write_file, write_page
+from cosim.report.page.page_table import PageTable, grouped_table, simple_table
 from cosim.report.page.render import render
-from cosim.report.page.table import PageTable, grouped_table, simple_table
-from cosim.report.page.verdict import Fact
+from cosim.report.page.run_statements import Fact
 from cosim.results.result import Result
 
 PAGE, FIGURES = "overlay.html", "figures"

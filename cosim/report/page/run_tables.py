@@ -19,7 +19,7 @@ from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged
-from cosim.report.page.table import PageTable, simple_table
+from cosim.report.page.page_table import PageTable, simple_table
 from cosim.results.result import Result
 
 LIMITS = ("aperiodic_limit", "constant_limit")

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import NUMBERS, record_from_row, record_row
+from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.summary_file import jsonable, restored
 from cosim.results.table_layout import column_names
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.data import ResultData, SignalInfo
+from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.si import in_si
 from cosim.results.table_layout import table_dtype
 from plant_models.hybrid.units import UnitError, conversion, parse_unit

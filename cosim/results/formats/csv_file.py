@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.results.data import ResultData
 from cosim.results.formats.format import Format, bare
+from cosim.results.result_data import ResultData
 from cosim.results.table_layout import column_names, table_dtype
 
 CHUNK = 4096  # rows turned into text at a time, so that memory stays flat

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.data import ResultData
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.csv_dialect import SEPARATORS, Dialect, csv_dialect
 from cosim.results.formats.headings import split_unit
+from cosim.results.result_data import ResultData
 
 WORDS = {"true": 1.0, "false": 0.0} | dict.fromkeys(("", "na", "n/a", "#n/a", "null", "none"), float("nan"))
 _OF_WINDOWS = re.compile(r"(?P<sign>[+-]?)1[.,]#(?P<what>inf|ind|q?nan|snan)\d*", re.IGNORECASE)

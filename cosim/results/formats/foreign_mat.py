@@ -14,12 +14,12 @@ import numpy as np
 import scipy
 
 from cosim.errors import OutputError
-from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import with_about
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.formats.mat_file import read_mat
 from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description, write_modelica
+from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.table_layout import table_dtype
 
 TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``

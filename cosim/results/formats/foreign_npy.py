@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.npy_file import HEADER
+from cosim.results.result_data import ResultData, SignalInfo
 
 
 def read_foreign_npy(path: Path) -> ResultData:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
-from cosim.results.data import ResultData, SignalInfo
+from cosim.results.result_data import ResultData, SignalInfo
 
 
 class Format(ABC):

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
 from cosim.results.formats.about import BLOCK, blocks, signals_of
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.formats.guarded_file import GuardedFile
 from cosim.results.optional import optional_module
+from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.summary_file import jsonable, restored
 from cosim.results.table_layout import table_dtype
 

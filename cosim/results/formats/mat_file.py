@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import scipy
 
-from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
 from cosim.results.formats.format import Format
 from cosim.results.formats.matlab_names import matlab_names
+from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.table_layout import column_names, table_dtype
 
 RESERVED = ("time", "units", "signals", "events")

@@ -19,8 +19,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import about_text, blocks, signals_of
+from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.table_layout import column_names
 
 ACLASS = [text.ljust(11) for text in ("Atrajectory", "1.1", "", "binTrans")]  # OpenModelica wants it so to the byte

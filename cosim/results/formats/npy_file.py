@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.results.data import ResultData
 from cosim.results.formats.format import Format, bare
+from cosim.results.result_data import ResultData
 from cosim.results.table_layout import column_names
 
 HEADER = 1 << 26  # bytes; thousands of names need more than NumPy allows unasked

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import about_text, blocks, signals_of, with_about
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.optional import optional_module
+from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.table_layout import table_dtype
 
 ABOUT = b"fmu-observer"

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import OutputError, nearest
-from cosim.results.data import BaliseRecord
 from cosim.results.events_file import COLUMNS, NUMBERS, parse_outcomes, require_accuracy
 from cosim.results.formats.csv_dialect import csv_dialect
 from cosim.results.formats.headings import split_unit
+from cosim.results.result_data import BaliseRecord
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 NEEDED = ("stamp", "position")

@@ -42,7 +42,7 @@ FIRST = 25
 
 C_USERS = {
     "fmus/runtime": ("fmus/cache.py", "fmus/build.py"),
-    "fmus/hosted": ("fmus/hosted/build.py", "fmus/hosted/export.py", "fmus/hosted/slave.py"),
+    "fmus/hosted": ("fmus/hosted/hosted_fmu.py", "fmus/hosted/export.py", "fmus/hosted/slave.py"),
     "cosim/compiled": ("cosim/compiled/",),
 }
 """Files in Python that whoever executes C of a room executes too."""

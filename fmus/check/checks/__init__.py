@@ -1,1 +1,1 @@
-"""The checks themselves, one file for each subject; `fmus.check.catalogue` says which are run, and in which order."""
+"""The checks themselves, one file for each subject; `fmus.check.known_checks` says which run, in which order."""

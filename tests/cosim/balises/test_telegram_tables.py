@@ -14,8 +14,8 @@ from cosim.balises.layout import from_csv
 from cosim.balises.recorded import RecordedLayout, read_layout
 from cosim.errors import ScenarioError
 from cosim.observer_benchmark.playback import train_observers
-from cosim.results.data import BaliseRecord
 from cosim.results.events_file import read_events, write_events
+from cosim.results.result_data import BaliseRecord
 
 LOG = "time,odometer [km/h],effort [N]\n0,36,0\n2,36,0\n"
 

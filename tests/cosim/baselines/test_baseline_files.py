@@ -16,7 +16,7 @@ import pytest
 from small_scenarios import small
 
 from cosim.baselines import check, read_baseline, write_baseline
-from cosim.baselines.files import parts
+from cosim.baselines.baseline_files import parts
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.errors import BaselineError, ComparisonError, OutputError
 from cosim.results.result import Result, SignalInfo

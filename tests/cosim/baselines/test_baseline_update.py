@@ -12,7 +12,7 @@ import pytest
 from test_baseline_files import component, hand_made
 
 from cosim.baselines import check, read_baseline
-from cosim.baselines.files import write_texts
+from cosim.baselines.baseline_files import write_texts
 from cosim.baselines.update import plan_update
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.results.result import Result

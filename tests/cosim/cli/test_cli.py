@@ -17,7 +17,7 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import RunError
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 
 
 @pytest.fixture

@@ -15,8 +15,8 @@ import pytest
 from cosim.baselines import write_baseline
 from cosim.cli import main
 from cosim.comparison.tolerance import Tolerance, Tolerances
-from cosim.results.folder import write_results
 from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.results.results_folder import write_results
 
 TIME = np.linspace(0.0, 10.0, 101)
 TELEGRAM = BaliseRecord(2.5, 2.5, "B1", 2.5, 2.5, outcomes={"observer": "accepted"})

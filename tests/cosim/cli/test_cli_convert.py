@@ -11,8 +11,8 @@ from odd_results import assert_same, odd_result
 
 from cosim import load_result
 from cosim.cli import main
-from cosim.results.folder import write_results
 from cosim.results.result import Result, SignalInfo
+from cosim.results.results_folder import write_results
 
 
 def some_result() -> Result:

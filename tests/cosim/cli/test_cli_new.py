@@ -8,7 +8,7 @@ import pytest
 from test_fmus.build import linear_fmu
 
 from cosim.cli import main
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 
 
 @pytest.mark.compiler

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.cli import main
 from cosim.evaluation.reference_trajectory import reference_trajectory, sampled_rows
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from fmu_observer.formulas.filtering.covariance_consistency import is_inside
 
 STD, SCALE, BALISES = 0.05, 0.015, 250.0

@@ -10,7 +10,7 @@ import pytest
 from kept_runs import coast, coasting, quietly
 
 from cosim.cli import main
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 
 
 @pytest.fixture

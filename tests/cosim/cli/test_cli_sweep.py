@@ -10,9 +10,9 @@ import pytest
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.cli.sweep import parse_values
+from cosim.cli.sweep_command import parse_values
 from cosim.errors import ScenarioError
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 from cosim.studies.sampling import uniform
 
 

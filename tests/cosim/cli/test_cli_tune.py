@@ -9,7 +9,7 @@ import pytest
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.cli.tune import _seeds
+from cosim.cli.tune_command import _seeds
 
 RUNNING = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 5e4}
 

@@ -10,8 +10,8 @@ import pytest
 from made_results import STRICT, compared, made
 
 from cosim.comparison.compare import compare_results
+from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.notes import notes
-from cosim.comparison.text import comparison_text
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.results.result import BaliseRecord
 

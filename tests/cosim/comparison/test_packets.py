@@ -8,8 +8,8 @@ from math import nan
 import pytest
 from made_results import compared, made
 
+from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.packets import keeps_packets
-from cosim.comparison.text import comparison_text
 from cosim.comparison.verdict import Comparison
 from cosim.provenance.same import same_result
 from cosim.report.page.comparison import comparison_page

@@ -21,7 +21,7 @@ from cosim.components.unpacking import forget_all
 from cosim.errors import FmuLoadError
 from cosim.starter.look import look_into
 from fmus.cli import main as fmus_main
-from fmus.report import describe_file
+from fmus.fmu_report import describe_file
 
 
 def xml(version: str = "3.0", interface: str = '<CoSimulation modelIdentifier="toy"/>') -> str:

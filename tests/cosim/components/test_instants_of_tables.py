@@ -23,11 +23,11 @@ from cosim.baselines.subject import make_subject
 from cosim.calibration.fitting import calibrate
 from cosim.calibration.recorded_signals import sort_columns
 from cosim.calibration.runs import FmuRuns
-from cosim.cli import identify
+from cosim.cli import identify_command as identify
 from cosim.errors import CosimError
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.run.outcome import Outcome
-from cosim.structure.text import when
+from cosim.structure.structure_text import when
 from fmus import cached_fmu
 from fmus.cli.commands import add_command
 from plant_models import PLANTS

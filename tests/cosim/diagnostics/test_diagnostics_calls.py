@@ -28,7 +28,7 @@ from cosim.diagnostics.call_text import DescribedCall
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_rows, cost_text
 from cosim.master.master import close
-from cosim.report.page.report import report_page
+from cosim.report.page.run_page import report_page
 
 LINE = re.compile(
     r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, "

@@ -17,8 +17,8 @@ from cosim import Scenario
 from cosim.components.loading import load_fmu
 from cosim.diagnostics.messages import OMITTED, Message, MessageLog, in_order, read_messages, write_messages
 from cosim.errors import CouplingError, ScenarioError
-from cosim.report.page.report import report_page
-from cosim.results.folder import read_results
+from cosim.report.page.run_page import report_page
+from cosim.results.results_folder import read_results
 from fmus.fmi.native_log import _listeners
 
 STEP = 0.05

@@ -17,13 +17,13 @@ from matplotlib.image import imread
 from matplotlib.transforms import Bbox
 
 from cosim.errors import OutputError
-from cosim.structure import picture
+from cosim.structure import structure_picture as picture
 from cosim.structure.curves import forward_curves
-from cosim.structure.layout import EVENT_PORT, lay_out
-from cosim.structure.picture import COLOURS, box_size, structure_figure, text_width, wires_of
+from cosim.structure.picture_layout import EVENT_PORT, lay_out
+from cosim.structure.run_structure import Structure
 from cosim.structure.shapes import Box, Layout, Wire
-from cosim.structure.structure import Structure
 from cosim.structure.structure_data import Balises, Link
+from cosim.structure.structure_picture import COLOURS, box_size, structure_figure, text_width, wires_of
 
 EDGE = 1e-6
 TOUCH = 0.6  # pixels; text boxes are rounded to whole ones

@@ -19,8 +19,8 @@ from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations import Judged
 from cosim.expectations.indicator_levels import first_on
-from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result, SignalInfo
+from cosim.results.results_folder import read_results, write_results
 from cosim.run.outcome import Outcome
 
 RMS = math.sqrt(0.5 * 0.5**2 + 0.5 * 0.1**2)  # 0.5 m/s for one half of the time, 0.1 m/s for the other

@@ -12,7 +12,7 @@ from toys import STOP, run, scenario
 from cosim import Outcome, Scenario
 from cosim.errors import CosimError
 from cosim.results import stream as stream_module
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.packets_file import read_packets, write_packets
 
 ROUGH: dict[str, Any] = {

@@ -19,7 +19,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import OutputError, ProvenanceError
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 from cosim.run.made_from import renewed
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import read_manifest
@@ -198,7 +198,7 @@ def test_results_that_cannot_be_written_leave_the_former_ones_whole(
     def refuse(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cosim.results.folder.write_summary", refuse)
+    monkeypatch.setattr("cosim.results.results_folder.write_summary", refuse)
     with pytest.raises(OutputError, match="No space left"):
         other.write(tmp_path / "out", report=False)
     assert everything(tmp_path / "out") == before

@@ -14,8 +14,8 @@ from cosim import Scenario
 from cosim.errors import CosimError, OutputError, ProvenanceError
 from cosim.provenance import rerun
 from cosim.provenance.same import same_result
-from cosim.results.folder import read_results
 from cosim.results.result import BaliseRecord, Result
+from cosim.results.results_folder import read_results
 
 
 @pytest.fixture

@@ -13,11 +13,11 @@ import failing_models
 import pytest
 
 import cosim.baselines.call
-import cosim.comparison.text
+import cosim.comparison.comparison_text
 import cosim.report.page.comparison
 import fmus
 import plant_models
-from cosim.pytest_plugin.names import baseline_name
+from cosim.pytest_plugin.baseline_names import baseline_name
 
 pytest_plugins = ["pytester"]
 

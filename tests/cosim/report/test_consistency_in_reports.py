@@ -12,9 +12,9 @@ from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.consistency_figure import NeesPanel, NisPanel, nees_figure, nis_figure
-from cosim.report.page.report import report_page
-from cosim.results.data import SignalInfo
+from cosim.report.page.run_page import report_page
 from cosim.results.result import Result
+from cosim.results.result_data import SignalInfo
 from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit
 

@@ -11,11 +11,11 @@ import pytest
 from small_scenarios import small
 
 from cosim.cli import main
-from cosim.cli.report import _guess
-from cosim.cli.report import _labels as default_labels
+from cosim.cli.report_command import _guess
+from cosim.cli.report_command import _labels as default_labels
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import spec_of
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.summary_file import jsonable
 
 

@@ -12,7 +12,7 @@ from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 from cosim.diagnostics.messages import Message
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.overlay import write_overlay
-from cosim.report.page.report import write_report
+from cosim.report.page.run_page import write_report
 from cosim.results.result import Result
 
 pytestmark = pytest.mark.browser

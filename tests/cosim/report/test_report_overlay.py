@@ -28,8 +28,8 @@ from cosim.report.figures.overlay_figures import (
     true_speed_figure,
 )
 from cosim.report.overlay.differences import differences, layout_note
-from cosim.report.overlay.measures import cell, difference, measured
-from cosim.report.overlay.runs import MOST_RUNS, OverlayRun, make_runs
+from cosim.report.overlay.overlaid_runs import MOST_RUNS, OverlayRun, make_runs
+from cosim.report.overlay.overlay_measures import cell, difference, measured
 from cosim.report.page import overlay
 from cosim.report.page.overlay import overlay_page, write_overlay
 from cosim.results.result import Result

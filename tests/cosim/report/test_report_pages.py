@@ -32,9 +32,9 @@ from cosim.report.figures.panels import draw_all, panels
 from cosim.report.figures.run_figures import SpeedPanel, adhesion_figure, slip_figure
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.render import first_sentence
-from cosim.report.page.report import report_page, write_report
-from cosim.results.folder import read_results, write_results
+from cosim.report.page.run_page import report_page, write_report
 from cosim.results.result import Result
+from cosim.results.results_folder import read_results, write_results
 
 PANELS = [panel for panel in panels() if panel.available(synthetic_result(), synthetic_spec())]
 VOID = {"meta", "img", "br", "hr", "link", "input"}

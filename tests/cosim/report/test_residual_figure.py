@@ -6,7 +6,7 @@ import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.residual_figure import FLOOR, ResidualsPanel, residual_figure
-from cosim.report.page.report import report_page
+from cosim.report.page.run_page import report_page
 from cosim.results.formats.format import bare
 from cosim.results.result import Result
 

@@ -18,10 +18,10 @@ from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants, phas
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import Phase, ReportSpec
-from cosim.report.overlay.measures import measured
-from cosim.report.overlay.runs import make_runs
-from cosim.report.page.report import report_page
-from cosim.report.page.verdict import verdict_facts
+from cosim.report.overlay.overlaid_runs import make_runs
+from cosim.report.overlay.overlay_measures import measured
+from cosim.report.page.run_page import report_page
+from cosim.report.page.run_statements import verdict_facts
 from cosim.results.result import BaliseRecord, Result
 from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures

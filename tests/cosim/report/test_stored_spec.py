@@ -14,8 +14,8 @@ from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import is_guessed, spec_of
-from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
+from cosim.results.results_folder import read_results, write_results
 from cosim.results.summary_file import jsonable
 
 JSON = st.recursive(

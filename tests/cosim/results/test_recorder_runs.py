@@ -14,8 +14,8 @@ from small_scenarios import small
 
 from cosim.errors import OutputError
 from cosim.results import recorder as recorder_module
-from cosim.results.folder import read_results
 from cosim.results.result import SignalInfo
+from cosim.results.results_folder import read_results
 from cosim.results.si import in_si
 from cosim.run.outcome import Outcome
 from plant_models.hybrid.units import Unit, parse_unit

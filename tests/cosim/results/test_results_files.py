@@ -15,11 +15,11 @@ from scipy.io import loadmat
 
 from cosim.errors import OutputError
 from cosim.results.events_file import outcomes_text, parse_outcomes, read_events, write_events
-from cosim.results.folder import check_writable, read_results, write_results
 from cosim.results.formats.csv_file import read_csv, write_csv
 from cosim.results.formats.mat_file import read_mat, write_mat
 from cosim.results.formats.matlab_names import matlab_names
 from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.results.results_folder import check_writable, read_results, write_results
 from cosim.results.summary_file import read_summary, write_summary
 
 ODD = (0.1, -0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, math.inf, -math.inf, math.nan, 1 / 3)
@@ -259,7 +259,7 @@ def test_failed_write_leaves_the_former_files(result: Result, tmp_path: Path, mo
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cosim.results.folder.write_summary", full)
+    monkeypatch.setattr("cosim.results.results_folder.write_summary", full)
     with pytest.raises(OutputError, match="No space left"):
         write_results(replace(result, table=result.table[:1]), tmp_path)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before

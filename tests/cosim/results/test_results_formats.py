@@ -20,11 +20,11 @@ from scipy.io import loadmat
 
 from cosim import load_result
 from cosim.errors import OutputError
-from cosim.results.folder import check_writable, read_results, write_results
 from cosim.results.formats import about
-from cosim.results.formats.catalogue import FORMATS, format_of
 from cosim.results.formats.headings import split_unit, with_unit
+from cosim.results.formats.known_formats import FORMATS, format_of
 from cosim.results.result import Result, SignalInfo
+from cosim.results.results_folder import check_writable, read_results, write_results
 
 COMPLETE = tuple(name for name, item in FORMATS.items() if item.keeps)
 
@@ -199,7 +199,7 @@ def test_any_table_of_a_folder_brings_its_units_and_telegrams(name: str, tmp_pat
 
 
 def test_format_without_its_package_is_refused_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cosim.results.formats.catalogue.is_installed", lambda package: package != "pyarrow")
+    monkeypatch.setattr("cosim.results.formats.known_formats.is_installed", lambda package: package != "pyarrow")
     check_writable(tmp_path, ("csv", "hdf5"))
     with pytest.raises(OutputError, match=r"needs the package pyarrow: pip install 'fmu-observer\[parquet\]'"):
         check_writable(tmp_path, ("csv", "parquet"))
@@ -211,7 +211,7 @@ def test_format_without_its_package_is_refused_before_the_run(tmp_path: Path, mo
 def test_folder_is_read_from_a_table_whose_package_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_results(odd_result(), tmp_path, ("parquet", "csv"))
     (tmp_path / "table.parquet").write_bytes(b"")
-    monkeypatch.setattr("cosim.results.folder.is_installed", lambda _: False)
+    monkeypatch.setattr("cosim.results.results_folder.is_installed", lambda _: False)
     assert_same(odd_result(), read_results(tmp_path))
 
 

@@ -15,8 +15,8 @@ from odd_results import bits, odd_result
 
 from cosim import load_result
 from cosim.errors import OutputError
-from cosim.results.folder import write_results
 from cosim.results.result import SignalInfo
+from cosim.results.results_folder import write_results
 
 NAN = math.nan
 SI = {"v": SignalInfo("v", "m/s", "km/h")}

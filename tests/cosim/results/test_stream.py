@@ -29,11 +29,11 @@ from cosim.errors import CosimError, OutputError
 from cosim.provenance import rerun
 from cosim.results import recorder as recorder_module
 from cosim.results import stream as stream_module
-from cosim.results.folder import read_results
 from cosim.results.formats.growing_npy import growing_header, read_grown
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, SignalInfo
+from cosim.results.results_folder import read_results
 from cosim.results.si import InFormerUnits
 from cosim.results.stream import Stream
 from plant_models.hybrid.units import Unit, parse_unit

@@ -16,7 +16,7 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 
 SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "step negative": ({"step": -0.01}, "step must be positive"),

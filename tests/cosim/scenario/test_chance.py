@@ -24,7 +24,7 @@ from cosim.network.chance import Chance
 from cosim.network.settings import NetworkSettings, Node
 from cosim.provenance.rerun import rerun
 from cosim.run.outcome import Outcome
-from cosim.tuning.seeds import drawn, with_seed
+from cosim.tuning.shifted_seeds import drawn, with_seed
 from fmu_observer import OBSERVERS
 from fmus import Batch, cached_fmu
 from plant_models import PLANTS

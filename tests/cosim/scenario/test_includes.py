@@ -16,7 +16,7 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 from cosim.scenario.merging import merge
 
 Write = Callable[[str, str], Path]

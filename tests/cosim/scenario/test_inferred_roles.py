@@ -9,7 +9,7 @@ import pytest
 from small_scenarios import small
 
 from cosim import Scenario
-from cosim.report.page.verdict import verdict_facts
+from cosim.report.page.run_statements import verdict_facts
 from cosim.run.signal_roles import ROLES
 from cosim.studies.measures import error_measures
 

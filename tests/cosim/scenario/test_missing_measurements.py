@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 import cosim
 import fmus
 from cosim.errors import CosimError, CouplingError
-from cosim.results.folder import write_results
+from cosim.results.results_folder import write_results
 from fmu_observer.annotated_variable import can_be_missing
 from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmus import cached_fmu

@@ -6,7 +6,7 @@ import pytest
 
 from cosim import Scenario
 from cosim.scenario.shipped import shipped_scenarios
-from cosim.structure.structure import Structure
+from cosim.structure.run_structure import Structure
 
 NAMES = sorted({*shipped_scenarios()} - {"own_fmu"})  # that one waits for a file of the user's
 

@@ -12,7 +12,7 @@ from test_fmus.typed import expected, typed_fmu
 
 import cosim
 from cosim.errors import CosimError, CouplingError, ScenarioError
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 from cosim.run.starts import start_values
 
 FILE = """

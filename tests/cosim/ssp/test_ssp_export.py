@@ -20,7 +20,7 @@ from ssp_files import connector, described_fmu, ramp_fmu, sum_fmu
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 from cosim.scenario.scenario_tables import ConnectionTable
 
 SCHEMAS = {"ssd": "Description", "ssv": "ParameterValues"}

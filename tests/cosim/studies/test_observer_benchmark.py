@@ -19,6 +19,7 @@ from cosim.errors import RunError, ScenarioError
 from cosim.evaluation.metrics import ErrorSize, PhaseMetrics, phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
+from cosim.observer_benchmark.benchmark import ObserverBenchmark, benchmark_observers
 from cosim.observer_benchmark.candidates import find_candidates
 from cosim.observer_benchmark.observer_scores import (
     CertifiedGap,
@@ -29,9 +30,8 @@ from cosim.observer_benchmark.observer_scores import (
     telegram_outcomes,
 )
 from cosim.observer_benchmark.observer_table import certified, certified_limit
-from cosim.observer_benchmark.observers import ObserverBenchmark, benchmark_observers
 from cosim.observer_benchmark.playback import find_sides, known_facts, train_observers
-from cosim.results.load import load_result
+from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
 

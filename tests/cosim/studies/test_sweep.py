@@ -14,11 +14,11 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.errors import ComparisonError, CosimError, OutputError, RunError, ScenarioError
 from cosim.master.master import Master
-from cosim.results.folder import read_results
+from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
 from cosim.studies.sampling import uniform
 from cosim.studies.seed_rows import seed_file
-from cosim.studies.seeds import seed_study
+from cosim.studies.seed_study import seed_study
 from cosim.studies.sweep_result import SweepResult
 
 MASSES = [70e3, 110e3]

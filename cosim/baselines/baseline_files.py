@@ -1,0 +1,258 @@
+"""Baselines on disk: ``NAME.json`` says what was run, ``NAME.csv`` holds rows, ``NAME.events.csv`` telegrams.
+
+Written so that a version control system shows what changed: one row a line, columns in alphabetical order, a line feed
+at the end of each, no time of day and no absolute paths. Files that would not change are not touched.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+from cosim.baselines.baseline import Baseline, Header
+from cosim.baselines.baseline_tables import parse_events, parse_table
+from cosim.baselines.draft import BaselineDraft, make_draft, text_digest
+from cosim.baselines.header_data import header_data, header_from, is_newer
+from cosim.baselines.recipe import Recipe
+from cosim.comparison.tolerance import Tolerances
+from cosim.errors import BaselineError, OutputError, nearest
+from cosim.results.result import Result
+from cosim.results.summary_file import jsonable
+
+Change = Literal["new", "changed", "unchanged"]
+MARKERS = ("<<<<<<< ", "=======", ">>>>>>> ")
+HOW_TO_MAKE = "Make it with 'cosim baseline make', or with 'pytest --fmu-baseline=update' where a test uses it."
+
+
+def parts(path: Path) -> dict[str, Path]:
+    """The files of a baseline by what they hold; `path` is that of the JSON file."""
+    return {"header": path, "table": path.with_suffix(".csv"), "events": path.with_suffix(".events.csv")}
+
+
+def baseline_path(path: str | Path) -> Path:
+    """The JSON file of a baseline, whichever of its files was named.
+
+    Args:
+        path: the JSON file, its table or its telegrams.
+    """
+    path = Path(path)
+    name = path.name.removesuffix(".json").removesuffix(".csv").removesuffix(".events")
+    return path.with_name(name + ".json")
+
+
+def is_baseline(path: str | Path) -> bool:
+    """Whether a path is that of a baseline: a JSON file that says so. Nothing is checked beyond that.
+
+    Args:
+        path: the file.
+    """
+    path = Path(path)
+    if path.suffix != ".json" or not path.is_file():
+        return False
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return '"fmu-observer baseline"' in file.read(10_000)
+
+
+def write_baseline(
+    result: Result,
+    path: str | Path,
+    *,
+    tolerances: Tolerances | None = None,
+    recipe: Recipe | None = None,
+    signals: Iterable[str] | None = None,
+    every: float | None = None,
+) -> Change:
+    """Write a baseline of a result.
+
+    Args:
+        result: of a run that was found right. path: of the JSON file; the CSV stands beside it.
+        tolerances, recipe, signals, every: as for `make_draft`.
+
+    Returns:
+        ``new``, ``changed``, or ``unchanged`` where the files say the same already; they are then not touched.
+
+    Raises:
+        BaselineError: the run failed or is empty, or a pattern fits no signal.
+        OutputError: the files cannot be written; former ones are then still whole.
+    """
+    return write_draft(make_draft(result, tolerances, recipe=recipe, signals=signals, every=every), path)
+
+
+def write_draft(draft: BaselineDraft, path: str | Path) -> Change:
+    """Write a draft, see `write_baseline`.
+
+    Args:
+        draft: what the files are to hold.
+        path: the JSON file; the tables stand beside it.
+    """
+    path = baseline_path(path)
+    change = change_by(draft, path)
+    if change != "unchanged":
+        write_texts(draft_texts(draft, path), path)
+    return change
+
+
+def draft_texts(draft: BaselineDraft, path: Path) -> dict[str, str]:
+    """What each file of a baseline at `path` is to hold.
+
+    Args:
+        draft: what the files are to hold.
+    """
+    data = jsonable(header_data(draft.header, path.parent))
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return {"header": text, "table": draft.table, "events": draft.events}
+
+
+def write_texts(texts: dict[str, str], path: Path) -> None:
+    """Write the files of a baseline, the header last; an empty text removes its file.
+
+    Args:
+        texts: content by name of the file.
+        path: the JSON file.
+
+    Raises:
+        OutputError: a file cannot be written, or a table that belongs to no baseline is in the way.
+    """
+    demand_free(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as scratch:
+            for kind in ("table", "events", "header"):
+                (Path(scratch) / kind).write_text(texts[kind], encoding="utf-8", newline="\n")
+            for kind in ("table", "events", "header"):
+                if texts[kind]:
+                    (Path(scratch) / kind).replace(parts(path)[kind])
+                else:
+                    parts(path)[kind].unlink(missing_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(
+            f"The baseline {path} could not be written: {reason}. Former files are still whole."
+        ) from error
+
+
+def demand_free(path: Path) -> None:
+    """Refuse to write a table over one that belongs to no baseline: somebody's inputs, say.
+
+    Args:
+        path: of the table.
+
+    Raises:
+        OutputError: there is one.
+    """
+    for kind in ("table", "events"):
+        if parts(path)[kind].exists() and not path.exists():
+            raise OutputError(
+                f"{parts(path)[kind]} exists and belongs to no baseline ({path.name} is not there); it is not "
+                f"overwritten. "
+                "Give the baseline another name, or remove the file."
+            )
+
+
+def change_by(draft: BaselineDraft, path: Path) -> Change:
+    """What writing a draft would do. Other versions alone are no change: nothing else is to be seen in them.
+
+    Args:
+        draft: what the files are to hold.
+        path: the JSON file.
+    """
+    if not path.exists():
+        return "new"
+    former = {kind: _text(file) for kind, file in parts(path).items()}
+    wanted = draft_texts(draft, path)
+    if any(former[kind] != wanted[kind] for kind in ("table", "events")):
+        return "changed"
+    try:
+        before, after = json.loads(former["header"]), json.loads(wanted["header"])
+    except ValueError:
+        return "changed"
+    for data in (before, after):
+        data.pop("versions", None)
+    return "unchanged" if before == after else "changed"
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")  # line endings become line feeds
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def read_baseline(path: str | Path) -> Baseline:
+    """Read a baseline.
+
+    Args:
+        path: of its JSON file, or of one of the tables beside it.
+
+    Returns:
+        The baseline; its `notes` tell what was odd and did not matter.
+
+    Raises:
+        BaselineError: it is missing, unreadable, cut off, in conflict after a merge, or of another version of the
+        layout.
+    """
+    path = baseline_path(path)
+    header = _read_header(path)
+    files = parts(path)
+    table = _demanded(files["table"], f"it belongs to {path.name}")
+    events = _demanded(files["events"], f"{path.name} speaks of {header.events} telegrams") if header.events else ""
+    result = Result(
+        table=parse_table(table, header, files["table"]),
+        signals=tuple(header.signals),
+        events=tuple(parse_events(events, header, files["events"])),
+        summary=summary_of(header),
+    )
+    notes = [f"{path.name} was written by a newer version of the layout ({header.version})."] * is_newer(header.version)
+    if text_digest(table, events) != header.digest:
+        notes.append(f"{files['table'].name} is not as it was written: edited by hand, or merged.")
+    return Baseline(header, result, path, notes)
+
+
+def summary_of(header: Header) -> dict[str, Any]:
+    """What a run would say of itself, as far as the header tells.
+
+    Args:
+        header: what the baseline says of itself.
+    """
+    components = [
+        {key: getattr(entry, key) for key in entry.__dataclass_fields__} | {"source": entry.file}
+        for entry in header.components
+    ]
+    summary: dict[str, Any] = {"title": header.title, "versions": dict(header.versions), **header.span}
+    return summary | {"components": components, "events_recorded": header.events is not None}
+
+
+def _read_header(path: Path) -> Header:
+    if not path.is_file():
+        others = sorted(other.name for other in path.parent.glob("*.json")) if path.parent.is_dir() else []
+        near = f" {path.parent} holds others; {nearest(path.name, others)}" if others else ""
+        raise BaselineError(f"There is no baseline {path}.{near} {HOW_TO_MAKE}")
+    text = _demanded(path, "it is the header of a baseline")
+    try:
+        return header_from(json.loads(text), path.parent)
+    except json.JSONDecodeError as error:
+        raise BaselineError(f"{path}, line {error.lineno}: not readable as JSON: {error.msg}. {_AGAIN}") from error
+    except BaselineError as error:
+        raise BaselineError(f"{path}: {error}") from error
+
+
+_AGAIN = "Restore it from version control, or make it again."
+
+
+def _demanded(path: Path, why: str) -> str:
+    """The text of a file that must be there, without conflicts of a merge."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise BaselineError(f"{path} is missing: {why}. {_AGAIN}") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise BaselineError(f"{path} cannot be read: {error}. {_AGAIN}") from error
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith(MARKERS[::2]) or line == MARKERS[1]:
+            raise BaselineError(
+                f"{path}, line {number}: holds the conflict of a merge ({line[:7]}). Decide it, or make it again."
+            )
+    return text

@@ -1,0 +1,157 @@
+"""Check a result against a baseline: refuse what has nothing to do with it, compare, and say what else was
+different.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from cosim.baselines.baseline import Baseline
+from cosim.baselines.draft import resolved, versions_of
+from cosim.baselines.kept_signals import resolve
+from cosim.baselines.model_identity import identities, same_models
+from cosim.comparison.compare import compare_results
+from cosim.comparison.tolerance import Tolerance, Tolerances
+from cosim.comparison.verdict import Comparison
+from cosim.errors import BaselineError, ComparisonError
+from cosim.results.result import Result
+from cosim.results.summary_file import jsonable
+from cosim.run.outcome import Outcome
+
+MODELS = ("FMU", "block")
+"""Components that are models; a recording that is played back is not."""
+
+
+@dataclass(frozen=True)
+class Regression(Comparison):
+    """A comparison with a baseline.
+
+    Args:
+        outcome: of the run; None where only a result was given. actual: the result.
+        baseline: None where there is none yet (while baselines are written).
+    """
+
+    outcome: Outcome | None = None
+    actual: Result | None = None
+    baseline: Baseline | None = None
+
+
+def check(
+    result: Result | Outcome, baseline: Baseline, tolerances: Tolerances | None = None, *, label: str = "result"
+) -> Regression:
+    """Compare a result with a baseline.
+
+    Args:
+        result: of a run, or its outcome. baseline: what it should be like.
+        tolerances: those of the baseline where none are given. label: what the result is called.
+
+    Raises:
+        BaselineError: the baseline is of another model.
+        ComparisonError: the run is empty, or has no signal of the baseline.
+    """
+    outcome = result if isinstance(result, Outcome) else None
+    actual = result if isinstance(result, Result) else result.result
+    demand_same_models(actual, baseline)
+    if not len(actual.table):
+        raise ComparisonError(f"The run is empty: it has no rows to compare with {baseline.label}.")
+    names = [info.name for info in (*baseline.result.signals, *actual.signals)]
+    comparison = compare_results(
+        baseline.result,
+        _told(_selected(actual, baseline)),
+        resolved(tolerances or baseline.tolerances, names),
+        labels=(baseline.label, label),
+    )
+    notes = (*baseline.notes, *_notes(actual, baseline), *comparison.notes)
+    return regression(replace(comparison, notes=notes), outcome, actual, baseline)
+
+
+def regression(
+    comparison: Comparison, outcome: Outcome | None, actual: Result, baseline: Baseline | None
+) -> Regression:
+    """A comparison with the run behind it.
+
+    Args:
+        comparison: what was found.
+        outcome: the run; None for a result of an earlier one.
+        actual: what was compared with the baseline.
+        baseline: what it was held against; None where it was made now.
+    """
+    given: dict[str, Any] = {entry.name: getattr(comparison, entry.name) for entry in fields(Comparison)}
+    return Regression(**given, outcome=outcome, actual=actual, baseline=baseline)
+
+
+def demand_same_models(result: Result, baseline: Baseline) -> None:
+    """Refuse a result of another model; the same model with another GUID is a new delivery.
+
+    Args:
+        result: the run.
+        baseline: the baseline.
+
+    Raises:
+        BaselineError: a component is of another model; says both.
+    """
+    for before, now in same_models(baseline.header.components, identities(result)):
+        if before.kind in MODELS and now.kind in MODELS and before.model and now.model and before.model != now.model:
+            raise BaselineError(
+                f"{baseline.label} is a baseline of another FMU: {before.name} was the model '{before.model}' "
+                f"(GUID {before.guid}), the run used the model '{now.model}' (GUID {now.guid}). "
+                "Run the model of the baseline, or make a new baseline."
+            )
+
+
+def _selected(result: Result, baseline: Baseline) -> Result:
+    """The result without the signals that the baseline was not to keep, so that they are not called extra."""
+    if baseline.header.selection is None:
+        return result
+    kept = {info.name for info in baseline.result.signals}
+    names = [info.name for info in result.signals]
+    patterns = [resolve(pattern, names) for pattern in baseline.header.selection]
+    fitting = Tolerances(ignore=tuple(patterns))
+    shown = [info for info in result.signals if info.name in kept or fitting.ignores(info.name)]
+    if not shown:  # so that the comparison can name what is near
+        return result
+    return replace(result, table=result.table[["time", *(info.name for info in shown)]], signals=shown)
+
+
+def _told(result: Result) -> Result:
+    """The result with a summary as a header would tell it, so that the comparison's notes name what really differs."""
+    if "components" not in result.summary:
+        return result
+    summary = {**result.summary, "components": jsonable(result.summary["components"]), "versions": versions_of(result)}
+    return replace(result, summary=summary)
+
+
+def _notes(result: Result, baseline: Baseline) -> Iterable[str]:
+    """What the comparison of two results does not say itself."""
+    for before, now in same_models(baseline.header.components, identities(result)):
+        if before.guid == now.guid and before.sha256 and now.sha256 and before.sha256 != now.sha256:
+            yield f"{before.name}: the file {now.file} is not the one of the baseline, though it has the same GUID."
+        elif before.guid != now.guid and now.kind == "FMU" and before.fmi_version == now.fmi_version:
+            yield f"{before.name}: a new delivery of the model '{now.model}'."
+        for name in sorted({*before.options, *now.options}):
+            old, new = before.options.get(name, "its default"), now.options.get(name, "its default")
+            if old != new:
+                yield f"{before.name}: option {name} is {new} instead of {old}."
+
+
+def tolerances_of(
+    base: Tolerances, tolerance: Any = None, by_signal: Mapping[str, Any] | None = None, ignore: Iterable[str] = ()
+) -> Tolerances:
+    """Tolerances as a test gives them, on top of others.
+
+    Args:
+        base: used where nothing is given. tolerance: default, as for `cosim.comparison.tolerance.tolerance`.
+        by_signal: by name or pattern. ignore: names or patterns.
+
+    Raises:
+        ComparisonError: they cannot be.
+    """
+    default = Tolerances.of(tolerance).default if tolerance is not None else base.default
+    given = Tolerances.of(default, by_signal, ignore)
+    merged: dict[str, Tolerance] = {
+        **given.by_signal,
+        **{k: v for k, v in base.by_signal.items() if k not in given.by_signal},
+    }
+    return Tolerances(default, merged, (*base.ignore, *(name for name in given.ignore if name not in base.ignore)))

@@ -1,0 +1,258 @@
+"""``cosim baseline``: make, check, show and update baselines, put them into an FMU and take them out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cosim.baselines import check, read_baseline
+from cosim.baselines.baseline_files import baseline_path, write_texts
+from cosim.baselines.header_data import header_data
+from cosim.baselines.recipe import Recipe
+from cosim.baselines.references import embed_baseline, find_references, read_reference
+from cosim.baselines.references.extract import extract_reference
+from cosim.baselines.subject import Subject, make_subject, run_again
+from cosim.baselines.update import plan_update
+from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
+from cosim.cli.baseline_text import print_change, print_comparison, print_header
+from cosim.cli.output import print_json, print_paths, print_warning
+from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
+from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
+from cosim.comparison.tolerance import Tolerances
+from cosim.components.description import read_description
+from cosim.errors import BaselineError
+from cosim.results.load_result import load_result
+from fmus.cli.commands import Action, Actions, Argument, Execute, Group, argument
+from fmus.cli.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from cosim.baselines import Baseline, Regression
+    from cosim.baselines.subject import Subject
+    from cosim.comparison.tolerance import Tolerances
+
+DONE, DIFFERS = 0, 1
+EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
+
+
+FILE = argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
+FORCE = argument("--force", action="store_true", help="replace a baseline that is there already")
+ALLOWED = Group(TOLERANCES, "tolerances", "those in the baseline, or the usual ones, where not given")
+OUTPUT = (argument("--json", action="store_true", help="print JSON instead of text"), QUIET)
+MAKE = (
+    argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"),
+    FILE,
+    settings_argument(f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input"),
+    argument("--inputs", metavar="TABLE", help="of an FMU: a table with a column for each input"),
+    argument(
+        "--between",
+        nargs="+",
+        default=[],
+        metavar="[NAME=]hold|linear",
+        help="what inputs of the table do between its rows (default: linear, held where discrete)",
+    ),
+    argument("--start", type=float, metavar="SECONDS", help="begin of the run [s]"),
+    argument("--stop", type=float, metavar="SECONDS", help="end of the run [s]"),
+    argument("--step", type=float, metavar="SECONDS", help="communication step of the run [s]"),
+    argument(
+        "--record", nargs="+", default=[], metavar="NAME", help="of an FMU: variables to record besides the outputs"
+    ),
+    argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="signals to keep (default: all)"),
+    argument("--every", type=float, metavar="SECONDS", help="least spacing of the rows [s] (default: about 2000 rows)"),
+    FORCE,
+    ALLOWED,
+)
+CHECK = (
+    argument("file", metavar="FILE.json", help="the baseline, or an FMU that holds references"),
+    argument("--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare"),
+    argument("--reference", metavar="NAME", help="of several references in an FMU: this one only"),
+    argument("--plots", metavar="DIR", help="write a page with pictures of what differs to this folder"),
+    argument("--verbose", action="store_true", help="print all signals and everything that was found"),
+    ALLOWED,
+)
+EMBED = (
+    FILE,
+    argument("fmu", metavar="FMU", help="the FMU that the baseline is of"),
+    argument("-o", "--output", metavar="COPY.fmu", required=True, help="the copy; may be the FMU itself"),
+    argument("--name", help="of the reference (default: that of the baseline)"),
+)
+EXTRACT = (
+    argument("fmu", metavar="FMU", help="the FMU that holds it"),
+    FILE,
+    argument("--reference", metavar="NAME", help="which one, where there are several"),
+    FORCE,
+)
+
+
+def _make(options: argparse.Namespace) -> int:
+    path = _free(baseline_path(options.file), options.force)
+    tolerances = chosen_tolerances(options, asked_tolerances(options), Tolerances())
+    subject = _subject(options)
+    given = subject.outcome or subject.result
+    update = plan_update(given, path, tolerances, recipe=subject.recipe, signals=options.signals, every=options.every)
+    return _write(update, path, options)
+
+
+def _subject(options: argparse.Namespace) -> Subject:
+    if Path(options.subject).is_dir():
+        return Subject(Recipe(), load_result(options.subject))
+    with _progress(options) as bar:
+        return make_subject(
+            options.subject,
+            Path(),
+            start=options.start,
+            stop=options.stop,
+            step=options.step,
+            record=options.record,
+            interpolation=between_samples(options.between),
+            progress=bar,
+            warn=print_warning,
+            **_values(options),
+        )
+
+
+def _values(options: argparse.Namespace) -> dict[str, Any]:
+    """What ``--set`` and ``--inputs`` mean: overrides of a scenario; constant inputs and start values of an FMU."""
+    values = dict(parse_setting(setting) for setting in options.settings)
+    if Path(options.subject).suffix.lower() != ".fmu":
+        return {"overrides": values, "inputs": options.inputs}
+    variables = read_description(options.subject, options.subject).modelVariables
+    held = {v.name: values.pop(v.name) for v in variables if v.causality == "input" and v.name in values}
+    if held and options.inputs:
+        raise BaselineError(
+            f"Give the inputs in the table {options.inputs} or with --set, not both: {', '.join(held)}."
+        )
+    return {"inputs": options.inputs or held, "parameters": values}
+
+
+def _check(options: argparse.Namespace) -> int:
+    asked = asked_tolerances(options)
+    found = [_check_one(baseline, asked, options) for baseline in _baselines(options)]
+    if options.json:
+        print_json([one.to_dict() for one in found] if len(found) > 1 else found[0].to_dict())
+    else:
+        for one in found:
+            print_comparison(one, options.verbose)
+    if options.plots:
+        _draw(found, options)
+    return DONE if all(one.equal for one in found) else DIFFERS
+
+
+def _baselines(options: argparse.Namespace) -> list[Baseline]:
+    if Path(options.file).suffix.lower() != ".fmu":
+        return [read_baseline(options.file)]
+    names = [reference.name for reference in find_references(options.file)]
+    if options.reference or len(names) < 2:
+        return [read_reference(options.file, options.reference)]
+    return [read_reference(options.file, name) for name in names]
+
+
+def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) -> Regression:
+    tolerances: Tolerances = chosen_tolerances(options, asked, baseline.tolerances)
+    other = options.against
+    if other is not None and Path(other).suffix.lower() != ".fmu":
+        return check(load_result(other), baseline, tolerances, label=other)
+    with _progress(options) as bar:
+        subject = run_again(baseline, other, bar, print_warning)
+    return check(
+        subject.outcome or subject.result, baseline, tolerances, label=Path(other or subject.recipe.source).name
+    )
+
+
+def _draw(found: list[Regression], options: argparse.Namespace) -> None:
+    from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - matplotlib only for those who draw
+
+    for one in found:
+        folder = Path(options.plots) / one.reference if len(found) > 1 else Path(options.plots)
+        print_paths(write_comparison(one, folder), sys.stderr if options.json else sys.stdout)
+
+
+def _show(options: argparse.Namespace) -> int:
+    baseline = read_baseline(options.file)
+    if options.json:
+        print_json(header_data(baseline.header, baseline.path.parent) | {"notes": list(baseline.notes)})
+    else:
+        print_header(baseline)
+    return DONE
+
+
+def _update(options: argparse.Namespace) -> int:
+    baseline = read_baseline(options.file)
+    tolerances = chosen_tolerances(options, asked_tolerances(options), baseline.tolerances)
+    with _progress(options) as bar:
+        subject = run_again(baseline, None, bar, print_warning)
+    header = baseline.header
+    update = plan_update(
+        subject.outcome or subject.result,
+        baseline.path,
+        tolerances,
+        recipe=header.recipe,
+        signals=header.selection,
+        every=header.every,
+    )
+    return _write(update, baseline.path, options)
+
+
+def _write(update: Any, path: Path, options: argparse.Namespace) -> int:
+    if update.texts:
+        write_texts(update.texts, path)
+    print_change(update, path, options.json)
+    return DONE
+
+
+def _embed(options: argparse.Namespace) -> int:
+    target = embed_baseline(read_baseline(options.file), options.fmu, options.output, options.name)
+    if options.json:
+        print_json({"file": str(target)})
+    else:
+        print(f"{target} holds {options.name or Path(options.file).stem}.")
+    return DONE
+
+
+def _extract(options: argparse.Namespace) -> int:
+    path = _free(baseline_path(options.file), options.force)
+    extract_reference(options.fmu, path, options.reference)
+    if options.json:
+        print_json({"file": str(path)})
+    else:
+        print(f"{path} written.")
+    return DONE
+
+
+def _free(path: Path, force: bool) -> Path:
+    """A path where nothing is lost by writing.
+
+    Raises:
+        BaselineError: a baseline is there already.
+    """
+    if path.exists() and not force:
+        raise BaselineError(
+            f"{path} exists already; accept new outputs with 'cosim baseline update', or replace it with --force."
+        )
+    return path
+
+
+def _progress(options: argparse.Namespace) -> ProgressBar:
+    return simulated_time_bar(silent=options.quiet or options.json)
+
+
+def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | Group]) -> Action:
+    words = {"help": text, "description": f"{text[0].upper()}{text[1:]}."}
+    return Action(name, execute, words, (*OUTPUT, *arguments))
+
+
+PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
+ARGUMENTS = (
+    Actions(
+        (
+            _action("make", _make, "run an FMU or a scenario and keep its outputs", MAKE),
+            _action("check", _check, "run again, or take a given result, and compare", CHECK),
+            _action("show", _show, "show what a baseline is of", (FILE,)),
+            _action("update", _update, "run again and accept the outputs as they are now", (FILE, ALLOWED)),
+            _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", EMBED),
+            _action("extract", _extract, "take a reference (FMI-LS-REF) out of an FMU as a baseline", EXTRACT),
+        )
+    ),
+)

@@ -1,0 +1,159 @@
+"""``cosim compare``: a result against a reference, as text, JSON, page, pictures. Exit codes: 0 equal, 1 different, 2
+error.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
+
+from cosim.baselines import check, is_baseline, read_baseline
+from cosim.cli.output import print_json
+from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
+from cosim.comparison.compare import compare_results
+from cosim.comparison.comparison_text import comparison_text
+from cosim.comparison.tolerance import Tolerances
+from cosim.errors import ComparisonError, nearest
+from cosim.results.load_result import load_result
+from fmus.cli.commands import Group, argument, one_of
+
+if TYPE_CHECKING:
+    from cosim.baselines import Baseline
+    from cosim.comparison.verdict import Comparison
+    from cosim.results.result import Result
+
+EQUAL, DIFFERENT = 0, 1
+NO_TELEGRAMS = "Telegrams and packets were not compared (--no-telegrams)."
+EPILOG = (
+    'A tolerance file is TOML: [default] with absolute, relative, time and time_relative; [signals."train.*"] with the '
+    "same "
+    'keys for the signals that fit; ignore = ["driver.*"]. A value may differ by absolute + relative * range of the '
+    "reference, "
+    "an instant by time + time_relative * length. Exit codes: 0 equal within tolerance, 1 different, 2 error."
+)
+
+KINDS = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
+PARSER = {
+    "description": "Compare a result with a reference: signals in tolerance tubes, telegrams as events.",
+    "epilog": EPILOG,
+}
+ARGUMENTS = (
+    argument("reference", metavar="A", help=f"what is right: {KINDS}"),
+    argument("result", metavar="B", help=f"what is compared with it: {KINDS}"),
+    Group(
+        (
+            *TOLERANCES,
+            argument(
+                "--signals", action="append", metavar="PATTERN", help="compare these signals only; may be repeated"
+            ),
+            argument(
+                "--no-telegrams", action="store_true", help="do not compare balise telegrams and packets of a network"
+            ),
+            argument("--extra-fails", action="store_true", help="signals that only B has are a difference"),
+        ),
+        "what is compared, and how closely",
+        "tolerances that are not given are those of a baseline A, or else the usual ones",
+    ),
+    Group(
+        (
+            argument("--json", action="store_true", help="print the comparison as JSON instead of text"),
+            argument("--html", metavar="FILE", help="write a page with pictures of the signals that differ"),
+            argument("--plots", metavar="DIR", help="write these pictures as PNG files"),
+            one_of(
+                argument("--quiet", action="store_true", help="print the verdict only"),
+                argument("--verbose", action="store_true", help="print all signals and everything that was found"),
+            ),
+        ),
+        "output",
+    ),
+)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Compare, tell, and write what was asked for.
+
+    Args:
+        options: of the command line.
+    """
+    asked = asked_tolerances(options)  # before anything is read: a mistake in them is told at once
+    comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
+    _tell(comparison, options)
+    return EQUAL if comparison.equal else DIFFERENT
+
+
+def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
+    """The comparison; against a baseline it is that of the baseline, which knows its models and its tolerances."""
+    reference, baseline = _load(options.reference)
+    result, other = _load(options.result)
+    tolerances = chosen_tolerances(options, asked, baseline.tolerances if baseline is not None else Tolerances())
+    if options.signals:
+        reference, result = _chosen(reference, result, options.signals)
+    odd = list(other.notes) if other is not None else []
+    if options.no_telegrams:
+        reference, result = (replace(side, events=(), packets=()) for side in (reference, result))
+        odd = [*odd, NO_TELEGRAMS]
+    if baseline is not None:
+        regression = check(result, replace(baseline, result=reference), tolerances, label=options.result)
+        return replace(regression, reference=options.reference, notes=[*regression.notes, *odd])
+    drawn = bool(options.html or options.plots)
+    found = compare_results(reference, result, tolerances, labels=(options.reference, options.result), curves=drawn)
+    return replace(found, notes=[*odd, *found.notes])
+
+
+def _load(path: str) -> tuple[Result, Baseline | None]:
+    """A result, and the baseline where it is of one."""
+    if not is_baseline(path):
+        return load_result(path), None
+    baseline = read_baseline(path)
+    return baseline.result, baseline
+
+
+# -- signals ----------------------------------------------------------------------------------------------------------
+
+
+def _chosen(reference: Result, result: Result, patterns: Sequence[str]) -> tuple[Result, Result]:
+    """Both sides with the signals that fit a pattern only."""
+    both = [list(side.table.dtype.names or ())[1:] for side in (reference, result)]
+    known = list(dict.fromkeys([*both[0], *both[1]]))
+    for pattern in patterns:
+        if not any(_fits(name, pattern) for name in known):
+            raise ComparisonError(f"--signals {pattern!r}: fits no signal of either side; {nearest(pattern, known)}")
+    first, second = ([n for n in names if any(_fits(n, p) for p in patterns)] for names in both)
+    return _columns(reference, first), _columns(result, second)
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return name == pattern or fnmatchcase(name, pattern)
+
+
+def _columns(side: Result, names: Sequence[str]) -> Result:
+    return replace(
+        side, table=side.table[["time", *names]], signals=[info for info in side.signals if info.name in names]
+    )
+
+
+# -- telling ----------------------------------------------------------------------------------------------------------
+
+
+def _tell(comparison: Comparison, options: argparse.Namespace) -> None:
+    """Text or JSON first, so that it is seen also where a file cannot be written."""
+    if options.json:
+        print_json(comparison.to_dict())
+    else:
+        text = comparison_text(comparison, verbose=options.verbose)
+        print(text.splitlines()[0] if options.quiet else text)
+    if not (options.html or options.plots):
+        return
+    from cosim.report.page.comparison import write_page, write_pictures  # noqa: PLC0415 - matplotlib only for those who look
+
+    lines = [f"{'page':>10}: {write_page(comparison, options.html)}"] if options.html else []
+    if options.plots:
+        drawn = write_pictures(comparison, options.plots)
+        lines += [f"{'picture':>10}: {path}" for path in drawn.values()] or [
+            "no pictures: nothing that differs can be drawn"
+        ]
+    if not (options.json or options.quiet):
+        print("", *lines, sep="\n")

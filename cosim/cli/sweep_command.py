@@ -1,0 +1,157 @@
+"""``cosim sweep``: one scenario run many times with some values changed; a folder for each run, a table of all."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from cosim import studies
+from cosim.cli.arguments import QUIET, scenario_arguments
+from cosim.cli.scenarios import load_scenario, parse_setting
+from cosim.errors import ScenarioError, nearest
+from cosim.results.results_folder import check_writable
+from cosim.scenario.override import CASE
+from cosim.simulation.scenario import Scenario
+from cosim.studies.sampling import MOST, Range, uniform
+from cosim.studies.sweep import Sweep
+from fmus.cli.commands import argument
+from fmus.cli.progress import ProgressBar
+
+DONE, SOME_FAILED = 0, 1
+RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
+VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
+a range, with --samples"""  # noqa: E501
+
+PARSER = {
+    "description": (
+        "Run a scenario once for each combination of some values. A run that fails does not stop the others."
+    ),
+    "epilog": (
+        "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
+    ),
+}
+ARGUMENTS = (
+    *scenario_arguments(default=None),
+    argument("--vary", action="append", default=[], metavar="NAME=VALUES", help=VARY),
+    argument("--cases", action="store_true", help="run all cases of the scenario, each with all --vary"),
+    argument("--by", metavar="NAME", help="one line for each value of NAME, such as case: means of its runs"),
+    argument(
+        "--zip", action="store_true", help="first values together, then second ones, ... instead of all combinations"
+    ),
+    argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists"),
+    argument("--seed", type=int, default=0, help="of the points (default: 0)"),
+    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)"),
+    argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)"),
+    argument("--table-only", action="store_true", help="keep the table, and no results folder for each run"),
+    argument("--resume", action="store_true", help="take over the runs that are done in the folder already"),
+    argument("--json", action="store_true", help="print the table as JSON"),
+    QUIET,
+)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run, write each run as soon as it is done, and print the table.
+
+    Args:
+        options: of the command line.
+    """
+    scenario = load_scenario(options)
+    sweep = _sweep(scenario, options)
+    directory = check_writable(
+        Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep"
+    )
+    with ProgressBar("run", silent=options.quiet or options.json) as bar:
+        result = sweep.run(
+            options.workers,
+            progress=bar,
+            keep=False,
+            directory=directory.absolute(),
+            folders=not options.table_only,
+            resume=options.resume,
+        )
+    if options.by is not None:
+        studies.write_groups(result, options.by, directory)
+    if options.json:
+        print((directory / "index.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(result.text() if options.by is None else studies.groups_text(result, options.by))
+        print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
+    return SOME_FAILED if result.failed else DONE
+
+
+def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:
+    """What is run.
+
+    Raises:
+        ScenarioError: options exclude one another, or nothing is varied.
+    """
+    if options.zip and options.samples is not None:
+        raise ScenarioError("--zip and --samples exclude each other.")
+    mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
+    values = (_cases(scenario, options.settings, options.zip) if options.cases else {}) | _values(options.vary)
+    if not values:
+        raise ScenarioError("Nothing is varied: give --vary NAME=VALUES, or --cases for a scenario with cases.")
+    if options.cases and not scenario.cases:
+        raise ScenarioError(f"--cases: {scenario.name} has no cases; expected tables [cases.NAME] in it.")
+    if options.by is not None and options.by not in values:
+        raise ScenarioError(f"--by {options.by}: this is not varied; {nearest(options.by, list(values))}")
+    if options.samples is None and (ranges := [name for name, given in values.items() if isinstance(given, Range)]):
+        raise ScenarioError(
+            f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
+        )
+    return scenario.vary(values, mode, count=options.samples, seed=options.seed)
+
+
+def _cases(scenario: Scenario, settings: list[str], zipped: bool) -> dict[str, list[Any]]:
+    """All cases, and what ``--set`` says of values that a case sets too: that wins, as it does for one run."""
+    told = {name for values in scenario.cases.values() for name in values}
+    given = dict(parse_setting(text) for text in settings)
+    times = len(scenario.cases) if zipped else 1
+    return {CASE: list(scenario.cases)} | {name: [value] * times for name, value in given.items() if name in told}
+
+
+def _values(given: list[str]) -> dict[str, Any]:
+    """Names and values of all ``--vary``.
+
+    Raises:
+        ScenarioError: one is not ``NAME=VALUES``, or a name is given twice.
+    """
+    values: dict[str, Any] = {}
+    for text in given:
+        name, sign, listed = (part.strip() for part in text.partition("="))
+        if not (name and sign and listed):
+            raise ScenarioError(
+                f"--vary {text!r}: expected NAME=VALUES, for instance --vary locomotive.mass=70e3,80e3."
+            )
+        if name in values:
+            raise ScenarioError(f"--vary {name} is given twice; write all values in one list.")
+        values[name] = parse_values(listed)
+    return values
+
+
+def parse_values(text: str) -> Any:
+    """``70e3,80e3``, ``0:10``, ``0:10:2`` or ``70e3..90e3`` as a list or a range; each value TOML where it is that,
+    else text.
+
+    Raises:
+        ScenarioError: a range without numbers in it.
+    """
+    if (match := RANGE.fullmatch(text)) is not None:
+        numbers = range(int(match[1]), int(match[2]), int(match[3] or 1) or 1)
+        if not numbers:
+            raise ScenarioError(f"--vary: {text} holds no numbers; 0:10 are those from 0 to 9.")
+        return list(numbers) if len(numbers) <= MOST else numbers  # too many are refused by their number, not listed
+    if (match := SPAN.fullmatch(text)) is not None:
+        try:
+            return uniform(float(match[1]), float(match[2]))
+        except ScenarioError as error:
+            raise ScenarioError(f"--vary: {text}: {error}") from error
+    try:
+        return list(tomllib.loads(f"value = [{text}]")["value"])
+    except tomllib.TOMLDecodeError:
+        return [parse_setting(f"value={part}")[1] for part in text.split(",")]

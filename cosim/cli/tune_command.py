@@ -1,0 +1,145 @@
+"""``cosim tune``: parameters searched for the smallest cost over several seeds, and judged with others."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from cosim.cli.arguments import QUIET, positive, scenario_arguments
+from cosim.cli.output import print_json
+from cosim.cli.scenarios import load_scenario, parse_setting
+from cosim.errors import ScenarioError
+from cosim.results.results_folder import check_writable
+from cosim.simulation.scenario import Scenario
+from cosim.tuning.parameters import Bounds
+from cosim.tuning.tune import tune
+from cosim.tuning.tuning_result import Tuning
+from fmus.cli.commands import argument
+from fmus.cli.progress import ProgressBar
+
+DONE, NOT_BETTER = 0, 1
+
+
+def _seeds(text: str) -> list[int]:
+    """``3``, ``0:4`` (0 to 3) or ``1,5,7``."""
+    try:
+        if ":" in text:
+            first, last = text.split(":")
+            found = list(range(int(first), int(last)))
+        else:
+            found = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected seeds such as 3, 0:4 or 1,5,7 (got {text!r})") from None
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text} holds no seeds; 0:4 are those from 0 to 3")
+    return found
+
+
+PARSER = {
+    "description": (
+        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and "
+        "judge the best with other seeds. An observer that only listens is run beside one recording of the plant a"
+        " seed."
+    ),
+    "epilog": (
+        "Exit codes: 0 done, 1 the judging seeds do not show that it became better, 2 error or interrupted; the "
+        "history is in the folder, --resume goes on with it."
+    ),
+}
+ARGUMENTS = (
+    *scenario_arguments(default=None),
+    argument("--observer", metavar="NAME", help="component that is tuned, or a shipped observer"),
+    argument(
+        "--parameters",
+        nargs="+",
+        required=True,
+        metavar="NAME=LOW:HIGH[:log]",
+        help="parameters with bounds: of the observer, or component.parameter; process_covariance[1,1] for a diagonal",
+    ),
+    argument(
+        "--method", default="bbo", metavar="NAME", help="bbo (default), pso, ga, cma, gradient, hand, or a full name"
+    ),
+    argument(
+        "--option", action="append", default=[], metavar="NAME=VALUE", help="of the method, such as population=30"
+    ),
+    argument(
+        "--cost",
+        default="state",
+        metavar="COST",
+        help="state (default), state:estimate=component.signal,..., likelihood, nis, expectation:NUMBER, or a measure "
+        "such as speed_error_rms; with a minus sign (--cost=-NAME) the largest is wanted",
+    ),
+    argument("--seeds", type=_seeds, default=[0], metavar="0:4", help="for training (default: 0)"),
+    argument("--judge", type=_seeds, default=[], metavar="10:20", help="for judging before and after"),
+    argument("--iterations", type=positive, default=20, metavar="N", help="default: 20"),
+    argument(
+        "--searches", type=positive, default=1, metavar="N", help="searches, each with another seed of the method"
+    ),
+    argument("--workers", type=positive, default=1, metavar="W", help="processes at a time (default: 1)"),
+    argument("--out", metavar="DIR", help="folder for history and results (default: results/NAME_tuned)"),
+    argument("--resume", action="store_true", help="take over the evaluations that are in the folder already"),
+    argument("--whole-runs", action="store_true", help="run the whole scenario, also where a recording would do"),
+    argument("--json", action="store_true", help="print the data as JSON"),
+    QUIET,
+)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Search, write and print.
+
+    Args:
+        options: of the command line.
+    """
+    scenario = load_scenario(options)
+    directory = check_writable(
+        Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"
+    )
+    found = _tuned(scenario, options, directory)
+    if options.json:
+        print_json(found.to_data())
+    else:
+        print(found.text())
+        print(f"\nTuned scenario: {directory / 'tuned.toml'}")
+    if found.interrupted:
+        raise KeyboardInterrupt  # all there is has been printed
+    return NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
+
+
+def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> Tuning:
+    with ProgressBar("run", silent=options.quiet or options.json) as bar:
+        return tune(
+            scenario,
+            dict(_bounds(text) for text in options.parameters),
+            observer=options.observer,
+            method=options.method,
+            cost=options.cost,
+            seeds=options.seeds,
+            judge=options.judge,
+            iterations=options.iterations,
+            searches=options.searches,
+            options=dict(parse_setting(text) for text in options.option),
+            workers=options.workers,
+            directory=directory,
+            resume=options.resume,
+            whole_runs=options.whole_runs,
+            progress=bar,
+        )
+
+
+def _bounds(text: str) -> tuple[str, Bounds]:
+    """``name=low:high`` or ``name=low:high:log``.
+
+    Raises:
+        ScenarioError: it is something else.
+    """
+    name, sign, limits = (part.strip() for part in text.partition("="))
+    low, *rest = limits.split(":")
+    try:
+        if not (name and sign) or len(rest) not in {1, 2} or rest[1:] not in ([], ["log"]):
+            raise ValueError
+        return name, (float(low), float(rest[0]), len(rest) == 2)
+    except ValueError:
+        raise ScenarioError(
+            f"--parameters {text!r}: expected NAME=LOW:HIGH or NAME=LOW:HIGH:log, such as theta=0.1:5; an optimiser "
+            "does not search without bounds."
+        ) from None

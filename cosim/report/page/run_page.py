@@ -1,0 +1,139 @@
+"""The report of a run: one HTML page that needs nothing else, and its figures as files. Touches only the folder it is
+given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cosim.evaluation.balise_gaps import ENVELOPE, gap_errors
+from cosim.evaluation.cost import was_compiled
+from cosim.evaluation.event_counts import count_events
+from cosim.evaluation.facts import list_entry, mapping_entry, statement
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.phase_details import phase_details
+from cosim.evaluation.result_warnings import all_warnings
+from cosim.evaluation.spec import ReportSpec
+from cosim.expectations.judged import Judged
+from cosim.report.figures.panel import Panel
+from cosim.report.figures.panels import draw_all, panels
+from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
+from cosim.report.page import run_tables
+from cosim.report.page.gaps import gaps_table
+from cosim.report.page.page_files import explained, page_bytes, write_file, write_page
+from cosim.report.page.phases import errors_table, phases_table
+from cosim.report.page.render import render
+from cosim.report.page.run_statements import verdict_facts
+from cosim.results.result import Result
+
+PAGE, FIGURES = "report.html", "figures"
+
+
+def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Path:
+    """Write ``report.html``, with the figures inside, and the same figures as PNG files in ``figures/``.
+
+    Args:
+        result: the run; a failed one is reported as far as it came.
+        spec: roles of the signals, phases, published numbers.
+        directory: the folder; created where it does not exist.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    folder = Path(directory)
+    figures, zooms = draw_all(result, spec), draw_zooms(result, spec)
+    text = report_page(result, spec, figures, zooms)
+    files = {panel.name: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
+    stale = ({panel.name for panel in panels()} | set(ZOOM_KEYS)) - set(files)  # of an earlier run
+    with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
+        (folder / FIGURES).mkdir(parents=True, exist_ok=True)
+        for key, data in files.items():
+            write_file(folder / FIGURES / f"{key}.png", data)
+        for key in stale:
+            (folder / FIGURES / f"{key}.png").unlink(missing_ok=True)
+        write_file(folder / PAGE, page_bytes(text))
+    return folder / PAGE
+
+
+def write_report_page(result: Result, spec: ReportSpec, path: str | Path) -> Path:
+    """Write the page alone; it needs no other file.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, phases, published numbers.
+        path: the file; its folder is created.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    return write_page(path, report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec)))
+
+
+def report_page(
+    result: Result, spec: ReportSpec, figures: Mapping[type[Panel], bytes], zooms: Sequence[Zoom] = ()
+) -> str:
+    """The page as text.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, phases, published numbers.
+        figures: PNG by panel, from `draw_all`.
+        zooms: from `draw_zooms`.
+
+    Returns:
+        The page.
+    """
+    metrics, counts = phase_metrics(result, spec), count_events(result.events)
+    shown = metrics if spec.true_speed or spec.true_position else []  # a turbine has no errors of speed
+    judged = [Judged.from_data(data) for data in list_entry(result, "expectations")]
+    return render(
+        "report.html.j2",
+        spec.title,
+        result=result,
+        spec=spec,
+        description=result.summary.get("description"),
+        facts=verdict_facts(result, spec),
+        statement=statement(result),
+        judged=judged,
+        expectations=run_tables.expectations_table(sorted(judged, key=lambda j: j.passed)),
+        warnings=all_warnings(result, spec),
+        metrics=shown,
+        errors=errors_table(shown, spec),
+        seed_count=len(mapping_entry(result, "seed_study").get("seeds", [])),
+        zooms=zooms,
+        figures=figures,
+        phases=phases_table(phase_details(result, spec), spec),
+        gaps=gaps_table(gap_errors(result, spec)),
+        envelope=ENVELOPE,
+        counts=counts,
+        telegrams=run_tables.telegrams_table(counts.outcomes, spec.labels),
+        compiled=was_compiled(result),
+        notes=list(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")]))),
+        **_run_tables(result, spec),
+    )
+
+
+def _run_tables(result: Result, spec: ReportSpec) -> dict[str, Any]:
+    """Tables that follow from result and roles alone, by their names in the template."""
+    certificates, explained = run_tables.certificates(result, spec)
+    return {
+        "seeds": run_tables.seeds_table(result),
+        "certificates": certificates,
+        "explained": explained,
+        "packets": run_tables.packets_table(result),
+        "indicators": run_tables.indicators_table(result, spec),
+        "faults": run_tables.faults_table(result, spec),
+        "consistency": run_tables.consistency_table(result, spec),
+        "components": run_tables.components_table(result),
+        "calls": run_tables.calls_table(result),
+        "messages": run_tables.messages_table(result),
+        "versions": run_tables.versions_table(result),
+    }

@@ -1,0 +1,160 @@
+"""A result as a folder of files: table, events, messages, summary. Touches only the folder it is given.
+
+All files are written to a hidden folder beside their places first and moved there when they are complete: a full disk
+or a stopped program leaves the former files whole.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnostics.messages import read_messages, write_messages
+from cosim.errors import OutputError
+from cosim.results.events_file import read_events, write_events
+from cosim.results.formats.known_formats import FORMATS, check_formats, fastest_first, table_files, usual_file
+from cosim.results.optional import is_installed
+from cosim.results.packets_file import read_packets, write_packets
+from cosim.results.result_data import ResultData, SignalInfo
+from cosim.results.summary_file import read_summary, write_summary
+from cosim.results.unfinished import read_unfinished
+
+EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
+PACKETS = "packets.csv"  # of runs with a network
+LAYOUT = 1  # version of the layout of summary.json
+
+
+def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:
+    """Make sure, before a run, that results can be written to a folder; it is created where it does not exist.
+
+    Args:
+        directory: the folder.
+        formats: formats of the table to be written; the packages they need must be there.
+
+    Returns:
+        The folder.
+
+    Raises:
+        OutputError: it cannot be created or written, or a format not be written; the message says why and what to do.
+    """
+    check_formats(formats)
+    folder = Path(directory)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"results")
+    except OSError as error:
+        raise OutputError(
+            f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder."
+        ) from error
+    for name in (*table_files().values(), EVENTS, MESSAGES, PACKETS, SUMMARY):
+        if (folder / name).is_dir():
+            raise OutputError(
+                f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder."
+            )
+    return folder
+
+
+def _reason(error: OSError) -> str:
+    return f"{error.strerror or error}" + (f" ({error.filename})" if error.filename else "")
+
+
+def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list[str]:
+    for name in formats:
+        FORMATS[name].write(folder / usual_file(name), result)
+    write_events(folder / EVENTS, result.events)
+    write_messages(folder / MESSAGES, result.messages)
+    content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
+    write_summary(folder / SUMMARY, content)
+    if result.packets:
+        write_packets(folder / PACKETS, result.packets)
+    packets = [PACKETS] if result.packets else []
+    return [*(usual_file(name) for name in dict.fromkeys(formats)), EVENTS, MESSAGES, *packets, SUMMARY]
+
+
+def write_results(result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv",)) -> dict[str, Path]:
+    """Write a result to a folder, replacing what an earlier run left there.
+
+    Args:
+        result: what to write.
+        directory: the folder; created where it does not exist.
+        formats: formats of the table, any of ``csv``, ``mat``, ``npy``, ``parquet``, ``hdf5`` and ``modelica``. A table
+            that an earlier run left in another format is removed, since it would not belong to the other files.
+
+    Returns:
+        Paths by what they hold: the formats, ``events``, ``messages``, ``summary``, and ``packets`` where there is a
+        network.
+
+    Raises:
+        OutputError: a format is unknown or lacks a package, or a file cannot be written; former files are then still
+        whole.
+    """
+    check_formats(formats)
+    folder = check_writable(directory)
+    try:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
+            for name in _write_all(result, Path(scratch), formats):
+                (Path(scratch) / name).replace(folder / name)
+        for stale in set(table_files()) - set(formats):
+            (folder / usual_file(stale)).unlink(missing_ok=True)
+        if not result.packets:
+            (folder / PACKETS).unlink(missing_ok=True)
+    except OSError as error:
+        hint = "Free the disk, or close the program that has the file open."
+        raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
+    names = {name: usual_file(name) for name in dict.fromkeys(formats)} | {"events": EVENTS, "messages": MESSAGES}
+    names |= ({"packets": PACKETS} if result.packets else {}) | {"summary": SUMMARY}
+    return {kind: folder / name for kind, name in names.items()}
+
+
+def _table(folder: Path, name: str | None) -> np.ndarray:
+    """The table of a folder, from the file with that name or from the one that is read fastest."""
+    present = [item for item in fastest_first() if (folder / usual_file(item.name)).exists()]
+    named = [item for item in fastest_first() if usual_file(item.name) == name]
+    readable = [item for item in present if item.package is None or is_installed(item.package)]
+    chosen = next(iter([*named, *readable, *present]), FORMATS["csv"])
+    return chosen.read(folder / usual_file(chosen.name)).table
+
+
+def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapping[str, Any]]:
+    content = read_summary(folder / SUMMARY)
+    if content.get("layout") != LAYOUT:
+        raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
+    signals = [SignalInfo(**signal) for signal in content["signals"]]
+    if not content.get("ended", True):  # it was streamed here, and its program died
+        rows, events, logged, sent = (folder / name for name in (usual_file("npy"), EVENTS, MESSAGES, PACKETS))
+        return read_unfinished(rows, events, logged, sent, content), content
+    table = _table(folder, table_name)
+    messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
+    packets = read_packets(folder / PACKETS) if (folder / PACKETS).exists() else []
+    return ResultData(table, signals, read_events(folder / EVENTS), messages=messages, packets=packets), content
+
+
+def read_results(directory: str | Path, table: str | None = None) -> ResultData:
+    """Read the result that `write_results` left in a folder.
+
+    Args:
+        directory: the folder.
+        table: name of the file to take the table from, where there are several; all hold the same.
+
+    Returns:
+        The result: table and events bit by bit; in the summary NaN has become None and tuples have become lists.
+
+    Raises:
+        OutputError: a file is missing or is not what `write_results` writes; the message names it.
+    """
+    folder = Path(directory)
+    try:
+        result, content = _read(folder, table)
+        return replace(result, summary=content["summary"], failure=content["failure"])
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"No complete result in {folder}: {_reason(error)}. Run the scenario again.") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise OutputError(f"The result in {folder} cannot be read: {error}. Run the scenario again.") from error

@@ -1,0 +1,149 @@
+"""The starter of a plant: the FMU with an odometer, a driver where it can be driven, an observer and balises."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cosim.run.component_models import make_declared
+from cosim.scenario.scenario_tables import ComponentTable
+from cosim.scenario.schema import step_count
+from cosim.starter.guess import Guess, fits
+from cosim.starter.look import Look, number
+from cosim.starter.signal_roles import PlantRoles
+from cosim.starter.toml_lines import GuessedLink, guessed, one_line
+from fmus.fmi.capabilities import read_capabilities
+
+PLANT, OBSERVER = "plant", "observer"
+DEFAULT_OBSERVER = "takagi_sugeno_cdo"
+HORIZON, STEP, SHORTEST, LONGEST = 60.0, 0.01, 1e-3, 0.5
+RADIUS = 0.5
+PRESETS = {DEFAULT_OBSERVER: "long_gaps"}
+"""What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes
+unstable.
+"""
+
+
+def train(look: Look, roles: PlantRoles, observer: str, place: str) -> dict[str, Any]:
+    """What the template of this starter inserts.
+
+    Args:
+        look: what the FMU says.
+        roles: what its signals were guessed to be.
+        observer: name of the observer, or ``file.py:Class``. place: the same as the scenario file says it.
+
+    Returns:
+        Values by name.
+    """
+    stop, step, source = train_times(look)
+    declared = declared_observer(observer)
+    driven = roles.effort.signal.name if roles.effort else None
+    needed = {"position": roles.position, "speed": roles.speed}
+    return {
+        "title": f"{one_line(look.path.name)} beside one observer",
+        "stop": stop,
+        "step": step,
+        "source": source,
+        "links": _links(roles),
+        "roles": roles,
+        "others": [s for s in look.inputs if s.name != driven],
+        "settings": [s for s in look.parameters if s.start is not None and not s.name.endswith("]")],
+        "observer": place,
+        "preset": PRESETS.get(observer),
+        "known": {s.name: s.start for s in (*declared.parameter_signals, *getattr(declared, "states", ()))},
+        "lacking": [what for what, found in needed.items() if found is None or not found.signal.readable],
+    }
+
+
+def declared_observer(name: str) -> Any:
+    """What an observer declares, see `cosim.run.component_models.make_declared`.
+
+    Args:
+        name: of the observer, or ``file.py:Class``.
+
+    Raises:
+        ScenarioError: there is no such observer, or it cannot be loaded.
+    """
+    return make_declared(ComponentTable.model_validate({"observer": name}), "observer")
+
+
+def train_times(look: Look) -> tuple[float, float, str]:
+    """When the run stops and how long its steps are: the FMU's own where it names one to communicate at.
+
+    Args:
+        look: what the FMU says.
+
+    Returns:
+        Stop and step [s], and where the step comes from.
+    """
+    fixed = read_capabilities(look.description).fixedInternalStepSize
+    advised = look.description.defaultExperiment
+    for length, source in (
+        (fixed, "the FMU's own step"),
+        (number(advised.stepSize) if advised else None, "from the FMU's default experiment"),
+    ):
+        if length is not None and SHORTEST <= length <= LONGEST:
+            stop = round(round(HORIZON / length) * length, 9)
+            try:
+                step_count(0.0, stop, length)
+            except ValueError:
+                continue
+            return stop, length, source
+    return HORIZON, STEP, "communication step"
+
+
+# -- connections
+# --------------------------------------------------------------------------------------------------------
+
+
+def _links(roles: PlantRoles) -> list[GuessedLink]:
+    links: list[GuessedLink] = []
+    if roles.effort is not None:
+        links.append(_from_driver(roles.effort))
+    elif roles.applied is not None:
+        links.append(
+            GuessedLink(
+                f"{PLANT}.{roles.applied.signal.name}",
+                [f"{OBSERVER}.effort"],
+                guessed(roles.applied),
+                _factor(roles.applied),
+            )
+        )
+    links.append(_to_odometer(roles))
+    readers = ["driver.odometer"] if roles.effort is not None else []
+    links.append(GuessedLink("odometer.reading", [*readers, f"{OBSERVER}.odometer"]))
+    if roles.effort is not None:
+        links.append(GuessedLink("driver.effort", [f"{OBSERVER}.effort"]))
+    return links
+
+
+def _from_driver(effort: Guess) -> GuessedLink:
+    remark = guessed(effort)
+    if effort.signal.unit is None:
+        remark += "; it declares no unit: N is assumed"
+    factor = _factor(effort)
+    if factor is not None:
+        remark += f"; its unit {one_line(str(effort.signal.unit))} is not understood: write the factor from N to it"
+    return GuessedLink("driver.effort", [f"{PLANT}.{effort.signal.name}"], remark, factor)
+
+
+def _to_odometer(roles: PlantRoles) -> GuessedLink:
+    found = roles.wheel_speed or roles.speed
+    assert found is not None
+    signal, remark = found.signal, guessed(found)
+    if roles.wheel_speed is None:
+        remark += "; no speed of a wheel was found, so this odometer never slips"
+    if fits(signal, "rad/s"):
+        assert signal.meaning is not None
+        remark += f"; times the wheel radius, {RADIUS} m: WRITE YOURS"
+        return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, RADIUS * signal.meaning.factor)
+    if signal.unit is None:
+        remark += "; it declares no unit: m/s is assumed"
+    factor = _factor(found)
+    if factor is not None:
+        remark += f"; its unit {one_line(str(signal.unit))} is not understood: write the factor to m/s"
+    return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, factor)
+
+
+def _factor(found: Guess) -> float | None:
+    """A factor to be edited where nobody can convert the unit."""
+    return None if found.signal.readable else 1.0

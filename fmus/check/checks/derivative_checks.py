@@ -1,0 +1,60 @@
+"""The check of directional derivatives in co-simulation: outputs along inputs, where the slave stands between two
+steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmus.check.check import LIMIT, Check
+from fmus.check.checks.life_checks import real_names
+from fmus.check.context import Context
+from fmus.check.differences import compare
+from fmus.check.findings import CheckOutcome, skipped
+from fmus.check.runner import WARM_UP_STEPS
+
+
+def slave_derivatives(context: Context) -> CheckOutcome:
+    """Directional derivatives of the outputs along the inputs between two steps.
+
+    Args:
+        context: what is checked.
+    """
+    if not context.description.coSimulation.providesDirectionalDerivative:
+        return skipped("does not declare providesDirectionalDerivative")
+    bench = context.bench
+    bench.begin()
+    bench.steps((bench.h,) * WARM_UP_STEPS)
+    slave = bench.component
+    inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
+    if not inputs or not outputs:
+        return skipped("has no pair of a continuous input and a continuous output")
+    values = dict(zip(inputs, slave.read(inputs).tolist(), strict=True))
+
+    def evaluate(name: str, value: float) -> np.ndarray:
+        write, buffer = slave.writer(inputs)
+        buffer[:] = [value if n == name else v for n, v in values.items()]
+        write()
+        return slave.read(outputs)
+
+    nominal = {n: nominal_of(slave.variables[n]) for n in inputs}
+    try:
+        return compare(evaluate, lambda n: slave.directional_derivative(outputs, [n], [1.0]), values, outputs, nominal)
+    finally:
+        evaluate(inputs[0], values[inputs[0]])
+
+
+def nominal_of(variable: object) -> float:
+    """The nominal value of a variable, 1 where it declares none."""
+    declared = getattr(variable, "nominal", None)
+    return abs(float(declared)) if declared else 1.0
+
+
+class DirectionalDerivativesCheck(Check):
+    """The check *directional derivatives*."""
+
+    name = "directional derivatives"
+    failing = LIMIT
+    advice = "do not use its derivatives"
+    place = 18
+    run = staticmethod(slave_derivatives)

@@ -1,0 +1,309 @@
+"""Checks of model exchange: start, derivatives, continuous states, saved states, reset, directional derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from fmus.check.check import DISTRUST, LIMIT, MISSING, Check
+from fmus.check.checks.derivative_checks import nominal_of
+from fmus.check.checks.life_checks import by, exported_symbols, listed, not_finite, real_names
+from fmus.check.context import Context
+from fmus.check.differences import compare
+from fmus.check.exchange_model import FmuModel
+from fmus.check.findings import CheckOutcome, failed, passed, skipped
+from fmus.fmi.standard import MODEL_EXCHANGE
+
+NO_STATES = "has no continuous states"
+SHIFT = 0.01
+"""States are moved by this share, so that derivatives are not judged at a start at rest, where friction has its
+kink.
+"""
+
+
+@contextmanager
+def started(context: Context) -> Iterator[FmuModel]:
+    """An instance in continuous-time mode, freed at the end.
+
+    Args:
+        context: what is checked.
+    """
+    model = context.model()
+    try:
+        model.instantiate()
+        _start(model, context)
+        yield model
+    finally:
+        model.terminate()
+        model.free()
+
+
+def _start(model: FmuModel, context: Context) -> None:
+    for name, value in context.starts.items():
+        model.set_start(name, value)
+    model.initialize(context.start_time)
+
+
+def loading(context: Context) -> CheckOutcome:
+    """The library can be loaded here, with all that it needs.
+
+    Args:
+        context: what is checked.
+    """
+    context.model().free()
+    return passed("the library and what it needs are loaded")
+
+
+def model_symbols(context: Context) -> CheckOutcome:
+    """`exported_symbols` for model exchange.
+
+    Args:
+        context: what is checked.
+    """
+    return exported_symbols(context.model())
+
+
+def initialise(context: Context) -> CheckOutcome:
+    """Instantiate, initialise, reach continuous-time mode, terminate, free.
+
+    Args:
+        context: what is checked.
+    """
+    with started(context) as model:
+        return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
+
+
+def finite_derivatives(context: Context) -> CheckOutcome:
+    """Outputs, derivatives and event indicators are finite at the start.
+
+    Args:
+        context: what is checked.
+    """
+    with started(context) as model:
+        outputs = model.names("output")
+        values = {
+            "outputs": not_finite(outputs, model.read(outputs)),
+            "derivatives": not_finite(_numbered(model.state_count), model.derivatives()) if model.state_count else [],
+            "event indicators": not_finite(_numbered(model.indicator_count), model.indicators())
+            if model.indicator_count
+            else [],
+        }
+    bad = {what: names for what, names in values.items() if names}
+    if bad:
+        return failed("not finite at the start: " + "; ".join(f"{what} {listed(names)}" for what, names in bad.items()))
+    return passed("outputs, derivatives and event indicators are finite at the start")
+
+
+def states(context: Context) -> CheckOutcome:
+    """States that are set are read back, and derivatives depend on nothing else.
+
+    Args:
+        context: what is checked.
+    """
+    with started(context) as model:
+        if not model.state_count:
+            return skipped(NO_STATES)
+        x = model.states()
+        before = model.derivatives()
+        moved = _moved(x)
+        model.set_states(moved)
+        if not np.array_equal(model.states(), moved):
+            return failed("continuous states that were set are not what is read back")
+        model.derivatives()
+        model.set_states(x)
+        if not np.array_equal(model.derivatives(), before, equal_nan=True):
+            return failed("the derivatives at the same states differ after a visit elsewhere")
+    return passed("states are read back, derivatives at the same states are identical")
+
+
+def round_trip(context: Context) -> CheckOutcome:
+    """Save, integrate on, restore, integrate again: bit-identical.
+
+    Args:
+        context: what is checked.
+    """
+    with started(context) as model:
+        if not model.can_save:
+            return skipped("does not declare canGetAndSetFMUstate")
+        if not model.state_count:
+            return skipped(NO_STATES)
+        state = model.save()
+        try:
+            first = _path(model, context)
+            model.restore(state)
+            second = _path(model, context)
+        finally:
+            model.release(state)
+    same = np.array_equal(first, second, equal_nan=True)
+    return by(
+        "" if same else "after a restored state the same states have other derivatives", "what follows is identical"
+    )
+
+
+def reset(context: Context) -> CheckOutcome:
+    """After a reset the same path has the identical derivatives.
+
+    Args:
+        context: what is checked.
+    """
+    with started(context) as model:
+        if not model.state_count:
+            return skipped(NO_STATES)
+        first = _path(model, context)
+        model.terminate()
+        model.reset()
+        _start(model, context)
+        second = _path(model, context)
+    same = np.array_equal(first, second, equal_nan=True)
+    return by(
+        "" if same else "after a reset the same states have other derivatives", "the same after a reset is identical"
+    )
+
+
+def directional(context: Context) -> CheckOutcome:
+    """Directional derivatives of derivatives and outputs along states and inputs.
+
+    Args:
+        context: what is checked.
+    """
+    if not context.description.modelExchange.providesDirectionalDerivative:
+        return skipped("does not declare providesDirectionalDerivative")
+    with started(context) as model:
+        found = [(u.variable, getattr(u.variable, "derivative", None)) for u in model.description.derivatives]
+        scalar = [(rate.name, of.name) for rate, of in found if of is not None and not rate.shape]
+        inputs, outputs = real_names(model, "input"), real_names(model, "output")
+        unknowns, state_names = [*(r for r, _ in scalar), *outputs], [s for _, s in scalar]
+        if len(scalar) != model.state_count or not unknowns or not (state_names or inputs):
+            return skipped("has no pair of a scalar unknown and a scalar known")
+        x = _moved(model.states())
+        u = model.read(inputs)
+        values = dict(zip([*state_names, *inputs], [*x.tolist(), *u.tolist()], strict=True))
+        write, buffer = model.writer(inputs)
+
+        def evaluate(name: str, value: float) -> np.ndarray:
+            point = [value if n == name else v for n, v in values.items()]
+            model.set_states(np.array(point[: len(x)]))
+            buffer[:] = point[len(x) :]
+            write()
+            return model.read(unknowns)
+
+        evaluate("", 0.0)
+
+        def said(name: str) -> np.ndarray:
+            evaluate("", 0.0)
+            return model.directional_derivative(unknowns, [name], [1.0])
+
+        return compare(evaluate, said, values, unknowns, {n: nominal_of(model.variables[n]) for n in values})
+
+
+def _moved(x: np.ndarray) -> np.ndarray:
+    moved: np.ndarray = x + SHIFT * np.maximum(1.0, np.abs(x))
+    return moved
+
+
+def _path(model: FmuModel, context: Context) -> np.ndarray:
+    """Derivatives along a few forward Euler steps that stay near the start, shape (steps, n)."""
+    t, x, rows = context.start_time, model.states(), []
+    for _ in range(5):
+        rate = model.derivatives()
+        rows.append(rate)
+        t += context.step
+        size = SHIFT * np.maximum(1.0, np.abs(x))
+        x += np.clip(np.nan_to_num(context.step * rate), -size, size)
+        model.set_time(t)
+        model.set_states(x)
+    return np.array(rows)
+
+
+def _numbered(count: int) -> list[str]:
+    return [f"[{k}]" for k in range(1, count + 1)]
+
+
+class ModelExchangeLoadingCheck(Check):
+    """The check *model exchange: loading*."""
+
+    name = "model exchange: loading"
+    failing = DISTRUST
+    basis = True
+    interface = MODEL_EXCHANGE
+    place = 1
+    run = staticmethod(loading)
+
+
+class ModelExchangeExportedSymbolsCheck(Check):
+    """The check *model exchange: exported symbols*."""
+
+    name = "model exchange: exported symbols"
+    failing = LIMIT
+    advice = MISSING
+    interface = MODEL_EXCHANGE
+    place = 2
+    run = staticmethod(model_symbols)
+
+
+class ModelExchangeInitialiseCheck(Check):
+    """The check *model exchange: initialise*."""
+
+    name = "model exchange: initialise"
+    failing = DISTRUST
+    advice = "give start values, if it needs some"
+    basis = True
+    interface = MODEL_EXCHANGE
+    place = 3
+    run = staticmethod(initialise)
+
+
+class ModelExchangeValuesAtStartCheck(Check):
+    """The check *model exchange: values at start*."""
+
+    name = "model exchange: values at start"
+    failing = DISTRUST
+    advice = "give start values"
+    interface = MODEL_EXCHANGE
+    place = 4
+    run = staticmethod(finite_derivatives)
+
+
+class ModelExchangeStatesCheck(Check):
+    """The check *model exchange: states*."""
+
+    name = "model exchange: states"
+    failing = DISTRUST
+    interface = MODEL_EXCHANGE
+    place = 5
+    run = staticmethod(states)
+
+
+class ModelExchangeResetAndReRunCheck(Check):
+    """The check *model exchange: reset and re-run*."""
+
+    name = "model exchange: reset and re-run"
+    failing = LIMIT
+    advice = "make a new instance for each run"
+    interface = MODEL_EXCHANGE
+    place = 6
+    run = staticmethod(reset)
+
+
+class ModelExchangeStateRoundTripCheck(Check):
+    """The check *model exchange: state round trip*."""
+
+    name = "model exchange: state round trip"
+    failing = LIMIT
+    advice = "do not rely on saved states"
+    interface = MODEL_EXCHANGE
+    place = 7
+    run = staticmethod(round_trip)
+
+
+class ModelExchangeDirectionalDerivativesCheck(Check):
+    """The check *model exchange: directional derivatives*."""
+
+    name = "model exchange: directional derivatives"
+    failing = LIMIT
+    advice = "do not use its derivatives"
+    interface = MODEL_EXCHANGE
+    place = 8
+    run = staticmethod(directional)

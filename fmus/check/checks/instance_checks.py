@@ -1,0 +1,137 @@
+"""Checks of many instances of an FMU: one after the other, which must leave nothing behind, and two at once."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from time import perf_counter
+
+from fmus.check.behaviour import difference
+from fmus.check.check import LIMIT, ONE_INSTANCE, Check
+from fmus.check.checks.life_checks import SHARE_OF_BUDGET, by
+from fmus.check.context import Context
+from fmus.check.findings import CheckOutcome, failed, passed, skipped
+from fmus.check.runner import WARM_UP_STEPS, elsewhere, end_of_experiment
+
+INSTANCES = 50
+FIRST_INSTANCES = 10
+"""Instances made before memory is measured: libraries open files and fill caches once."""
+
+LEAK = 16 * 1024
+"""Growth of memory for each instance that is taken for a leak [bytes]; a few pages each are the allocator's own."""
+
+
+def repeated_instantiation(context: Context) -> CheckOutcome:
+    """Many instances, one after the other: memory and open files must not grow.
+
+    Args:
+        context: what is checked.
+    """
+    if context.only_once:
+        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+    slave = context.slave()
+    since, marks = perf_counter(), []
+    try:
+        for count in range(1, INSTANCES + 1):
+            slave.instantiate()
+            slave.enter_initialization(context.start_time, end_of_experiment(context.description, context.start_time))
+            slave.exit_initialization()
+            slave.free_instance_only()
+            if count in (FIRST_INSTANCES, INSTANCES):
+                marks.append((count, resident_bytes(), open_files()))
+            elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > FIRST_INSTANCES:
+                marks.append((count, resident_bytes(), open_files()))
+                break
+    finally:
+        slave.free()
+    if len(marks) < 2:
+        return skipped(f"instances take too long to make {FIRST_INSTANCES + 1} of them; use a longer --timeout")
+    return _growth(*marks)
+
+
+def two_instances(context: Context) -> CheckOutcome:
+    """Two instances at once, under different inputs, step by step in turn: the first one must not notice.
+
+    Args:
+        context: what is checked.
+    """
+    if context.only_once:
+        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+    bench, other = context.bench, context.fresh_bench()
+    bench.begin()
+    alone = bench.steps((bench.h,) * (2 * WARM_UP_STEPS))
+    try:
+        bench.begin()
+        other.begin()
+        other.set_inputs(elsewhere(bench.amplitude))
+        beside = []
+        for _ in alone:
+            other.steps((bench.h,))
+            beside += bench.steps((bench.h,))
+    finally:
+        other.put_away()
+    problem = difference(bench, alone, beside)
+    return by(problem and f"beside a second instance {problem}", "a second instance changes nothing in the first")
+
+
+# -- what the process holds ------------------------------------------------------------------------------------------
+
+
+def resident_bytes() -> int | None:
+    """Memory of this process in main memory [bytes], or None where that is not known."""
+    gc.collect()
+    with suppress(OSError, ValueError):
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return None
+
+
+def open_files() -> int | None:
+    """Open file descriptors of this process, or None where that is not known."""
+    if sys.platform == "win32":
+        return None
+    with suppress(OSError):
+        return len(os.listdir("/dev/fd"))  # noqa: PTH208 - names are enough
+    return None
+
+
+def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | None, int | None]) -> CheckOutcome:
+    count = last[0] - first[0]
+    said = []
+    if first[2] is None or last[2] is None:
+        said.append("open files are not counted on this system")
+    elif last[2] > first[2]:
+        return failed(f"leaks file descriptors: {last[2] - first[2]} more are open after {count} more instances")
+    else:
+        said.append("no file stays open")
+    if first[1] is None or last[1] is None:
+        said.append("memory is not measured on this system")
+    elif last[1] - first[1] > LEAK * count:
+        grown = (last[1] - first[1]) / 1024
+        return failed(f"leaks memory: {grown:.0f} kB more after {count} more instances, {grown / count:.0f} kB each")
+    else:
+        said.append(f"memory grew by {max(last[1] - first[1], 0) / 1024:.0f} kB over the last {count}")
+    return passed(f"{last[0]} instances, {', '.join(said)}")
+
+
+class TwoInstancesCheck(Check):
+    """The check *two instances*."""
+
+    name = "two instances"
+    failing = LIMIT
+    advice = ONE_INSTANCE
+    compares = True
+    place = 14
+    run = staticmethod(two_instances)
+
+
+class RepeatedInstantiationCheck(Check):
+    """The check *repeated instantiation*."""
+
+    name = "repeated instantiation"
+    failing = LIMIT
+    advice = "do not make many instances in one process"
+    place = 15
+    run = staticmethod(repeated_instantiation)

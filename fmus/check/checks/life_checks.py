@@ -1,0 +1,406 @@
+"""Checks of an instance's life in co-simulation: symbols, start, values, steps, resets, logging, speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+from fmpy.model_description import ModelVariable
+
+from fmu_observer.annotated_variable import can_be_missing
+from fmus.check.behaviour import difference, repeatable
+from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
+from fmus.check.checked_instance import FmuInstance, SlaveError
+from fmus.check.context import Context
+from fmus.check.findings import CheckOutcome, Verdict, failed, limited, noted, passed, skipped
+from fmus.check.runner import SLOW_STEPS, WARM_UP_STEPS
+from fmus.fmi.instance import Instance
+from fmus.fmi.library import functions_of_capabilities
+from fmus.fmi.types import FLOATING_TYPES
+
+SHARE_OF_BUDGET = 0.4
+TIMED_STEPS = 200
+UNSEEN = "what it does when it moves was not seen: give start values (--start) or a longer step (--step)"
+NAMES_SHOWN = 4
+
+
+def loading(context: Context) -> CheckOutcome:
+    """The library can be loaded here, with all that it needs.
+
+    Args:
+        context: what is checked.
+    """
+    context.slave().free()
+    return passed("the library and what it needs are loaded")
+
+
+def exported_symbols(instance: FmuInstance) -> CheckOutcome:
+    """The functions of the standard that the library exports, against what the FMU declares.
+
+    Args:
+        instance: loaded, not instantiated; it is freed here.
+    """
+    try:
+        missing = {name.lower(): name for name in instance.missing_functions}
+    finally:
+        instance.free()
+    if not missing:
+        return passed("the library exports every function of the interface")
+    needed: dict[str, str] = {}
+    for capability, function in functions_of_capabilities(instance.description, instance.interface):
+        needed.setdefault(missing.pop(function, ""), capability)
+    needed.pop("", None)
+    if needed:
+        lies = "; ".join(f"declares {capability} but does not export {name}" for name, capability in needed.items())
+        return failed(lies)
+    return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
+
+
+def slave_symbols(context: Context) -> CheckOutcome:
+    """`exported_symbols` for co-simulation.
+
+    Args:
+        context: what is checked.
+    """
+    return exported_symbols(context.slave())
+
+
+def initialise(context: Context) -> CheckOutcome:
+    """Instantiate, initialise, terminate, free.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.quiet_bench()
+    try:
+        bench.begin(excited=False)
+    finally:
+        bench.put_away()
+    return passed("instantiates, initialises, terminates and is freed")
+
+
+def values_at_start(context: Context) -> CheckOutcome:
+    """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.quiet_bench()
+    try:
+        bench.begin(excited=False)
+        slave = bench.component
+        outputs, locals_ = slave.names("output"), slave.names("local")
+        bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
+        bad_locals = not_finite(locals_, slave.read(locals_))
+    finally:
+        bench.put_away()
+    if bad_outputs:
+        return failed(f"not finite after initialisation: {listed(bad_outputs)}")
+    if bad_locals:
+        return noted(f"not finite after initialisation: the local variables {listed(bad_locals)}")
+    return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
+
+
+def getters(context: Context) -> CheckOutcome:
+    """Every variable can be read by the getter of its type.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.quiet_bench()
+    try:
+        bench.begin(excited=False)
+        slave = bench.component
+        own = [v for v in slave.description.modelVariables if v.alias is None]
+        readable = [v for v in own if v.type != "Clock" and not v.clocks]
+        problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
+    finally:
+        bench.put_away()
+    left_out = len(own) - len(readable)
+    note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
+    if problems:
+        return failed(f"{len(problems)} of {len(readable)} variables cannot be read: {problems[0]}{note}")
+    return passed(f"{len(readable)} variables are read{note}")
+
+
+def _unreadable(slave: Instance, variable: ModelVariable) -> str:
+    try:
+        slave.get(variable)
+    except SlaveError as error:
+        return str(error)
+    return ""
+
+
+def stepping(context: Context) -> CheckOutcome:
+    """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
+    values.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.bench
+    try:
+        return _run(context)
+    except SlaveError as error:
+        if not bench.amplitude:
+            raise
+        broken, bench.amplitude, bench.spread, bench.excited = str(error), 0.0, 0.0, False
+    outcome = _run(context)
+    if outcome.verdict is Verdict.DISTRUST:
+        return outcome
+    return limited(
+        f"{outcome.detail}; under other inputs: {broken}", "keep its inputs in the range that it was made for"
+    )
+
+
+def _run(context: Context) -> CheckOutcome:
+    bench = context.bench
+    bench.begin()
+    rows: list[np.ndarray] = []
+    since = perf_counter()
+    while len(rows) < context.steps and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
+        row = bench.step(bench.h)
+        if not row:
+            break
+        rows += row
+    if not rows:
+        raise bench.component.failure("asks for the end in its first step")
+    bad = not_finite(bench.output_names, np.sum(rows, axis=0), bench.component.variables)
+    if bad:
+        raise SlaveError(f"not finite while stepping: {listed(bad)}")
+    done = f"{len(rows)} steps of {bench.h:g} s"
+    if bench.component.terminated:
+        return limited(f"{done}, then it asks for the end", f"end runs at {bench.now:g} s, where it ends by itself")
+    if not bench.output_names:
+        return limited(f"{done}; it has no number that moves and can be read", UNSEEN)
+    if not bench.excited:
+        return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
+    late = f"; {context.steps} were asked for, use a longer --timeout" if len(rows) < context.steps else ""
+    above = (
+        f"inputs {bench.amplitude:g} above their start values" if bench.amplitude else "inputs at their start values"
+    )
+    return passed(f"{done}, {above}{late}")
+
+
+def repeated(context: Context) -> CheckOutcome:
+    """Two instances, one after the other, under the same inputs: identical outputs.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.bench
+    pattern = (bench.h,) * (2 * WARM_UP_STEPS)
+    bench.begin()
+    first = bench.steps(pattern)
+    bench.begin()
+    problem = difference(bench, first, bench.steps(pattern))
+    return by(problem and f"in a second run {problem}", "a second run is identical")
+
+
+def reset(context: Context) -> CheckOutcome:
+    """After a reset the same steps give the identical outputs.
+
+    Args:
+        context: what is checked.
+    """
+    return by(repeatable(context.bench), "the same run after a reset is identical")
+
+
+def logging(context: Context) -> CheckOutcome:
+    """The outputs must not depend on whether the FMU is asked to log.
+
+    Args:
+        context: what is checked.
+    """
+    if context.only_once:
+        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+    bench = context.bench
+    bench.begin()
+    quiet = bench.steps((bench.h,) * WARM_UP_STEPS)
+    talking = bench.twin(lambda: context.slave(logging=True))
+    try:
+        talking.begin()
+        loud = talking.steps((bench.h,) * WARM_UP_STEPS)
+    finally:
+        talking.put_away()
+    problem = difference(bench, quiet, loud)
+    return by(problem and f"with logging on {problem}", "logging changes no output")
+
+
+def time_per_step(context: Context) -> CheckOutcome:
+    """Median time of one step.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.bench
+    bench.begin()
+    seconds: list[float] = []
+    advance, since = bench.component.advance, perf_counter()
+    most = min(TIMED_STEPS, max(context.steps, 1))
+    while (
+        len(seconds) < most
+        and not bench.component.terminated
+        and perf_counter() - since < SHARE_OF_BUDGET * context.budget
+    ):
+        t = bench.t0 + len(seconds) * bench.h
+        begin = perf_counter()
+        advance(t, t + bench.h)
+        seconds.append(perf_counter() - begin)
+    return passed(
+        f"median {median(seconds) * 1e6:.3g} microseconds for a step of {bench.h:g} s, the call from Python included"
+    )
+
+
+# -- helpers
+# ------------------------------------------------------------------------------------------------------------
+
+
+def by(problem: str, good: str) -> CheckOutcome:
+    """Failed with the problem where there is one, else passed.
+
+    Args:
+        good: what to say where there is no problem.
+    """
+    return failed(problem) if problem else passed(good)
+
+
+def not_finite(
+    names: Sequence[str], values: np.ndarray, variables: Mapping[str, ModelVariable] | None = None
+) -> list[str]:
+    """The names whose values are NaN or infinite, with the values; without those for which NaN is a value.
+
+    Args:
+        names: of the values. values: shape (len(names),). variables: by name; None where all must be numbers.
+    """
+
+    def wrong(name: str, value: float) -> bool:
+        missing = variables is not None and math.isnan(value) and can_be_missing(variables[name])
+        return not math.isfinite(value) and not missing
+
+    return [f"{n} = {float(v):g}" for n, v in zip(names, values, strict=True) if wrong(n, v)]
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first few, and how many more.
+
+    Args:
+        names: what is listed.
+    """
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    return ", ".join(names[:NAMES_SHOWN]) + more
+
+
+def real_names(instance: Instance, causality: str) -> list[str]:
+    """Names of its scalar continuous real variables of one causality.
+
+    Args:
+        instance: whose variables they are.
+    """
+    found = (instance.variables[n] for n in instance.names(causality))
+    return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]
+
+
+class LoadingCheck(Check):
+    """The check *loading*."""
+
+    name = "loading"
+    failing = DISTRUST
+    basis = True
+    place = 1
+    run = staticmethod(loading)
+
+
+class ExportedSymbolsCheck(Check):
+    """The check *exported symbols*."""
+
+    name = "exported symbols"
+    failing = LIMIT
+    advice = MISSING
+    place = 2
+    run = staticmethod(slave_symbols)
+
+
+class InitialiseCheck(Check):
+    """The check *initialise*."""
+
+    name = "initialise"
+    failing = DISTRUST
+    advice = "give start values, if it needs some"
+    basis = True
+    place = 3
+    run = staticmethod(initialise)
+
+
+class ValuesAtStartCheck(Check):
+    """The check *values at start*."""
+
+    name = "values at start"
+    failing = LIMIT
+    advice = "give start values, so that what it feeds does not begin with these"
+    place = 4
+    run = staticmethod(values_at_start)
+
+
+class GettersCheck(Check):
+    """The check *getters*."""
+
+    name = "getters"
+    failing = LIMIT
+    advice = "leave these variables out of connections and recordings"
+    place = 5
+    run = staticmethod(getters)
+
+
+class SteppingCheck(Check):
+    """The check *stepping*."""
+
+    name = "stepping"
+    failing = DISTRUST
+    basis = True
+    place = 6
+    run = staticmethod(stepping)
+
+
+class RepeatedRunCheck(Check):
+    """The check *repeated run*."""
+
+    name = "repeated run"
+    failing = LIMIT
+    advice = "give each run a fresh process, and compare no two runs digit by digit"
+    place = 7
+    run = staticmethod(repeated)
+
+
+class ResetAndReRunCheck(Check):
+    """The check *reset and re-run*."""
+
+    name = "reset and re-run"
+    failing = LIMIT
+    advice = "make a new instance for each run"
+    compares = True
+    place = 8
+    run = staticmethod(reset)
+
+
+class LoggingCheck(Check):
+    """The check *logging*."""
+
+    name = "logging"
+    failing = LIMIT
+    advice = "leave its logging off"
+    compares = True
+    place = 16
+    run = staticmethod(logging)
+
+
+class TimePerStepCheck(Check):
+    """The check *time per step*."""
+
+    name = "time per step"
+    failing = NOTE
+    place = 24
+    run = staticmethod(time_per_step)

@@ -1,0 +1,130 @@
+"""Checks of saved states in co-simulation: restored, as bytes, and in another instance."""
+
+from __future__ import annotations
+
+from fmus.check.behaviour import again, continuation, difference, go_elsewhere
+from fmus.check.check import LIMIT, NO_BYTES, NO_REDOING, Check
+from fmus.check.context import Context
+from fmus.check.findings import CheckOutcome, failed, limited, passed, skipped
+from fmus.check.restoring import near, restoring
+from fmus.check.runner import WARM_UP_STEPS
+from fmus.fmi.slave import Slave
+
+NO_STATE = "does not declare canGetAndSetFMUstate"
+WITHIN = "steps may be redone, and what is redone differs by as much; the master tells it in its bounds"
+NOT_SERIALISED = "does not declare canSerializeFMUstate"
+
+
+def round_trip(context: Context) -> CheckOutcome:
+    """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else.
+
+    Args:
+        context: what is checked.
+    """
+    if not context.bench.component.can_save:
+        return skipped(NO_STATE)
+    found = restoring(context.bench)
+    if found.restores == "exact":
+        return passed("what follows a restored state is identical, bit for bit")
+    if found.restores == "within_tolerance":
+        return limited(f"{found.problem}; within the tolerance of its solver, {found.mismatch:.1g} of its size", WITHIN)
+    return failed(f"not restored: {found.problem}")
+
+
+def serialised(context: Context) -> CheckOutcome:
+    """The same through bytes, in the same instance.
+
+    Args:
+        context: what is checked.
+    """
+    return _through_bytes(context, elsewhere=False)
+
+
+def other_instance(context: Context) -> CheckOutcome:
+    """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from.
+
+    Args:
+        context: what is checked.
+    """
+    if context.only_once:
+        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+    return _through_bytes(context, elsewhere=True)
+
+
+def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
+    bench = context.bench
+    slave = bench.component
+    if not slave.can_save or not slave.capabilities.canSerializeFMUState:
+        return skipped(NOT_SERIALISED)
+    path = continuation(bench)
+    bench.begin()
+    bench.steps((bench.h,) * WARM_UP_STEPS)
+    content, saved_at = _saved(bench.component), bench.now
+    first = bench.steps(path)
+    target = context.fresh_bench() if elsewhere else bench
+    try:
+        if elsewhere:
+            target.begin()
+        go_elsewhere(target)
+        _restore(target.component, content)
+        redone = again(target, saved_at, path)
+    finally:
+        if elsewhere:
+            target.put_away()
+    place = "in another instance" if elsewhere else "from bytes"
+    problem = difference(bench, first, redone)
+    if not problem:
+        return passed(f"what follows a state restored {place} is identical")
+    told = f"after a state restored {place} {problem}"
+    return (
+        limited(f"{told}; within the tolerance of its solver", WITHIN) if near(bench, first, redone) else failed(told)
+    )
+
+
+def _saved(slave: Slave) -> bytes:
+    state = slave.save()
+    try:
+        return slave.serialize(state)
+    finally:
+        slave.release(state)
+
+
+def _restore(slave: Slave, content: bytes) -> None:
+    state = slave.deserialize(content)
+    try:
+        slave.restore(state)
+    finally:
+        slave.release(state)
+
+
+class StateRoundTripCheck(Check):
+    """The check *state round trip*."""
+
+    name = "state round trip"
+    failing = LIMIT
+    advice = NO_REDOING
+    compares = True
+    place = 11
+    run = staticmethod(round_trip)
+
+
+class SerialisedStateCheck(Check):
+    """The check *serialised state*."""
+
+    name = "serialised state"
+    failing = LIMIT
+    advice = NO_BYTES
+    compares = True
+    place = 12
+    run = staticmethod(serialised)
+
+
+class StateInAnotherInstanceCheck(Check):
+    """The check *state in another instance*."""
+
+    name = "state in another instance"
+    failing = LIMIT
+    advice = NO_BYTES
+    compares = True
+    place = 13
+    run = staticmethod(other_instance)

@@ -1,0 +1,216 @@
+"""Checks of steps in co-simulation: divided ones, tiny ones, and sizes no master should ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fmus.check.behaviour import divided_steps, short_step
+from fmus.check.check import FIXED_STEP, LIMIT, NOTE, Check
+from fmus.check.checks.life_checks import by, listed, not_finite
+from fmus.check.context import Context
+from fmus.check.findings import CheckOutcome, failed, noted, passed, skipped
+from fmus.fmi.slave import RawStep
+
+SCALES = (1.0, 0.37, 3.0)
+TINY = 1e-9
+HUGE = 1000.0
+BEFORE = 3
+"""Ordinary steps before an odd one."""
+NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
+
+
+def divided(context: Context) -> CheckOutcome:
+    """A step of h against 2 x h/2 and an uneven split, for several h.
+
+    Args:
+        context: what is checked.
+    """
+    bench = context.bench
+    if not bench.component.can_vary_step:
+        return skipped(NO_VARIABLE_STEP)
+    for scale in SCALES:
+        problem = divided_steps(bench, scale)
+        if problem:
+            return failed(problem)
+    return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * bench.h:g}' for s in SCALES)} s")
+
+
+def short(context: Context) -> CheckOutcome:
+    """The first change after a short step.
+
+    Args:
+        context: what is checked.
+    """
+    if not context.bench.component.can_vary_step:
+        return skipped(NO_VARIABLE_STEP)
+    return by(short_step(context.bench), "tiny steps after a short one move the outputs by their share")
+
+
+def tiny(context: Context) -> CheckOutcome:
+    """A step of a billionth of a second.
+
+    Args:
+        context: what is checked.
+    """
+    if not context.bench.component.can_vary_step:
+        return skipped(NO_VARIABLE_STEP)
+    return _odd(context, lambda _h: TINY, _done_or_refused)
+
+
+def huge(context: Context) -> CheckOutcome:
+    """A step a thousand times the communication step, or to the end of the experiment.
+
+    Args:
+        context: what is checked.
+    """
+    left = context.bench.end - context.start_time - BEFORE * context.step
+    return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
+
+
+def zero(context: Context) -> CheckOutcome:
+    """A step of length zero, which the standard does not know.
+
+    Args:
+        context: what is checked.
+    """
+    return _odd(context, lambda _h: 0.0, _still_or_refused)
+
+
+def negative(context: Context) -> CheckOutcome:
+    """A step back in time, which the standard forbids.
+
+    Args:
+        context: what is checked.
+    """
+    return _odd(context, lambda h: -h, _must_refuse)
+
+
+def wrong_time(context: Context) -> CheckOutcome:
+    """A step from a currentCommunicationPoint where the FMU does not stand.
+
+    Args:
+        context: what is checked.
+    """
+    return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
+
+
+Judge = Callable[[str, bool, str], CheckOutcome]
+
+
+def _odd(
+    context: Context, size: Callable[[float], float], judge: Judge, shift: Callable[[float], float] = lambda _h: 0.0
+) -> CheckOutcome:
+    """One odd step on an instance of its own after three ordinary ones; the judge says what it thinks of it."""
+    bench = context.fresh_bench()
+    try:
+        bench.begin()
+        before = bench.steps((bench.h,) * BEFORE)[-1]
+        slave = bench.component
+        bench.set_inputs(bench.amplitude)
+        said = slave.raw_step(bench.now + shift(bench.h), size(bench.h))
+        if said.refused:
+            return _refusal(said)
+        after = bench.outputs()
+        bad = not_finite(bench.output_names, after, slave.variables) if np.isfinite(before).all() else []
+        moved = not np.array_equal(before, after, equal_nan=True)
+        what = f"a step of {size(bench.h):g} s" + (f" from {shift(bench.h):g} s too late" if shift(bench.h) else "")
+        return judge(what, moved, listed(bad))
+    finally:
+        bench.put_away()
+
+
+def _refusal(said: RawStep) -> CheckOutcome:
+    if said.status == "fatal":
+        return noted("refused with status fatal: the instance is lost")
+    return passed(f"refused with status {said.status}")
+
+
+def _done_or_refused(what: str, moved: bool, bad: str) -> CheckOutcome:
+    if bad:
+        return failed(f"accepts {what} and is not finite after it: {bad}")
+    return passed(f"accepts {what}, " + ("the outputs move" if moved else "the outputs stay"))
+
+
+def _still_or_refused(what: str, moved: bool, bad: str) -> CheckOutcome:
+    if bad or moved:
+        return noted(f"accepts {what}, and the outputs move" + (f": {bad}" if bad else ""))
+    return passed(f"accepts {what}, the outputs stay")
+
+
+def _must_refuse(what: str, moved: bool, bad: str) -> CheckOutcome:
+    effect = f"not finite: {bad}" if bad else "the outputs move" if moved else "the outputs stay"
+    return noted(f"accepts {what} instead of refusing it; {effect}")
+
+
+class DividedStepsCheck(Check):
+    """The check *divided steps*."""
+
+    name = "divided steps"
+    failing = LIMIT
+    advice = FIXED_STEP
+    compares = True
+    place = 9
+    run = staticmethod(divided)
+
+
+class ShortStepCheck(Check):
+    """The check *short step*."""
+
+    name = "short step"
+    failing = LIMIT
+    advice = FIXED_STEP
+    compares = True
+    place = 10
+    run = staticmethod(short)
+
+
+class TinyStepCheck(Check):
+    """The check *tiny step*."""
+
+    name = "tiny step"
+    failing = LIMIT
+    advice = "use no step far below its communication step"
+    place = 19
+    run = staticmethod(tiny)
+
+
+class HugeStepCheck(Check):
+    """The check *huge step*."""
+
+    name = "huge step"
+    failing = NOTE
+    advice = "use no step far above its communication step"
+    place = 20
+    run = staticmethod(huge)
+
+
+class ZeroStepCheck(Check):
+    """The check *zero step*."""
+
+    name = "zero step"
+    failing = NOTE
+    advice = "never send a step of length zero, as some masters do"
+    place = 21
+    run = staticmethod(zero)
+
+
+class NegativeStepCheck(Check):
+    """The check *negative step*."""
+
+    name = "negative step"
+    failing = NOTE
+    advice = "never send a negative step"
+    place = 22
+    run = staticmethod(negative)
+
+
+class StepFromElsewhereCheck(Check):
+    """The check *step from elsewhere*."""
+
+    name = "step from elsewhere"
+    failing = NOTE
+    advice = "never step it from where it does not stand"
+    place = 23
+    run = staticmethod(wrong_time)

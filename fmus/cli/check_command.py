@@ -1,0 +1,102 @@
+"""Command line: ``fmus check FILE.fmu``.
+
+Exit codes: 0 use it as it is, or with the limits that are told; 1 do not trust it, with ``--strict`` also where there
+are limits; 2 the file cannot be checked, the check itself failed, or a mistake of the user.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from fmus.check.findings import Class, Verdict
+from fmus.check.findings_table import as_data, table
+from fmus.check.run import CheckReport, check_count, check_fmu
+from fmus.cli.commands import argument, one_of
+from fmus.cli.progress import ProgressBar
+from fmus.fmi.archive import open_archive
+
+CLEAN, PROBLEMS, UNCHECKED = 0, 1, 2
+TRUTH = {"true": 1.0, "false": 0.0}
+
+PARSER: dict[str, Any] = {}
+ARGUMENTS = (
+    argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0"),
+    argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)"),
+    argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated"),
+    argument("--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)"),
+    one_of(
+        argument("--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)"),
+        argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps"),
+    ),
+    argument("--strict", action="store_true", help="limits end with exit code 1 too"),
+    argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table"),
+)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Check a file and print the report.
+
+    Args:
+        options: what the parser of `register` understood.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        ValueError, OSError: the file cannot be checked, or a mistake of the user; the program ends with 2 then.
+    """
+    report = _checked(options)
+    if options.json:
+        _write_json(options.json, as_data(report))
+    if options.json != "-":
+        print(table(report))
+    return _exit_code(report, options.strict)
+
+
+def _exit_code(report: CheckReport, strict: bool) -> int:
+    if report.verdict is Class.DISTRUST:
+        return PROBLEMS
+    if any(finding.verdict is Verdict.ERROR for finding in report.findings):
+        return UNCHECKED
+    return PROBLEMS if strict and not report.clean else CLEAN
+
+
+def _checked(options: argparse.Namespace) -> CheckReport:
+    starts = _starts(options.start)
+    checks, number = check_count(open_archive(options.file)), count(1)
+    with ProgressBar("check") as bar:
+        return check_fmu(
+            options.file,
+            step=options.step,
+            starts=starts,
+            timeout=options.timeout,
+            steps=options.steps,
+            until=options.until,
+            progress=lambda name: bar(next(number), checks, name),
+        )
+
+
+def _starts(words: Sequence[str]) -> dict[str, float]:
+    starts = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        try:
+            if not equals or not name:
+                raise ValueError
+            starts[name] = TRUTH[value.lower()] if value.lower() in TRUTH else float(value)
+        except ValueError:
+            raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.") from None
+    return starts
+
+
+def _write_json(target: str, data: dict[str, Any]) -> None:
+    if target == "-":  # a terminal, perhaps: pure ASCII has no control characters
+        sys.stdout.write(json.dumps(data, indent=2) + "\n")
+    else:
+        Path(target).write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
