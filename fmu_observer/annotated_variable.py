@@ -13,9 +13,9 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from plant_models.hybrid.output_warning import OutputWarning
 
-OPTIONAL, CAN_BE_MISSING = "optional", "can_be_missing"
+_OPTIONAL, CAN_BE_MISSING = "optional", "can_be_missing"
 MARKS = {
-    OPTIONAL: ("fmu-observer.optional-input", "OptionalInput"),
+    _OPTIONAL: ("fmu-observer.optional-input", "OptionalInput"),
     CAN_BE_MISSING: ("fmu-observer.can-be-missing", "CanBeMissing"),
 }
 """Marks, which are attributes of a `Signal`: annotation and element by which the description of an exported model
@@ -73,7 +73,7 @@ def is_optional(variable: ModelVariable) -> bool:
     Args:
         variable: of a block, or of an FMU as `fmus.fmi.description` reads it; that of another tool never says so.
     """
-    return isinstance(variable, AnnotatedVariable) and OPTIONAL in variable.marks
+    return isinstance(variable, AnnotatedVariable) and _OPTIONAL in variable.marks
 
 
 def can_be_missing(variable: ModelVariable) -> bool:

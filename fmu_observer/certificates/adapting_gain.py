@@ -30,10 +30,10 @@ from fmu_observer.certificates.quadratic import (
 )
 from fmu_observer.certificates.sampled_error import SampledError
 
-CELLS = 800  # of x, for checking
-COARSE = 16  # values of x for finding the Lyapunov matrix
-CUTS = 5
-LONGEST_X = 20.0  # theta times gap up to which a constant gap is searched for instability
+_CELLS = 800  # of x, for checking
+_COARSE = 16  # values of x for finding the Lyapunov matrix
+_CUTS = 5
+_LONGEST_X = 20.0  # theta times gap up to which a constant gap is searched for instability
 _LIMIT_TOLERANCE = 1e-3  # relative width of the last bisection interval
 _SMALLEST_LIMIT = 1e-5  # of the constant limit: below it no gap was found
 
@@ -135,7 +135,7 @@ def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_mode
     Returns:
         The certificate, without observer and preset. Its Lyapunov function is ``theta eps' P eps`` with theta in force.
     """
-    horizon = max(2.0 * max_gap, LONGEST_X / adaptation.theta_min)
+    horizon = max(2.0 * max_gap, _LONGEST_X / adaptation.theta_min)
     unstable_x = first_unstable_gap(adaptation.vertices, horizon * adaptation.theta_min)
     constant = unstable_x / (adaptation.theta_min if unstable_x > adaptation.ratio else adaptation.theta_max)
     margin, P = _common_decrease(adaptation, max_gap)
@@ -176,9 +176,9 @@ def _common_decrease(adaptation: GainAdaptation, max_gap: float) -> tuple[float,
     if cells.changing[0] and (cells.smallest[0] < 1.0 or cells.largest[0] > 1.0):
         return -inf, None  # changes of the gain without any time to correct: nothing here covers them
     grids = [_Grid(vertex, cells) for vertex in adaptation.vertices]
-    sought = reduce(QuadraticCondition.joined, (grid.condition(range(0, CELLS, CELLS // COARSE)) for grid in grids))
+    sought = reduce(QuadraticCondition.joined, (grid.condition(range(0, _CELLS, _CELLS // _COARSE)) for grid in grids))
     best: tuple[float, np.ndarray | None] = (-inf, None)
-    for _ in range(CUTS):
+    for _ in range(_CUTS):
         candidate = common_quadratic_form(sought)
         if candidate is None:
             break
@@ -197,7 +197,7 @@ def _cells(adaptation: GainAdaptation, max_gap: float) -> _Cells:
     """What can occur, cell by cell; a superset, since every bound is taken at its worst over the cell."""
     low, high, ratio = adaptation.theta_min, adaptation.theta_max, adaptation.ratio
     everywhere = adaptation.expected_share(np.zeros(1), np.full(1, max_gap), max_gap)[1][0]
-    x = np.linspace(0.0, min(max(ratio * everywhere, low * max_gap), high * max_gap), CELLS + 1)
+    x = np.linspace(0.0, min(max(ratio * everywhere, low * max_gap), high * max_gap), _CELLS + 1)
     longest = np.minimum(x[1:] / low, max_gap)
     smallest_share, largest_share = adaptation.expected_share(np.minimum(x[:-1] / high, longest), longest, max_gap)
     least, most = (np.maximum(ratio * share, np.finfo(float).tiny) for share in (smallest_share, largest_share))
@@ -210,13 +210,13 @@ class _Grid:
     """The inequalities of one vertex on the grid of cells, divided by x: at x = 0 that is the condition of the flow."""
 
     def __init__(self, vertex: SampledError, cells: _Cells) -> None:
-        self._x, self._transitions = vertex.transitions(float(cells.x[-1]), CELLS)  # entry i stands at x[i + 1]
+        self._x, self._transitions = vertex.transitions(float(cells.x[-1]), _CELLS)  # entry i stands at x[i + 1]
         start = flow_condition(vertex.continuous_limit)
         self._unchanged = start.joined(transition_condition(self._transitions, self._x))
-        self._cells = np.flatnonzero(cells.changing & (np.arange(CELLS) > 0))  # at x = 0 no gain changes
+        self._cells = np.flatnonzero(cells.changing & (np.arange(_CELLS) > 0))  # at x = 0 no gain changes
         # the condition is convex in m
         self._changes = np.stack([cells.smallest[self._cells], cells.largest[self._cells]])
-        self._first = np.clip(self._cells - 2, 0, CELLS - 4)  # the cell and its neighbours: four points
+        self._first = np.clip(self._cells - 2, 0, _CELLS - 4)  # the cell and its neighbours: four points
 
     def condition(self, cells: Sequence[int]) -> QuadraticCondition:
         """The inequalities at some of the cells, with the extreme changes of gain possible there."""
@@ -234,7 +234,7 @@ class _Grid:
         largest = np.linalg.eigvalsh(unchanged)[:, -1]
         found = (
             float(largest.max()) + 0.125 * _bend(np.diff(unchanged, 2, axis=0)),
-            min(int(largest.argmax()), CELLS - 1),
+            min(int(largest.argmax()), _CELLS - 1),
         )
         for change in self._changes if len(self._cells) else ():
             points = np.stack([inequalities(self._changed(self._first + k, change), P) for k in range(4)])

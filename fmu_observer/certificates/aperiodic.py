@@ -26,11 +26,11 @@ from fmu_observer.certificates.switching_error import SwitchingError
 
 # smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
 MARGIN = 1e-6
-SHORTEST_HORIZON = 20.0  # [s]
-COARSE, FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
-CUTS = 4
+_SHORTEST_HORIZON = 20.0  # [s]
+_COARSE, _FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
+_CUTS = 4
 _SMALLEST_LIMIT = 1e-4  # of the constant limit: below it no aperiodic limit was found
-LARGEST_GROWTH = 1e60  # an error that grows more over a gap is beyond what a quadratic form in floating point can judge
+_LARGEST_GROWTH = 1e60  # over a gap: more is beyond what a quadratic form in floating point can judge
 _LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
 
 
@@ -66,7 +66,7 @@ def certify_sampled_error(
         raise ValueError(
             "Certificate: the vertices must be errors of the same components, reset in the same way; they are not."
         )
-    horizon = max(SHORTEST_HORIZON, 4.0 * max_gap)
+    horizon = max(_SHORTEST_HORIZON, 4.0 * max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
     found = common_decrease(vertices, max_gap, switching)
     holds = found.margin > MARGIN
@@ -89,7 +89,7 @@ def _left_out(vertex: GapError, max_gap: float) -> tuple[str, ...]:
     """A note where the error does not fall in a gap of zero, and no derivative there covers short ones."""
     if vertex.continuous_limit is not None or vertex.spectral_radius(0.0) < 1.0 - MARGIN:
         return ()
-    return (f"gaps below {max_gap / (FINE + 1):.2g} s are left out",)
+    return (f"gaps below {max_gap / (_FINE + 1):.2g} s are left out",)
 
 
 def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...], what: str) -> Certificate:
@@ -137,14 +137,14 @@ def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: b
     """
     scale = _scaling(vertices)
     with np.errstate(over="ignore", invalid="ignore"):
-        fine = [_conditions(vertex, longest, FINE, scale) for vertex in vertices]
-    if not all(np.abs(condition.N).max() < LARGEST_GROWTH for condition in fine):  # NaN included
+        fine = [_conditions(vertex, longest, _FINE, scale) for vertex in vertices]
+    if not all(np.abs(condition.N).max() < _LARGEST_GROWTH for condition in fine):  # NaN included
         return Decrease(-inf, None)
-    sought = _pick(fine, range(0, FINE + 1, FINE // COARSE))
+    sought = _pick(fine, range(0, _FINE + 1, _FINE // _COARSE))
     inclusion = SwitchingError.between(vertices) if switching else None
-    judged = fine if inclusion is None else [_conditions(inclusion.centre, longest, FINE, scale)]
+    judged = fine if inclusion is None else [_conditions(inclusion.centre, longest, _FINE, scale)]
     best = Decrease(-inf, None)
-    for _ in range(CUTS):
+    for _ in range(_CUTS):
         candidate = common_quadratic_form(sought)
         if candidate is None:
             break
@@ -164,9 +164,9 @@ def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: b
 def _growth(inclusion: SwitchingError, P: np.ndarray, longest: float) -> np.ndarray:
     """What changes within a gap add to the inequalities of the centre, in units of P, shape (FINE + 1,)."""
     if inclusion.centre.continuous_limit is None:  # not divided by the gap: see `_conditions`
-        gaps = longest / (FINE + 1) * np.arange(1, FINE + 2)
+        gaps = longest / (_FINE + 1) * np.arange(1, _FINE + 2)
         return np.asarray(inclusion.growth(P, longest, gaps) * gaps)
-    return np.asarray(inclusion.growth(P, longest, np.linspace(0.0, longest, FINE + 1)) / inclusion.centre.rate)
+    return np.asarray(inclusion.growth(P, longest, np.linspace(0.0, longest, _FINE + 1)) / inclusion.centre.rate)
 
 
 def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray) -> QuadraticCondition:

@@ -15,8 +15,8 @@ from fmu_observer.certificates.gap_error import GapError, matrix_powers
 from fmu_observer.certificates.impulsive_error import ImpulsiveError, Rows, rows_of
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-TERMS = 80
-LARGEST_TURN = 15.0  # of the drift's rate times the decay; beyond it the series loses more than half of its digits
+_TERMS = 80
+_LARGEST_TURN = 15.0  # of the drift's rate times the decay; beyond it the series loses more than half of its digits
 
 
 @dataclass(frozen=True)
@@ -120,10 +120,10 @@ class DecayingError(GapError):
         m = 1.0 / (1.0 - self.exponent)
         end = m / self.rate_of_decay
         left = np.maximum(1.0 - gaps / end, 0.0)
-        powers = (end * left ** (m + 1.0))[:, None] * np.vander(left, TERMS, increasing=True)
-        coefficients = 1.0 / np.cumprod(m + 1.0 + np.arange(TERMS))
+        powers = (end * left ** (m + 1.0))[:, None] * np.vander(left, _TERMS, increasing=True)
+        coefficients = 1.0 / np.cumprod(m + 1.0 + np.arange(_TERMS))
         term, terms = np.asarray(self.gain_rows), []
-        for _ in range(TERMS):
+        for _ in range(_TERMS):
             terms.append(term)
             term = -self.generator * end @ term
         return np.tensordot(powers * coefficients, np.stack(terms), axes=1)
@@ -149,9 +149,9 @@ def decaying_error(
     if rate == 0.0 or exponent == 1.0:
         return ImpulsiveError.with_innovation(drift, gain, rate * np.eye(np.shape(gain)[1]), C, levels)
     turn = float(np.abs(np.linalg.eigvals(drift)).max()) / ((1.0 - exponent) * rate)
-    if turn > LARGEST_TURN:
+    if turn > _LARGEST_TURN:
         raise ValueError(
             f"Certificate: the innovation lasts {turn:.3g} times the fastest time of the model; at most "
-            f"{LARGEST_TURN:g} can be judged. Raise the decay rate, lower the exponent, or take 1 for it."
+            f"{_LARGEST_TURN:g} can be judged. Raise the decay rate, lower the exponent, or take 1 for it."
         )
     return DecayingError(rows_of(drift), rows_of(gain), rows_of(C), float(rate), float(exponent), levels)

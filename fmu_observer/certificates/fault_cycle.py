@@ -15,8 +15,8 @@ import scipy
 
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-SCAN_POINTS = 300  # over seven decades of time
-THIRDS = 60
+_SCAN_POINTS = 300  # over seven decades of time
+_THIRDS = 60
 
 
 @dataclass(frozen=True)
@@ -201,11 +201,11 @@ def overshoot(error_matrix: np.ndarray, decay: float) -> float:
 
     horizon = 30.0 / (slowest - decay)  # by then e^-30 of any overshoot is left
     fastest = float(np.abs(poles).max())
-    times = np.concatenate([[0.0], np.geomspace(1e-4 / fastest, horizon, SCAN_POINTS)])
+    times = np.concatenate([[0.0], np.geomspace(1e-4 / fastest, horizon, _SCAN_POINTS)])
     sizes = [size(float(t)) for t in times]
     k = int(np.argmax(sizes))
     low, high = times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)]
-    for _ in range(THIRDS):
+    for _ in range(_THIRDS):
         third = (high - low) / 3.0
         low, high = (low + third, high) if size(low + third) < size(high - third) else (low, high - third)
     return max(sizes[k], size(0.5 * (low + high)))
@@ -263,7 +263,7 @@ def smallest_effort(error_matrix: np.ndarray, effort_column: np.ndarray, thresho
 def _scan(error_matrix: np.ndarray) -> np.ndarray:
     """Times from far below the fastest time constant to far above the slowest [s]."""
     poles = np.linalg.eigvals(np.asarray(error_matrix, dtype=float))
-    return np.asarray(np.geomspace(1e-6 / np.abs(poles).max(), 30.0 / -poles.real.max(), SCAN_POINTS))
+    return np.asarray(np.geomspace(1e-6 / np.abs(poles).max(), 30.0 / -poles.real.max(), _SCAN_POINTS))
 
 
 def _shown(error_matrix: np.ndarray, effort_column: np.ndarray, row: int, t: float) -> float:

@@ -16,9 +16,9 @@ import numpy as np
 from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-SCAN_POINTS = 4000
-DECADES, DECADE_POINTS = (1000.0, 100.0, 10.0), 400  # parts of the horizon that are scanned finer before it
-SURELY = 1e-6  # growth over a short gap that is no rounding
+_SCAN_POINTS = 4000
+_DECADES, _DECADE_POINTS = (1000.0, 100.0, 10.0), 400  # parts of the horizon that are scanned finer before it
+_SURELY = 1e-6  # growth over a short gap that is no rounding
 _BISECTIONS = 40
 
 
@@ -130,7 +130,7 @@ def matrix_powers(step: np.ndarray, count: int) -> np.ndarray:
 def first_unstable_gap(vertices: Sequence[GapError], horizon: float) -> float:
     """First constant gap at which some vertex is seen unstable, by scanning (0, horizon] and bisection.
 
-    It is a scan of `SCAN_POINTS` gaps, and of finer ones up to a thousandth, a hundredth and a tenth of the horizon: a
+    It is a scan of `_SCAN_POINTS` gaps, and of finer ones up to a thousandth, a hundredth and a tenth of the horizon: a
     window of instability narrower than their distance, as lightly damped errors have, can lie between two of them. What
     is guaranteed is the limit of `aperiodic`.
 
@@ -148,13 +148,13 @@ def _first_unstable_gap_of(vertex: GapError, horizon: float) -> float:
     limit = vertex.continuous_limit
     if limit is not None and np.linalg.eigvals(limit).real.max() >= 0.0:
         return 0.0
-    for parts in (*DECADES, 1.0):
-        points = SCAN_POINTS if parts == 1.0 else DECADE_POINTS
+    for parts in (*_DECADES, 1.0):
+        points = _SCAN_POINTS if parts == 1.0 else _DECADE_POINTS
         gaps, matrices = vertex.transitions(horizon / parts, points)
         finite = np.isfinite(matrices).all(axis=(1, 2))
         radii = np.full(len(gaps), inf)
         radii[finite] = np.abs(np.linalg.eigvals(matrices[finite])).max(axis=1)
-        unstable = np.flatnonzero(radii >= (1.0 if parts == 1.0 else 1.0 + SURELY))
+        unstable = np.flatnonzero(radii >= (1.0 if parts == 1.0 else 1.0 + _SURELY))
         if unstable.size:
             high = float(gaps[unstable[0]])
             return _boundary(vertex, high - horizon / (parts * points), high)

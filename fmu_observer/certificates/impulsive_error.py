@@ -15,7 +15,7 @@ import numpy as np
 from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix_powers
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-NEGLIGIBLE = 1e-12  # relative: a smaller pivot of the reset is rounding
+_NEGLIGIBLE = 1e-12  # relative: a smaller pivot of the reset is rounding
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -172,7 +172,7 @@ def row_echelon(matrix: np.ndarray) -> tuple[np.ndarray, list[int]]:
         Array of shape (rank, M) whose pivot columns are unit vectors, and the pivot columns.
     """
     rows = np.array(matrix, dtype=float)
-    negligible = NEGLIGIBLE * np.abs(rows).max()
+    negligible = _NEGLIGIBLE * np.abs(rows).max()
     pivots: list[int] = []
     for column in range(rows.shape[1]):
         first = len(pivots)

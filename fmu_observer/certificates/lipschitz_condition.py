@@ -10,7 +10,7 @@ import scipy
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale, scaled, scaled_lipschitz
 
-SCALES = np.geomspace(0.1, 100.0, 301)
+_SCALES = np.geomspace(0.1, 100.0, 301)
 
 
 @dataclass(frozen=True)
@@ -69,4 +69,4 @@ def best_thau_bound(model: ObserverModel, gain: np.ndarray) -> ThauBound:
         bound = scaled_thau_bound(model, gain, scale)
         return bound.valid / max(bound.lipschitz, 1e-12)
 
-    return scaled_thau_bound(model, gain, best_scale(margin, model.A - gain @ model.C, SCALES))
+    return scaled_thau_bound(model, gain, best_scale(margin, model.A - gain @ model.C, _SCALES))

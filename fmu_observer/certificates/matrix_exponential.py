@@ -10,8 +10,8 @@ from math import ceil, log2
 
 import numpy as np
 
-TAYLOR_DEGREE = 16  # remainder 0.5^17 / 17! = 2e-20 at the norm the scaling leaves
-SCALED_NORM = 0.5
+_TAYLOR_DEGREE = 16  # remainder 0.5^17 / 17! = 2e-20 at the norm the scaling leaves
+_SCALED_NORM = 0.5
 
 
 def small_exponential(matrix: np.ndarray) -> np.ndarray:
@@ -24,11 +24,11 @@ def small_exponential(matrix: np.ndarray) -> np.ndarray:
         The exponential, shape (n, n), to about ``norm(matrix)`` roundings.
     """
     norm = float(np.abs(matrix).sum(axis=0).max())
-    squarings = max(0, ceil(log2(norm / SCALED_NORM))) if norm > 0.0 else 0
+    squarings = max(0, ceil(log2(norm / _SCALED_NORM))) if norm > 0.0 else 0
     scaled = matrix / 2.0**squarings
     identity = np.eye(len(matrix))
     result = identity
-    for k in range(TAYLOR_DEGREE, 0, -1):
+    for k in range(_TAYLOR_DEGREE, 0, -1):
         result = identity + scaled @ result / k
     with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
         for _ in range(squarings):

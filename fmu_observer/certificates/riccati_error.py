@@ -14,8 +14,8 @@ from fmu_observer.certificates.gap_error import GapError, matrix_powers
 from fmu_observer.certificates.impulsive_error import Rows, rows_of
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-DOUBLINGS = 40
-SETTLED = 1e-12  # relative change of a doubling step
+_DOUBLINGS = 40
+_SETTLED = 1e-12  # relative change of a doubling step
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _settled(flows: np.ndarray, information: np.ndarray, noises: np.ndarray) -> 
     A, G, H = np.swapaxes(flows, 1, 2), information, noises
     identity = np.eye(A.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(DOUBLINGS):
+        for _ in range(_DOUBLINGS):
             closed = _inverses(identity + G @ H)
             left = A @ closed
             grown = H + np.swapaxes(A, 1, 2) @ H @ closed @ A
@@ -116,7 +116,7 @@ def _settled(flows: np.ndarray, information: np.ndarray, noises: np.ndarray) -> 
             A = left @ A
             change = (np.abs(grown - H).max(axis=(1, 2)) / np.abs(grown).max(axis=(1, 2))).max()
             H = 0.5 * (grown + np.swapaxes(grown, 1, 2))
-            if change < SETTLED:
+            if change < _SETTLED:
                 break
     return H
 

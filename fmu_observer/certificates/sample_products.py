@@ -23,9 +23,9 @@ from fmu_observer.certificates.quadratic import (
     transition_condition,
 )
 
-HORIZON = 10.0  # [s]
-COARSE_PHASES, FINE_PHASES = 5, 41  # phases of the balise in an odometer period, for finding and for checking
-CUTS = 6
+_HORIZON = 10.0  # [s]
+_COARSE_PHASES, _FINE_PHASES = 5, 41  # phases of the balise in an odometer period, for finding and for checking
+_CUTS = 6
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str
         The certificate, without observer and preset.
     """
     samples = _samples(error, max_gap)
-    horizon = max(HORIZON, 2.0 * max_gap)
+    horizon = max(_HORIZON, 2.0 * max_gap)
     radii = _constant_radii(error, _samples(error, horizon))
     unstable = np.flatnonzero(~(radii < 1.0))
     searched = int(unstable[0]) if unstable.size else len(radii)
@@ -130,22 +130,21 @@ def _samples(error: TwoRateError, gap: float) -> int:
 
 def _constant_radii(error: TwoRateError, samples: int) -> np.ndarray:
     """Worst spectral radius over the phases at gaps of 1 .. `samples` periods, shape (samples,)."""
-    return np.asarray(np.abs(np.linalg.eigvals(error.products(samples, COARSE_PHASES))).max(axis=(1, 2)))
+    return np.asarray(np.abs(np.linalg.eigvals(error.products(samples, _COARSE_PHASES))).max(axis=(1, 2)))
 
 
 @lru_cache(maxsize=256)
 def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarray | None]:
     """Best recomputed relative decrease over all products of up to `samples` samples, and its P."""
     scale = _scaling(error, samples)
-    fine = error.products(samples, FINE_PHASES) * (scale[None, :] / scale[:, None])
+    fine = error.products(samples, _FINE_PHASES) * (scale[None, :] / scale[:, None])
     shape = fine.shape
     condition = transition_condition(fine.reshape(-1, *shape[2:]))
-    coarse = (
-        np.arange(len(condition.w)).reshape(shape[:2])[:: max(1, samples // 8), :: FINE_PHASES // COARSE_PHASES].ravel()
-    )
-    chosen = set(map(int, coarse))
+    places = np.arange(len(condition.w)).reshape(shape[:2])
+    coarse = places[:: max(1, samples // 8), :: _FINE_PHASES // _COARSE_PHASES]
+    chosen = set(map(int, coarse.ravel()))
     best: tuple[float, np.ndarray | None] = (-inf, None)
-    for _ in range(CUTS):
+    for _ in range(_CUTS):
         candidate = common_quadratic_form(condition.picked(sorted(chosen)))
         if candidate is None:
             break
@@ -160,10 +159,10 @@ def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarr
 
 def _recomputed(condition: QuadraticCondition, P: np.ndarray, samples: int) -> tuple[float, set[int]]:
     """Margin over the fine grid and between its phases, and the worst phase of every sample count."""
-    values = inequalities(condition, P).reshape(samples, FINE_PHASES, *P.shape)
+    values = inequalities(condition, P).reshape(samples, _FINE_PHASES, *P.shape)
     largest = np.linalg.eigvalsh(values)[..., -1]
     bend = np.linalg.norm(np.diff(values, 2, axis=1), axis=(2, 3)).max()  # see aperiodic: bound between grid points
-    worst = {i * FINE_PHASES + int(k) for i, k in enumerate(largest.argmax(axis=1))}
+    worst = {i * _FINE_PHASES + int(k) for i, k in enumerate(largest.argmax(axis=1))}
     return -float(largest.max() + 0.125 * bend), worst
 
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
 
-FREQUENCIES = 2000
-SPAN = 1e3  # the grid reaches from the slowest rate over this to the fastest times this
-WIDTHS = np.linspace(-2.0, 2.0, 21)  # half widths about each resonance at which the grid is denser
-SAFETY = 1.001  # on the peak of the grid; that nothing exceeds it is then checked
-RAISES = 400  # times the bound is raised until the check confirms it
+_FREQUENCIES = 2000
+_SPAN = 1e3  # the grid reaches from the slowest rate over this to the fastest times this
+_WIDTHS = np.linspace(-2.0, 2.0, 21)  # half widths about each resonance at which the grid is denser
+_SAFETY = 1.001  # on the peak of the grid; that nothing exceeds it is then checked
+_RAISES = 400  # times the bound is raised until the check confirms it
 
 
 def independent_gap_limit(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> float:
@@ -39,14 +39,14 @@ def independent_gap_limit(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.nda
     rates = np.abs(poles)
     if not poles.real.max() < 0.0:
         return 0.0
-    resonances = np.abs(poles.imag[:, None] + WIDTHS * poles.real[:, None]).ravel()
-    frequencies = np.r_[0.0, np.geomspace(rates.min() / SPAN, rates.max() * SPAN, FREQUENCIES), resonances]
+    resonances = np.abs(poles.imag[:, None] + _WIDTHS * poles.real[:, None]).ravel()
+    frequencies = np.r_[0.0, np.geomspace(rates.min() / _SPAN, rates.max() * _SPAN, _FREQUENCIES), resonances]
     shifted = 1j * frequencies[:, None, None] * np.eye(len(A)) - A
     responses = C @ np.linalg.solve(shifted, np.broadcast_to(B.astype(complex), (len(frequencies), *B.shape))) + D
     peak, scale = _scaled_peak(np.concatenate([responses, D[None]]))
     if peak == 0.0:
         return inf
-    bound = _confirmed(A, B * scale[None, :], C / scale[:, None], D * scale[None, :] / scale[:, None], SAFETY * peak)
+    bound = _confirmed(A, B * scale[None, :], C / scale[:, None], D * scale[None, :] / scale[:, None], _SAFETY * peak)
     return pi / (2.0 * bound)
 
 
@@ -71,7 +71,7 @@ def _confirmed(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, bound
     The gain reaches the bound at a frequency w exactly if i w is an eigenvalue of the Hamiltonian matrix (Boyd,
     Balakrishnan, Kabamba, Math. Control Signals Syst. 2 (1989) 207-219).
     """
-    for _ in range(RAISES):
+    for _ in range(_RAISES):
         inside = np.linalg.inv(bound**2 * np.eye(D.shape[1]) - D.T @ D)
         drift = A + B @ inside @ D.T @ C
         outward = C.T @ (np.eye(len(D)) + D @ inside @ D.T) @ C
@@ -80,7 +80,7 @@ def _confirmed(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, bound
         rounding = 1e-8 * np.abs(values) + 1e-13 * np.linalg.norm(hamiltonian, 2)
         if np.all(np.abs(values.real) > rounding):
             return bound
-        bound *= 1.0 + 10.0 * (SAFETY - 1.0)
+        bound *= 1.0 + 10.0 * (_SAFETY - 1.0)
     return inf
 
 

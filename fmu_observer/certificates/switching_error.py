@@ -20,9 +20,9 @@ from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-POINTS = 300  # of the quadrature over the longest gap
-QUADRATURE = 1.01  # on what the trapezoidal rule finds: a hundred times its error where a rate acts ten times in a gap
-NEGLIGIBLE = 1e-12  # relative: a direction in which generators differ less is rounding
+_POINTS = 300  # of the quadrature over the longest gap
+_QUADRATURE = 1.01  # on what the trapezoidal rule finds: a hundred times its error where a rate acts ten times in a gap
+_NEGLIGIBLE = 1e-12  # relative: a direction in which generators differ less is rounding
 
 
 @dataclass(frozen=True)
@@ -78,19 +78,19 @@ class SwitchingError:
         if strength == 0.0:
             return np.zeros(len(gaps))
         into, out = sizes[:, None] * into, out / sizes[None, :]
-        step = longest / POINTS
+        step = longest / _POINTS
         flow = np.concatenate(
-            [np.eye(len(sizes))[None], matrix_powers(small_exponential(self.centre.generator * step), POINTS)]
+            [np.eye(len(sizes))[None], matrix_powers(small_exponential(self.centre.generator * step), _POINTS)]
         )
-        course = self.centre.courses(longest, POINTS) @ np.linalg.inv(root)
+        course = self.centre.courses(longest, _POINTS) @ np.linalg.inv(root)
         after = root @ self.centre.kept
         seen = _norms(out @ course)
         kernel, effect = strength * _norms(out @ flow @ into), strength * _norms(after @ flow @ into)
-        stray = QUADRATURE * _convolved(effect, _volterra(seen, kernel, step), step)
+        stray = _QUADRATURE * _convolved(effect, _volterra(seen, kernel, step), step)
         grown = _norms(after @ course)
         added = (2.0 * grown + stray) * stray
-        times = step * np.arange(POINTS + 1)
-        rates = np.concatenate([[2.0 * QUADRATURE * effect[0] * seen[0]], added[1:] / times[1:]])
+        times = step * np.arange(_POINTS + 1)
+        rates = np.concatenate([[2.0 * _QUADRATURE * effect[0] * seen[0]], added[1:] / times[1:]])
         return np.asarray(np.interp(gaps, times, rates))
 
 
@@ -105,7 +105,7 @@ def _directions(distances: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
 
 def _basis(matrix: np.ndarray) -> np.ndarray:
     left, values, _ = np.linalg.svd(matrix, full_matrices=False)
-    return np.asarray(left[:, values > NEGLIGIBLE * max(float(values[0]), NEGLIGIBLE)])
+    return np.asarray(left[:, values > _NEGLIGIBLE * max(float(values[0]), _NEGLIGIBLE)])
 
 
 def _norms(matrices: np.ndarray) -> np.ndarray:

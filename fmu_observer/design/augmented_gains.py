@@ -16,10 +16,10 @@ from fmu_observer.certificates.aperiodic import aperiodic_limit, certify_sampled
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sampled_error import SampledError
 
-ORDER = 4
+_ORDER = 4
 # [ours] real, geometric mean -1; unequal ones bear longer gaps than four equal ones
 UNIT_POLES = (-0.5, -0.8, -1.25, -2.0)
-HORIZON = 20.0  # [s] at unit poles
+_HORIZON = 20.0  # [s] at unit poles
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class PositionGains:
 
 def augmented_matrix(drag_slope: float) -> np.ndarray:
     """Matrix of ``[p, v, delta, delta']``, shape (4, 4): the shift with ``-drag_slope`` [1/s] on the speed (4.13)."""
-    A = np.diag(np.ones(ORDER - 1), 1)
+    A = np.diag(np.ones(_ORDER - 1), 1)
     A[1, 1] = -drag_slope
     return A
 
@@ -56,18 +56,18 @@ def position_gains(poles: Sequence[float] | np.ndarray, drag_slope: float = 0.0)
         ValueError: not four poles, or one that is not stable.
     """
     values = np.asarray(poles)
-    if values.shape != (ORDER,) or not np.all(np.isfinite(values)) or values.real.max() >= 0.0:
+    if values.shape != (_ORDER,) or not np.all(np.isfinite(values)) or values.real.max() >= 0.0:
         raise ValueError(
-            f"position_gains: expected {ORDER} finite poles with negative real parts [1/s], got {tuple(poles)}."
+            f"position_gains: expected {_ORDER} finite poles with negative real parts [1/s], got {tuple(poles)}."
         )
     A = augmented_matrix(drag_slope)
-    observability = np.stack([np.linalg.matrix_power(A, k)[0] for k in range(ORDER)])
-    polynomial = sum(c * np.linalg.matrix_power(A, ORDER - k) for k, c in enumerate(np.real(np.poly(values))))
-    return np.asarray(polynomial @ np.linalg.solve(observability, np.eye(ORDER)[-1]))
+    observability = np.stack([np.linalg.matrix_power(A, k)[0] for k in range(_ORDER)])
+    polynomial = sum(c * np.linalg.matrix_power(A, _ORDER - k) for k, c in enumerate(np.real(np.poly(values))))
+    return np.asarray(polynomial @ np.linalg.solve(observability, np.eye(_ORDER)[-1]))
 
 
 def sampled_errors(
-    gains: Sequence[float], decay: float, drag_slopes: Sequence[float], odometer_gain: Sequence[float] = (0.0,) * ORDER
+    gains: Sequence[float], decay: float, drag_slopes: Sequence[float], odometer_gain: Sequence[float] = (0.0,) * _ORDER
 ) -> tuple[SampledError, ...]:
     """Error equations of the augmented observer, one for each drag slope [1/s].
 
@@ -75,7 +75,7 @@ def sampled_errors(
         gains: of position samples, shape (4,). decay: of the innovation [1/s].
         drag_slopes: corners of what the drag slope may be. odometer_gain: of a continuous odometer, shape (4,).
     """
-    continuous = np.outer(odometer_gain, np.eye(ORDER)[1])
+    continuous = np.outer(odometer_gain, np.eye(_ORDER)[1])
     return tuple(SampledError.of((augmented_matrix(s) - continuous).tolist(), gains, decay) for s in drag_slopes)
 
 
@@ -98,7 +98,7 @@ def design_for_gap(
     if not (isfinite(max_gap) and max_gap > 0.0 and isfinite(margin) and margin > 0.0):
         raise ValueError(f"design_for_gap: expected a positive gap [s] and margin, got {max_gap!r} and {margin!r}.")
     unit = position_gains(unit_poles)
-    limit = aperiodic_limit(sampled_errors(unit.tolist(), float(unit[0]), (0.0,)), HORIZON)
+    limit = aperiodic_limit(sampled_errors(unit.tolist(), float(unit[0]), (0.0,)), _HORIZON)
     if limit in (0.0, inf):
         raise ValueError(
             f"design_for_gap: no gap is certified for poles like {tuple(unit_poles)}; choose better damped ones."

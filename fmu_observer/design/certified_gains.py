@@ -8,8 +8,8 @@ from fmu_observer.certificates.certificate import Certificate
 
 Gains = dict[str, float]
 
-LIMIT = 4.0  # theta times gap certified for every mixture of gaps with K = (2, 1) and no drag
-TRIALS = 6
+_LIMIT = 4.0  # theta times gap certified for every mixture of gaps with K = (2, 1) and no drag
+_TRIALS = 6
 RATIOS = (2.5, 2.0, 1.5)  # of an adapting gain: theta times expected gap, largest first
 SHARES = (3.0, 2.0, 1.2)  # of an adapting gain: theta_min times longest gap, largest first
 
@@ -28,8 +28,8 @@ def certified_gains(
     Returns:
         The gains, or None where none were found.
     """
-    theta = LIMIT / gap
-    for _ in range(TRIALS):
+    theta = _LIMIT / gap
+    for _ in range(_TRIALS):
         candidate = family(rounded_down(theta))
         certificate = certify(candidate)
         if certificate.holds:

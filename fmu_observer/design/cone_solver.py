@@ -20,7 +20,7 @@ Rows = list[list[Matrix]]
 Attempt = tuple[float, Mapping[str, float]]
 Candidate = TypeVar("Candidate")
 
-ROUNDING = 1e-13  # of the largest number in a matrix: an eigenvalue smaller than this cannot be distinguished from zero
+_ROUNDING = 1e-13  # of the largest number in a matrix: a smaller eigenvalue cannot be distinguished from zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def smallest_eigenvalue(matrix: np.ndarray) -> float:
         matrix: shape (n, n).
     """
     asymmetry = np.abs(matrix - matrix.T).max()
-    rounding = len(matrix) * (ROUNDING * np.abs(matrix).max() + asymmetry)
+    rounding = len(matrix) * (_ROUNDING * np.abs(matrix).max() + asymmetry)
     return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0] - rounding)
 
 

@@ -17,7 +17,7 @@ from fmu_observer.models.suitability import require_unknown_inputs
 from fmu_observer.observability import MeasuredSystem, require_detectable, unobservable_modes
 from fmu_observer.observability.modes import unobservable_subspace
 
-STATEMENT = "rank(C H) = rank(H), and the invariant zeros of (A, H, C) lie in the left half plane"
+_STATEMENT = "rank(C H) = rank(H), and the invariant zeros of (A, H, C) lie in the left half plane"
 SOURCE = "Aguiar Cota 2019, (2.12); Darouach 1994"
 
 
@@ -51,7 +51,7 @@ def decoupling(A: np.ndarray, H: np.ndarray, C: np.ndarray) -> Decoupling:
     return Decoupling(M, P, free, np.array([*fixed, *pairs], dtype=complex))
 
 
-def decoupling_ranks(H: np.ndarray, C: np.ndarray) -> tuple[int, int]:
+def _decoupling_ranks(H: np.ndarray, C: np.ndarray) -> tuple[int, int]:
     """rank(C H) and rank(H).
 
     Args:
@@ -77,15 +77,15 @@ def decoupling_condition(model: ObserverModel) -> Condition:
     """
     require_unknown_inputs(model, "Decoupling")
     H = np.asarray(model.H)
-    seen, whole = decoupling_ranks(H, model.C)
+    seen, whole = _decoupling_ranks(H, model.C)
     values: dict[str, float] = {"rank_CH": seen, "rank_H": whole}
     if seen < whole:
-        return Condition(False, values, STATEMENT, SOURCE)
+        return Condition(False, values, _STATEMENT, SOURCE)
     fixed = decoupling(model.A, H, model.C).fixed.real
     values["invariant_zeros"] = len(fixed)
     if len(fixed):
         values["rightmost_zero"] = float(fixed.max())
-    return Condition(bool(np.all(fixed < 0.0)), values, STATEMENT, SOURCE)
+    return Condition(bool(np.all(fixed < 0.0)), values, _STATEMENT, SOURCE)
 
 
 def require_decoupling(model: ObserverModel, observer: str) -> None:
@@ -100,7 +100,7 @@ def require_decoupling(model: ObserverModel, observer: str) -> None:
     """
     require_unknown_inputs(model, observer)
     H = np.asarray(model.H)
-    seen, whole = decoupling_ranks(H, model.C)
+    seen, whole = _decoupling_ranks(H, model.C)
     if seen < whole:
         names = ", ".join(s.name for s in model.unknown_inputs)
         shown = ", ".join(s.name for s in model.measurements)

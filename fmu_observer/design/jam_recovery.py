@@ -15,7 +15,7 @@ from fmu_observer.certificates.gap_error import matrix_powers
 from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.detection.jam_rules import doubt_limit, settled_limit
 
-NEGLIGIBLE, LONGEST = 1e-9, 5000  # of what is left of an error; periods until then at most
+_NEGLIGIBLE, _LONGEST = 1e-9, 5000  # of what is left of an error; periods until then at most
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def _enclosed(pair: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 def _powers(transition: np.ndarray, radius: float) -> np.ndarray:
     """``F^k`` for k = 0 .. until it has vanished, shape (count, 3, 3)."""
-    count = min(int(log(NEGLIGIBLE) / log(max(radius, 1e-3))) + 1, LONGEST)
+    count = min(int(log(_NEGLIGIBLE) / log(max(radius, 1e-3))) + 1, _LONGEST)
     return np.concatenate([np.eye(3)[None], matrix_powers(transition, count)])
 
 

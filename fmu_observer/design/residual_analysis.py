@@ -14,11 +14,11 @@ import scipy
 from fmu_observer.design.residual_channel import ResidualChannel
 from fmu_observer.models.checks import check_numbers
 
-GRID = 400
-SPAN = 1e4  # the grid reaches from the slowest pole over this to the fastest times this
-STEPS = 60  # of the search for a peak; each comes much nearer
-SETTLED, RESPONSES, FINEST = 20.0, 500, 0.05  # a step response: time constants, points, part of the fastest one
-LONGEST = 0.5  # of a step times the norm of A, from which intervals are doubled
+_GRID = 400
+_SPAN = 1e4  # the grid reaches from the slowest pole over this to the fastest times this
+_STEPS = 60  # of the search for a peak; each comes much nearer
+_SETTLED, _RESPONSES, _FINEST = 20.0, 500, 0.05  # a step response: time constants, points, part of the fastest one
+_LONGEST = 0.5  # of a step times the norm of A, from which intervals are doubled
 
 
 def h_infinity_norm(channel: ResidualChannel, tolerance: float = 1e-7) -> float:
@@ -36,7 +36,7 @@ def h_infinity_norm(channel: ResidualChannel, tolerance: float = 1e-7) -> float:
     if not channel.stable:
         return inf
     best = float(_singular(channel, _grid(channel))[:, 0].max())
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         level = best * (1.0 + tolerance)
         if level == 0.0:
             return 0.0
@@ -71,7 +71,7 @@ def minimum_gain(channel: ResidualChannel, low: float = 0.0, high: float = inf, 
         raise ValueError(f"Minimum gain: the band [{low}, {high}] rad/s must be in order and begin at 0 or above.")
     grid = _grid(channel)
     best = float(_smallest(channel, np.r_[low, grid[(grid > low) & (grid < high)], high]).min())
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         level = best * (1.0 - tolerance)
         if level <= 0.0:
             return best
@@ -188,8 +188,8 @@ def sudden_fault(channel: ResidualChannel, threshold: float, length: float = inf
     check_numbers("Sudden fault", {"threshold": threshold})
     if not length > 0.0:
         raise ValueError(f"Sudden fault: the length must be positive, got {length} s.")
-    until = min(length, SETTLED / float(-channel.poles.real.max()))
-    step = min(until / RESPONSES, FINEST / float(np.abs(channel.poles).max()))
+    until = min(length, _SETTLED / float(-channel.poles.real.max()))
+    step = min(until / _RESPONSES, _FINEST / float(np.abs(channel.poles).max()))
     n = len(A)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n], whole[:n, n:] = A, B
@@ -241,7 +241,7 @@ def _grid(channel: ResidualChannel) -> np.ndarray:
     if not len(sizes):
         return np.array([0.0, inf])
     resonances = np.abs(channel.poles.imag)
-    about = np.geomspace(sizes.min() / SPAN, sizes.max() * SPAN, GRID)
+    about = np.geomspace(sizes.min() / _SPAN, sizes.max() * _SPAN, _GRID)
     return np.asarray(np.r_[0.0, np.sort(np.r_[about, resonances]), inf])
 
 
@@ -253,7 +253,7 @@ def _between(edges: np.ndarray) -> np.ndarray:
 
 def _energy(A: np.ndarray, C: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
     """``int exp(A' t) C' C exp(A t) dt`` over [0, length] and ``exp(A length)``, by doubling a short interval."""
-    doublings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(A, 2)) * length / LONGEST, 1.0)))))
+    doublings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(A, 2)) * length / _LONGEST, 1.0)))))
     n, short = len(A), length / 2**doublings
     block = np.block([[-A.T, C.T @ C], [np.zeros((n, n)), A]])
     exponential = scipy.linalg.expm(block * short)

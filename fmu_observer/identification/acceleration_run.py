@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 PARAMETERS = ("net_acceleration", "w1", "w2", "initial_speed")
 """What a run is described by: a [m/s2], w1 [1/s], w2 [1/m], v(0) [m/s]."""
-GRID_STEP, GRID_MOST = 0.25, 400  # [s]; speeds change over many seconds, so that fourth order is exact to rounding
+_GRID_STEP, _GRID_MOST = 0.25, 400  # [s]; speeds change over many seconds, so that fourth order is exact to rounding
 
 
 def integration_grid(time: Array, forcing: Array | None) -> Array:
@@ -30,7 +30,7 @@ def integration_grid(time: Array, forcing: Array | None) -> Array:
     if forcing is not None:
         return time
     span = time[-1] - time[0]
-    count = int(np.clip(np.ceil(span / GRID_STEP), 40, GRID_MOST))
+    count = int(np.clip(np.ceil(span / _GRID_STEP), 40, _GRID_MOST))
     return np.linspace(time[0], time[-1], count + 1)
 
 

@@ -15,11 +15,11 @@ Array = NDArray[np.float64]
 MINIMUM_SPEED = 5.0
 """Below it adhesion, gears and the odometer rule what is measured, not the running resistance [m/s]; (5.2)."""
 LEVEL, RESOLUTION = 0.95, 0.05
-FEWEST = 20  # samples: four numbers and a noise are estimated
-LEAST_CHANGE = 1.0  # [m/s]
-ALIKE = 0.3  # correlation of neighbouring residuals from which the model is doubted
-GRAVITY = 9.81
-FASTEST_PROPOSAL, PROPOSAL_STEP = 100.0, 2.5  # [m/s], of a run that would do
+_FEWEST = 20  # samples: four numbers and a noise are estimated
+_LEAST_CHANGE = 1.0  # [m/s]
+_ALIKE = 0.3  # correlation of neighbouring residuals from which the model is doubted
+_GRAVITY = 9.81
+_FASTEST_PROPOSAL, _PROPOSAL_STEP = 100.0, 2.5  # [m/s], of a run that would do
 
 
 def identify_davis(
@@ -184,12 +184,12 @@ def _part(times: Array, speeds: Array, minimum_speed: float) -> slice:
 
 
 def _check_part(speeds: Array, minimum_speed: float) -> None:
-    if len(speeds) < FEWEST:
+    if len(speeds) < _FEWEST:
         raise IdentificationError(
-            f"Only {len(speeds)} samples in one piece above {minimum_speed:g} m/s, expected at least {FEWEST}: four "
+            f"Only {len(speeds)} samples in one piece above {minimum_speed:g} m/s, expected at least {_FEWEST}: four "
             "numbers and the noise are estimated from them. Sample faster, or take a longer run."
         )
-    if np.ptp(speeds) < LEAST_CHANGE:
+    if np.ptp(speeds) < _LEAST_CHANGE:
         raise IdentificationError(
             f"Nothing accelerates: all speeds used lie between {speeds.min():.4g} and {speeds.max():.4g} m/s. At one "
             "speed only the sum of effort and resistance shows. Give a run from 5 m/s to the highest speed of use."
@@ -199,7 +199,7 @@ def _check_part(speeds: Array, minimum_speed: float) -> None:
 def _doubts(fits: RunFits, unknown: bool) -> list[str]:
     """What the residuals say against the model."""
     alike = float(fits.correlation[0])
-    if alike < ALIKE or fits.noise[0] < 1e-5:
+    if alike < _ALIKE or fits.noise[0] < 1e-5:
         return []
     cause = "an effort that is not constant, a gradient that changes, slip, or a sensor that filters or aggregates"
     wider = np.sqrt((1.0 + min(alike, 0.999)) / (1.0 - min(alike, 0.999)))
@@ -270,7 +270,7 @@ def _constant_part(a: Coefficient | None, net: Coefficient, mass: float | None) 
             f"effort/mass - w0 = {net.value:.4g} m/s2. An effort/mass of {pairs[0]} gives the same run as {pairs[1]}. "
             "w1 and w2 by mass need no effort."
         ]
-    per_mass = GRAVITY * 1e-3 * (1.0 if mass is None else mass)
+    per_mass = _GRAVITY * 1e-3 * (1.0 if mass is None else mass)
     scaled = "." if mass is None or mass == 1.0 else ", one of the mass into all three."
     return [
         f"A gradient is not in the model: each per mille of rise reads as {per_mass:.3g} {a.unit} more of davis_a. "
@@ -320,7 +320,9 @@ def _speed_that_would_do(
     alike = max(float(fits.correlation[0]), 0.0)
     noise = float(fits.noise[0]) * np.sqrt((1.0 + min(alike, 0.999)) / (1.0 - min(alike, 0.999)))
     quantile = fits.half_widths(level)[0, 0] / np.sqrt(covariance[0, 0])
-    for highest in np.arange(np.ceil(measured.max() / PROPOSAL_STEP) * PROPOSAL_STEP, FASTEST_PROPOSAL, PROPOSAL_STEP):
+    for highest in np.arange(
+        np.ceil(measured.max() / _PROPOSAL_STEP) * _PROPOSAL_STEP, _FASTEST_PROPOSAL, _PROPOSAL_STEP
+    ):
         span = (highest - MINIMUM_SPEED) / rate
         t = np.linspace(0.0, span, 200)
         v = MINIMUM_SPEED + rate * t

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Simulation = Callable[[Array], Array]  # parameters of shape (p,) -> signals of shape (q, n)
 
-DIFFERENCE = 1e-4
+_DIFFERENCE = 1e-4
 """Step of central differences, as a share of a parameter's size: a solver in the simulation may round at 1e-9."""
-ALMOST_ONE = 0.999
-UNSEEN = 1e12
+_ALMOST_ONE = 0.999
+_UNSEEN = 1e12
 """Variance, in squared sizes of the parameters, of a direction that no signal shows."""
-REPEATS = 3  # the noise is estimated anew after each fit
+_REPEATS = 3  # the noise is estimated anew after each fit
 
 
 def serial_enlargement(residuals: Array) -> Array:
@@ -33,7 +33,7 @@ def serial_enlargement(residuals: Array) -> Array:
         Factors of at least 1, shape (...): 1 where the correlation r is no larger than chance makes it.
     """
     correlation = serial_correlation(residuals)
-    alike = np.where(correlation > 2.0 / np.sqrt(residuals.shape[-1]), np.minimum(correlation, ALMOST_ONE), 0.0)
+    alike = np.where(correlation > 2.0 / np.sqrt(residuals.shape[-1]), np.minimum(correlation, _ALMOST_ONE), 0.0)
     return np.asarray((1.0 + alike) / (1.0 - alike))
 
 
@@ -141,7 +141,7 @@ def fit(
     spreads = np.array([np.std(row[k]) if k.any() else 1.0 for row, k in zip(measured, known, strict=True)])
     weights = 1.0 / (np.where(spreads > 0.0, spreads, 1.0) if noise is None else noise)
     found, converged = start / sizes, False
-    for _ in range(1 if noise is not None or len(measured) == 1 else REPEATS):
+    for _ in range(1 if noise is not None or len(measured) == 1 else _REPEATS):
         found, converged = _weighted(residuals, jacobian, found, weights, sizes, bounds)
         left = residuals(found * sizes)
         seen = _deviations(left, known, 0)
@@ -184,7 +184,7 @@ def _differences(function: Simulation, at: Array, sizes: Array, low: Array | Non
     columns = []
     for i, size in enumerate(sizes):
         above, below = at.copy(), at.copy()
-        step = DIFFERENCE * max(abs(at[i]), size)
+        step = _DIFFERENCE * max(abs(at[i]), size)
         above[i] = at[i] + step if high is None else min(at[i] + step, high[i])
         below[i] = at[i] - step if low is None else max(at[i] - step, low[i])
         columns.append((function(above) - function(below)) / (above[i] - below[i]))
@@ -202,7 +202,7 @@ def _covariance(jacobian: Array, weights: Array, variances: Array, sizes: Array)
     seen = values > np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
     inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
     hidden = vectors[:, ~seen]
-    return np.asarray((inverse @ spread @ inverse + UNSEEN * hidden @ hidden.T) * np.outer(sizes, sizes))
+    return np.asarray((inverse @ spread @ inverse + _UNSEEN * hidden @ hidden.T) * np.outer(sizes, sizes))
 
 
 @dataclass(frozen=True)
@@ -227,16 +227,16 @@ class Direction:
             )
         changes = ", ".join(f"{name} {100.0 * share:+.0f} %" for name, share in self.shares.items())
         text = f"a common change of {changes} is hardly seen (uncertain by {100.0 * self.uncertainty:.3g} %)"
-        if len(names) == 2 and abs(abs(self.shares[names[1]] / self.shares[names[0]]) - 1.0) < RATIO:
+        if len(names) == 2 and abs(abs(self.shares[names[1]] / self.shares[names[0]]) - 1.0) < _RATIO:
             one, other = names
             same = self.shares[one] * self.shares[other] > 0.0
             text += f": only the {'ratio' if same else 'product'} of {one} and {other} is identified"
         return text
 
 
-RATIO = 0.1
+_RATIO = 0.1
 """Two shares within this count as equal, so that a ratio or a product is told."""
-SMALL = 0.05
+_SMALL = 0.05
 """Shares below this are left out of the words."""
 
 
@@ -258,6 +258,6 @@ def unseen_directions(found: Fit, names: Sequence[str], limit: float) -> list[Di
         if not deviation > limit:
             break
         turned = vector / vector[np.argmax(np.abs(vector))]
-        shares = {name: float(s) for name, s in zip(names, turned, strict=True) if abs(s) >= SMALL}
+        shares = {name: float(s) for name, s in zip(names, turned, strict=True) if abs(s) >= _SMALL}
         directions.append(Direction(shares, deviation))
     return directions

@@ -17,9 +17,9 @@ from fmu_observer.identification.acceleration_run import PARAMETERS, integration
 from fmu_observer.identification.least_squares import serial_correlation, serial_enlargement
 
 Array = NDArray[np.float64]
-COUNT = len(PARAMETERS)
-ITERATIONS = 25
-CONVERGED, ROUNDING = 1e-7, 1e-8  # of the standard deviations of the estimates, and of the estimates themselves
+_COUNT = len(PARAMETERS)
+_ITERATIONS = 25
+_CONVERGED, _ROUNDING = 1e-7, 1e-8  # of the standard deviations of the estimates, and of the estimates themselves
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ def fit_runs(time: Array, speeds: Array, forcing: Array | None = None) -> RunFit
     grid = integration_grid(time, forcing)
     estimates = _first_guess(time, speeds, forcing)
     converged = np.zeros(len(speeds), dtype=bool)
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         with np.errstate(all="ignore"):  # a run that cannot be fitted is told by `converged`
             found = speeds_and_sensitivities(time, estimates, forcing, grid)
             inverse, projected, _, _ = _normal(found[1:], speeds - found[0])
             step = np.einsum("rij,rj->ir", inverse, projected)
-            size = np.sum((speeds - found[0]) ** 2, axis=1) / (len(time) - COUNT)
+            size = np.sum((speeds - found[0]) ** 2, axis=1) / (len(time) - _COUNT)
             deviations = np.sqrt(np.einsum("rii->ir", inverse) * size)
-            converged = np.all(np.abs(step) <= CONVERGED * deviations + ROUNDING * np.abs(estimates), axis=0)
+            converged = np.all(np.abs(step) <= _CONVERGED * deviations + _ROUNDING * np.abs(estimates), axis=0)
             estimates = estimates + step
         if converged.all():
             break

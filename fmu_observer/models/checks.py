@@ -13,7 +13,7 @@ import numpy as np
 
 from plant_models.hybrid import Signal
 
-CAUSALITIES = {
+_CAUSALITIES = {
     "states": ("local", "state"),
     "inputs": ("input", "input_signal"),
     "measurements": ("input", "input_signal"),
@@ -48,7 +48,7 @@ def check_signals(where: str, **groups: Sequence[Signal]) -> None:
         ValueError: one is not so; the message says which.
     """
     for kind, signals in groups.items():
-        causality, maker = CAUSALITIES[kind]
+        causality, maker = _CAUSALITIES[kind]
         for signal in signals:
             if not isinstance(signal, Signal):
                 raise ValueError(

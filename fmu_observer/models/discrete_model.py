@@ -14,9 +14,9 @@ from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.hybrid.integration import rk4_step
 from plant_models.hybrid.system import Array, vector
 
-TAYLOR_DEGREE = 10
-SQUARINGS = 6  # the remainder of the series is below 1e-14 while the norm of A times the period is below 16
-SUBSTEPS = 4  # Runge-Kutta steps in one period of a nonlinear model
+_TAYLOR_DEGREE = 10
+_SQUARINGS = 6  # the remainder of the series is below 1e-14 while the norm of A times the period is below 16
+_SUBSTEPS = 4  # Runge-Kutta steps in one period of a nonlinear model
 
 
 def zero_order_hold(A: np.ndarray, B: np.ndarray, period: Array) -> tuple[Array, Array]:
@@ -33,12 +33,12 @@ def zero_order_hold(A: np.ndarray, B: np.ndarray, period: Array) -> tuple[Array,
     n, m = B.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n], block[:n, n:] = A, B
-    scaled = block * (period / 2.0**SQUARINGS)
+    scaled = block * (period / 2.0**_SQUARINGS)
     identity = np.eye(n + m)
     exponential = identity
-    for k in range(TAYLOR_DEGREE, 0, -1):
+    for k in range(_TAYLOR_DEGREE, 0, -1):
         exponential = identity + scaled @ exponential / float(k)
-    for _ in range(SQUARINGS):
+    for _ in range(_SQUARINGS):
         exponential = exponential @ exponential
     return exponential[:n, :n], exponential[:n, n:]
 
@@ -54,8 +54,8 @@ def transition(model: ObserverModel, x: Array, u: Array, period: Array) -> Array
     if model.phi is None:
         A, B = zero_order_hold(model.A, model.B, period)
         return A @ x + B @ u if len(model.inputs) else A @ x
-    for _ in range(SUBSTEPS):
-        x = rk4_step(lambda _t, at: model.flow(at, u), 0.0, period / SUBSTEPS, x)
+    for _ in range(_SUBSTEPS):
+        x = rk4_step(lambda _t, at: model.flow(at, u), 0.0, period / _SUBSTEPS, x)
     return x
 
 

@@ -18,7 +18,7 @@ from plant_models.hybrid import Signal
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.hybrid.system import Array, vector
 
-PROBES = 5  # states at which a phi of unknown slope is looked at
+_PROBES = 5  # states at which a phi of unknown slope is looked at
 
 Remainder = Callable[[Array, Array], Array]  # (x of shape (n,), u of shape (m,)) -> shape (n,)
 
@@ -153,7 +153,7 @@ class ObserverModel:
         """
         if self.slopes:
             return max(float(np.linalg.norm(slope, 2)) for slope in self.slopes)
-        at, u = np.random.default_rng(0).normal(size=(PROBES, self.order)), np.ones(len(self.inputs))
+        at, u = np.random.default_rng(0).normal(size=(_PROBES, self.order)), np.ones(len(self.inputs))
         rounding = 1e-12 * max(1.0, float(np.abs(self.A).max()))
         try:
             found = [np.abs(np.asarray(self.jacobian(x, u)) - self.A).max() for x in at]

@@ -12,8 +12,8 @@ import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel
 
-FURTHEST = 1e8  # scale up to which is searched, and one over it: beyond it the powers leave the range of numbers
-PROGRESS = 1e-3  # relative; what grows less over a third of the grid tends to what it is
+_FURTHEST = 1e8  # scale up to which is searched, and one over it: beyond it the powers leave the range of numbers
+_PROGRESS = 1e-3  # relative; what grows less over a third of the grid tends to what it is
 
 
 def powers(scale: float, order: int) -> np.ndarray:
@@ -57,13 +57,13 @@ def best_scale(margin: Callable[[float], float], closed: np.ndarray, scales: np.
 
     The grid is moved to where the matrix of the error is smallest, if that lies outside of it: units of the states do
     not count. Where an end of the grid is best the search goes on beyond it in the same ratio: until the margin falls,
-    or tends to a value that it reaches nowhere, or `FURTHEST`.
+    or tends to a value that it reaches nowhere, or `_FURTHEST`.
 
     Args:
         margin: by the scale; larger is better. closed: matrix of the error, shape (n, n). scales: geometric grid that
             is tried first, shape (k,).
     """
-    around = FURTHEST ** np.linspace(-1.0, 1.0, 129)
+    around = _FURTHEST ** np.linspace(-1.0, 1.0, 129)
     smallest = around[int(np.argmin([np.linalg.norm(scaled(closed, s)) for s in around]))]
     if not scales[0] <= smallest <= scales[-1]:
         scales = scales * smallest / np.sqrt(scales[0] * scales[-1])
@@ -71,8 +71,8 @@ def best_scale(margin: Callable[[float], float], closed: np.ndarray, scales: np.
     tried = {float(s): margin(float(s)) for s in scales}
     for first, towards in ((float(scales[-1]), ratio), (float(scales[0]), 1.0 / ratio)):
         end, least = first, -np.inf
-        while max(tried.values()) == tried[end] > least and FURTHEST >= end >= 1.0 / FURTHEST:
-            least = (1.0 + PROGRESS) * tried[end]
+        while max(tried.values()) == tried[end] > least and _FURTHEST >= end >= 1.0 / _FURTHEST:
+            least = (1.0 + _PROGRESS) * tried[end]
             further = [end * towards**k for k in range(1, block + 1)]
             tried |= {s: margin(s) for s in further}
             end = further[-1]

@@ -12,8 +12,8 @@ import numpy as np
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 
 PremiseMatrix = Callable[[np.ndarray], Any]  # (premise values of shape (p,)) -> a matrix
-ROUNDING = 1e-9  # relative, of a matrix that is affine in a premise
-TRIALS = 12
+_ROUNDING = 1e-9  # relative, of a matrix that is affine in a premise
+_TRIALS = 12
 
 
 def sector_nonlinearity(
@@ -53,7 +53,7 @@ def sector_nonlinearity(
 def _check_affine(name: str, matrix: PremiseMatrix, premises: tuple[Premise, ...]) -> None:
     generator = np.random.default_rng(0)
     low, high = np.array([p.low for p in premises]), np.array([p.high for p in premises])
-    for _ in range(TRIALS):
+    for _ in range(_TRIALS):
         values, share = generator.uniform(low, high), generator.uniform(0.1, 0.9)
         for j, premise in enumerate(premises):
             at_low, at_high, between = values.copy(), values.copy(), values.copy()
@@ -61,7 +61,7 @@ def _check_affine(name: str, matrix: PremiseMatrix, premises: tuple[Premise, ...
             ends = np.asarray(matrix(at_low), dtype=float), np.asarray(matrix(at_high), dtype=float)
             error = np.abs(np.asarray(matrix(between), dtype=float) - (1.0 - share) * ends[0] - share * ends[1])
             size = max(np.abs(ends[0]).max(initial=0.0), np.abs(ends[1]).max(initial=0.0), 1e-300)
-            if error.max(initial=0.0) > ROUNDING * size:
+            if error.max(initial=0.0) > _ROUNDING * size:
                 raise ValueError(
                     f"Sector nonlinearity: {name} is not affine in premise {premise.name!r} (off by {error.max():.3g} "
                     f"inside its "

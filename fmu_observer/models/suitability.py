@@ -11,7 +11,7 @@ import numpy as np
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from plant_models.hybrid import input_signal
 
-POINTS = 5  # states at which the structure of the Jacobian is looked at
+_POINTS = 5  # states at which the structure of the Jacobian is looked at
 
 
 def require_linear(model: ObserverModel, observer: str, instead: str) -> None:
@@ -93,7 +93,7 @@ def require_mass(model: str, **masses: float) -> None:
             raise ValueError(f"Observer model {model!r}: {name} = {value!r} kg, expected a mass above zero.")
 
 
-def require_single_output(model: ObserverModel, observer: str) -> None:
+def _require_single_output(model: ObserverModel, observer: str) -> None:
     """The model has one measurement.
 
     Args:
@@ -121,7 +121,7 @@ def require_triangular_chain(model: ObserverModel, observer: str) -> None:
     Raises:
         ValueError: one of them is not so; the message says which.
     """
-    require_single_output(model, observer)
+    _require_single_output(model, observer)
     n = model.order
     where = f"{observer}: model {model.name!r} is not in the normal form (1.10): "
     if not np.array_equal(model.A, shift_matrix(n)):
@@ -133,7 +133,7 @@ def require_triangular_chain(model: ObserverModel, observer: str) -> None:
             f"{where}the first state must be measured, C = {np.eye(n)[:1].tolist()}, got {model.C.tolist()}."
         )
     generator = np.random.default_rng(0)
-    at = generator.normal(size=(POINTS, n))
+    at = generator.normal(size=(_POINTS, n))
     remainders = [np.asarray(model.jacobian(x, np.ones(len(model.inputs)))) - model.A for x in at]
     above = np.abs(np.triu(np.stack(remainders), 1)).max(axis=0)
     if above.max() > 0.0:

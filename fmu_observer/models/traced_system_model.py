@@ -27,15 +27,15 @@ from plant_models.hybrid.system import Array
 from plant_models.interop.continuous_part import known as known_name
 from plant_models.user_file import Expected, load_class, names_code
 
-SUBSTEPS = 4
+_SUBSTEPS = 4
 """Internal steps of the system in the period of a filter that is told no other period."""
 UNROLLED = 8
 """Steps that are written out; more of them are a loop in the generated code."""
-MOST_STEPS = 100_000
+_MOST_STEPS = 100_000
 
-USERS = Expected("subclass of HybridSystem", lambda found: isinstance(found, type) and issubclass(found, HybridSystem))
+_USERS = Expected("subclass of HybridSystem", lambda found: isinstance(found, type) and issubclass(found, HybridSystem))
 
-SAME = 1e-9  # share by which a period may exceed its steps: rounding
+_SAME = 1e-9  # share by which a period may exceed its steps: rounding
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Steps:
     """Integration steps of a system in a period of a filter.
 
     Args:
-        period: of the filter [s]; None for `SUBSTEPS` internal steps of the system.
+        period: of the filter [s]; None for `_SUBSTEPS` internal steps of the system.
         substeps: how many steps it has; None for as many as keep each within the internal step of the system.
     """
 
@@ -65,11 +65,11 @@ class Steps:
         if self.substeps is not None:
             require_whole(where, substeps=self.substeps)
             return self.substeps
-        count = SUBSTEPS if self.period is None else ceil(self.period / system.internal_step * (1.0 - SAME))
-        if count > MOST_STEPS:
+        count = _SUBSTEPS if self.period is None else ceil(self.period / system.internal_step * (1.0 - _SAME))
+        if count > _MOST_STEPS:
             raise ValueError(
                 f"{where}: a period of {self.period:g} s has {count} internal steps of {system.internal_step:g} s, "
-                f"expected {MOST_STEPS} at most; say by `substeps` how many are enough, which its condition judges."
+                f"expected {_MOST_STEPS} at most; say by `substeps` how many are enough, which its condition judges."
             )
         return max(count, 1)
 
@@ -189,7 +189,7 @@ def _found(model: object) -> HybridSystem:
     if isinstance(model, type) and issubclass(model, HybridSystem):
         return model()
     if isinstance(model, str) and names_code(model):
-        found: HybridSystem = load_class(model, USERS)()
+        found: HybridSystem = load_class(model, _USERS)()
         return found
     if not isinstance(model, str) or model not in PLANTS:
         raise ValueError(
@@ -299,7 +299,7 @@ class _Moving:
     def longest_period(self, steps: Steps) -> float:
         """The longest period in which no step is longer than the system's own [s]; none where the steps were given."""
         own = self.event is not None or steps.substeps is not None
-        return inf if own else float(self.substeps * self.system.internal_step) * (1.0 + SAME)
+        return inf if own else float(self.substeps * self.system.internal_step) * (1.0 + _SAME)
 
     def deviates(
         self, names: Sequence[str], noises: Sequence[str], readings: Sequence[str], rows: Sequence[int]

@@ -24,10 +24,10 @@ from fmu_observer.observability.modes import (
 )
 from fmu_observer.observability.pattern import SamplePattern
 
-PATTERN_TOLERANCE = 1e-9
+_PATTERN_TOLERANCE = 1e-9
 """Singular values of the measured rows below this share of the largest count as zero."""
 
-BASE_NORM = 0.5  # of A h, for the step that the doubling starts from
+_BASE_NORM = 0.5  # of A h, for the step that the doubling starts from
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Observability:
         )
         if self.unobservable:
             return f"{text} No pattern would show: {'; '.join(mode.explain() for mode in self.unobservable)}."
-        if self.remaining < PATTERN_TOLERANCE:
+        if self.remaining < _PATTERN_TOLERANCE:
             return f"{text} It dies out by itself before the samples come."
         return f"{text} Other instants would show it: these are too few, or in step with an oscillation."
 
@@ -102,7 +102,7 @@ class Observability:
 
 
 def observability(
-    system: MeasuredSystem, pattern: SamplePattern, tolerance: float = PATTERN_TOLERANCE
+    system: MeasuredSystem, pattern: SamplePattern, tolerance: float = _PATTERN_TOLERANCE
 ) -> Observability:
     """Gramian, rank and unseen directions of a measured system over a pattern.
 
@@ -158,7 +158,7 @@ def _over_gap(A: np.ndarray, weight: np.ndarray, gap: float) -> tuple[np.ndarray
     where A is stiff. So it is taken over a short step only.
     """
     n, size = len(A), float(np.abs(A).sum(axis=0).max()) * gap
-    doublings = max(0, ceil(log2(size / BASE_NORM))) if size > 0.0 else 0
+    doublings = max(0, ceil(log2(size / _BASE_NORM))) if size > 0.0 else 0
     h = gap / 2.0**doublings
     block = small_exponential(np.block([[-A.T, weight], [np.zeros((n, n)), A]]) * h)
     transition = block[n:, n:]

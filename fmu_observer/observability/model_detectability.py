@@ -12,7 +12,7 @@ from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import UnobservableError, require_detectable
 
-POINTS = 4  # further states at which a nonlinear model is looked at
+_POINTS = 4  # further states at which a nonlinear model is looked at
 
 
 def require_detectable_vertices(model: TakagiSugenoModel, asking: str) -> None:
@@ -50,7 +50,7 @@ def require_detectable_model(model: ObserverModel, asking: str) -> None:
 def _elsewhere(model: ObserverModel) -> list[np.ndarray]:
     if model.phi is None:
         return []
-    at = start_of(model) + np.random.default_rng(0).normal(size=(POINTS, model.order))
+    at = start_of(model) + np.random.default_rng(0).normal(size=(_POINTS, model.order))
     jacobians = [np.asarray(model.jacobian(x, np.ones(len(model.inputs)))) for x in at]
     return [A for A in jacobians if np.isfinite(A).all()]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fmu_observer.observability.measured_system import MeasuredSystem
 
-RANK_TOLERANCE = 1e-11
+_RANK_TOLERANCE = 1e-11
 """Singular values below this share of the norm of A, or of C, count as zero."""
 
 ROUNDING = 1e-13
@@ -24,7 +24,7 @@ ROUNDING = 1e-13
 A subspace that follows from a smallest singular value s of a matrix of norm m is turned by rounding by about m / s
 times as much (Wedin's theorem on the angles of singular subspaces, 1972)."""
 
-PART = 1e-6
+_PART = 1e-6
 """A state takes part in a mode when its entry is at least this share of the largest."""
 
 
@@ -63,7 +63,7 @@ class Mode:
     @property
     def taking_part(self) -> dict[str, complex]:
         """The states that take part, with their entries."""
-        return {name: self.vector[i] for i, name in enumerate(self.states) if self.shares[i] >= PART}
+        return {name: self.vector[i] for i, name in enumerate(self.states) if self.shares[i] >= _PART}
 
     @property
     def decays(self) -> bool:
@@ -83,7 +83,7 @@ class Mode:
         return f"eigenvalue {value} 1/s ({', '.join(words) or 'neither decays nor grows'}), in the states {parts}"
 
 
-def unobservable_modes(system: MeasuredSystem, tolerance: float = RANK_TOLERANCE) -> list[Mode]:
+def unobservable_modes(system: MeasuredSystem, tolerance: float = _RANK_TOLERANCE) -> list[Mode]:
     """Modes that no measurement of the system sees, however often it is taken.
 
     Args:
@@ -109,7 +109,7 @@ def unobservable_modes(system: MeasuredSystem, tolerance: float = RANK_TOLERANCE
     return sorted(modes, key=lambda mode: -mode.eigenvalue.real)
 
 
-def undetectable_modes(system: MeasuredSystem, tolerance: float = RANK_TOLERANCE) -> list[Mode]:
+def undetectable_modes(system: MeasuredSystem, tolerance: float = _RANK_TOLERANCE) -> list[Mode]:
     """The unobservable modes that do not decay by themselves: no observer can make their error vanish.
 
     Args:
@@ -151,7 +151,7 @@ class UnobservableSubspace:
     error: float
 
 
-def unobservable_subspace(A: np.ndarray, C: np.ndarray, tolerance: float = RANK_TOLERANCE) -> UnobservableSubspace:
+def unobservable_subspace(A: np.ndarray, C: np.ndarray, tolerance: float = _RANK_TOLERANCE) -> UnobservableSubspace:
     """The unobservable subspace by a staircase of orthogonal steps, with what rounding makes of it.
 
     Args:
@@ -186,7 +186,7 @@ def _mode(system: MeasuredSystem, value: complex, scaled_vector: np.ndarray, cha
     largest = int(np.argmax(shares))
     turned = scaled_vector / scaled_vector[largest]
     vector = turned * system.scales
-    if not np.iscomplexobj(vector) or np.abs(vector.imag).max() <= PART * np.abs(vector).max():
+    if not np.iscomplexobj(vector) or np.abs(vector.imag).max() <= _PART * np.abs(vector).max():
         vector = vector.real
     return Mode(value, vector / np.abs(vector[largest]), tuple(system.states), shares / shares[largest], chain)
 

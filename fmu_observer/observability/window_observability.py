@@ -8,8 +8,8 @@ import numpy as np
 
 from fmu_observer.models.filter_models import FilterModel, Known
 
-TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not told
-PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it
+_TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not told
+_PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it
 
 
 class WindowObservability(NamedTuple):
@@ -37,7 +37,7 @@ class WindowObservability(NamedTuple):
 
     def _direction(self, column: np.ndarray) -> str:
         largest = column[np.argmax(np.abs(column))]
-        parts = [(name, v) for name, v in zip(self.states, column / largest, strict=True) if abs(v) > PART]
+        parts = [(name, v) for name, v in zip(self.states, column / largest, strict=True) if abs(v) > _PART]
         if len(parts) == 1:
             return parts[0][0]
         return "the combination " + " ".join(f"{value:+.3g} {name}" for name, value in parts)
@@ -63,5 +63,5 @@ def window_observability(model: FilterModel, known: Known, period: float, rows: 
         x = np.asarray(model.moved(x, model.no_noise(), now, period), dtype=float)
     measured = np.vstack(seen)
     _, values, directions = np.linalg.svd(measured)
-    rank = int(np.sum(values > TOLERANCE * values[0])) if values[0] > 0.0 else 0
+    rank = int(np.sum(values > _TOLERANCE * values[0])) if values[0] > 0.0 else 0
     return WindowObservability(measured, rank, directions[rank:].T, tuple(s.name for s in model.states))

@@ -17,7 +17,7 @@ import numpy as np
 
 from plant_models.hybrid.system import Array
 
-ORDER = 3
+_ORDER = 3
 PACKED = 6  # entries of a symmetric matrix of that order
 
 
@@ -27,7 +27,7 @@ def packed(P: np.ndarray) -> tuple[float, ...]:
     Args:
         P: symmetric, shape (3, 3).
     """
-    return tuple(float(P[i, j]) for i in range(ORDER) for j in range(i, ORDER))
+    return tuple(float(P[i, j]) for i in range(_ORDER) for j in range(i, _ORDER))
 
 
 def unpacked(entries: Sequence[float]) -> np.ndarray:
@@ -36,8 +36,8 @@ def unpacked(entries: Sequence[float]) -> np.ndarray:
     Args:
         entries: of `packed`, shape (6,).
     """
-    P = np.zeros((ORDER, ORDER))
-    P[np.triu_indices(ORDER)] = np.asarray(entries, dtype=float)
+    P = np.zeros((_ORDER, _ORDER))
+    P[np.triu_indices(_ORDER)] = np.asarray(entries, dtype=float)
     return P + np.triu(P, 1).T
 
 

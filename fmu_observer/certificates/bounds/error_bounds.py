@@ -16,8 +16,8 @@ from fmu_observer.certificates.bounds.bounded_gaps import FIRST, HORIZON, growth
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates.bounds.worst_case import worst_case
 
-EXACT_HORIZON = 1e3  # [s] to which gaps of the worst case are looked for
-COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
+_EXACT_HORIZON = 1e3  # [s] to which gaps of the worst case are looked for
+_COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class ErrorBounds:
             "carried": self.carried,
         }
         found = {name: largest_gap(bound, limit) for name, bound in bounds.items()}
-        found["exact"] = largest_gap(exact, limit, EXACT_HORIZON, COARSE)
+        found["exact"] = largest_gap(exact, limit, _EXACT_HORIZON, _COARSE)
         return found
 
     def largest_periods(self, limit: float) -> dict[str, float]:
@@ -157,7 +157,7 @@ class ErrorBounds:
             "as_printed": largest_gap(self.as_printed, limit),
             "carried": largest_gap(lambda period: self._at_period(period).carried(max(period, FIRST)), limit),
             "exact": largest_gap(
-                lambda period: self._at_period(period).exact(max(period, FIRST)), limit, EXACT_HORIZON, COARSE
+                lambda period: self._at_period(period).exact(max(period, FIRST)), limit, _EXACT_HORIZON, _COARSE
             ),
         }
 
@@ -238,5 +238,5 @@ def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:
 
 
 def _seconds(name: str, value: float) -> str:
-    looked = EXACT_HORIZON if name == "exact" else HORIZON
+    looked = _EXACT_HORIZON if name == "exact" else HORIZON
     return f"> {looked:.4g} s" if value == inf else f"{value:.4g} s"

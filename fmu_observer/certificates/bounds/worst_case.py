@@ -15,9 +15,9 @@ import numpy as np
 from fmu_observer.certificates.gap_error import matrix_powers
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
-POINTS, FEWEST = 400, 8  # a period: errors of the trapezium rule are of the order 1e-6 of the result
-TOTAL = 50_000  # points altogether: for short periods fewer a period, which are closer then
-FORGOTTEN = 30.0  # time constants of the slowest pole that are looked back
+_POINTS, _FEWEST = 400, 8  # a period: errors of the trapezium rule are of the order 1e-6 of the result
+_TOTAL = 50_000  # points altogether: for short periods fewer a period, which are closer then
+_FORGOTTEN = 30.0  # time constants of the slowest pole that are looked back
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,9 @@ def worst_case(
     decay = -float(np.linalg.eigvals(F).real.max())
     if not decay > 0.0:
         raise ValueError(f"Worst case: the error matrix is not stable, its slowest pole is at {-decay:+.4g} 1/s.")
-    count = int(np.ceil(FORGOTTEN / (decay * period))) if periods is None else periods
-    gain, shape = np.asarray(K, dtype=float), max(FEWEST, min(POINTS, TOTAL // max(count, 1)))
-    last_ages, last = _weights(F, gap, max(FEWEST, round(shape * min(gap / period, POINTS))))
+    count = int(np.ceil(_FORGOTTEN / (decay * period))) if periods is None else periods
+    gain, shape = np.asarray(K, dtype=float), max(_FEWEST, min(_POINTS, _TOTAL // max(count, 1)))
+    last_ages, last = _weights(F, gap, max(_FEWEST, round(shape * min(gap / period, _POINTS))))
     past_ages, past = _weights(F, period, shape)
     before = small_exponential(F * gap) @ gain
     powers = matrix_powers(small_exponential(F * period), max(count, 1))

@@ -12,8 +12,8 @@ import numpy as np
 
 from fmu_observer.models.state_affine import StateAffineModel
 
-STEP = 2e-3  # [s], of the Riemann sums
-SETTLING = 20.0  # times 1 / mu, until S has forgotten its start
+_STEP = 2e-3  # [s], of the Riemann sums
+_SETTLING = 20.0  # times 1 / mu, until S has forgotten its start
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class AdaptiveBounds:
     @property
     def longest_period(self) -> float:
         """tau_MASP of (4.63) for a vanishing rate [s]; always below a third of a second."""
-        return masp(self)
+        return _masp(self)
 
     def explain(self) -> str:
         """The constants in one line."""
@@ -56,7 +56,7 @@ class AdaptiveBounds:
         )
 
 
-def masp(b: AdaptiveBounds) -> float:
+def _masp(b: AdaptiveBounds) -> float:
     """``1 / (m (c_lambda sigma_1c + M_c)^2 exp(2 T) / alpha0 + alpha1 exp(-2 mu T1) + 3)`` [s], which is (4.63).
 
     Args:
@@ -89,15 +89,15 @@ def adaptive_bounds(model: StateAffineModel, mu: float, window: float = 1.0, beg
     L, Z, Phi = np.zeros((n, m)), np.eye(n), np.eye(n)
     told, observed = np.zeros((m, m)), np.zeros((n, n))
     largest = np.zeros(3)
-    C, end = model.C, begin + max(window, SETTLING / mu)
-    for k in range(round(end / STEP)):
-        t = k * STEP
+    C, end = model.C, begin + max(window, _SETTLING / mu)
+    for k in range(round(end / _STEP)):
+        t = k * _STEP
         A, regressor = np.asarray(model.drift(t, u)), np.asarray(model.regressor(t, u))
         if begin <= t < begin + window:
             seen, shown = C @ L, C @ Phi
-            told += STEP * seen.T @ seen
-            observed += STEP * shown.T @ shown
-            Phi = Phi + STEP * A @ (Phi + 0.5 * STEP * A @ Phi)
+            told += _STEP * seen.T @ seen
+            observed += _STEP * shown.T @ shown
+            Phi = Phi + _STEP * A @ (Phi + 0.5 * _STEP * A @ Phi)
         norms = (np.abs(regressor).max(), np.abs(C @ A).sum(axis=1).max(), np.abs(C @ regressor).sum(axis=1).max())
         largest = np.maximum(largest, norms)
         L, Z = _moved(model, u, mu, t, L, Z)
@@ -140,6 +140,6 @@ def _moved(
         return dL, mu * Z + A @ Z + Z @ A.T - K @ K.T
 
     dL, dZ = slopes(t, L, Z)
-    dL, dZ = slopes(t + 0.5 * STEP, L + 0.5 * STEP * dL, Z + 0.5 * STEP * dZ)
-    Z = Z + STEP * dZ
-    return L + STEP * dL, 0.5 * (Z + Z.T)
+    dL, dZ = slopes(t + 0.5 * _STEP, L + 0.5 * _STEP * dL, Z + 0.5 * _STEP * dZ)
+    Z = Z + _STEP * dZ
+    return L + _STEP * dL, 0.5 * (Z + Z.T)

@@ -13,8 +13,8 @@ import scipy
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale, scaled, scaled_lipschitz
 
-POINTS, FEW = 2048, 128  # on the upper half of the unit circle, for the answer and for the choice of coordinates
-SCALES = np.geomspace(0.1, 100.0, 121)
+_POINTS, _FEW = 2048, 128  # on the upper half of the unit circle, for the answer and for the choice of coordinates
+_SCALES = np.geomspace(0.1, 100.0, 121)
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def centre_of(model: ObserverModel) -> np.ndarray:
     return np.asarray(model.A + (np.mean(model.slopes, axis=0) if model.slopes else 0.0))
 
 
-def circle_distance(closed: np.ndarray, points: int = POINTS) -> float:
+def circle_distance(closed: np.ndarray, points: int = _POINTS) -> float:
     """Lower bound of the smallest singular value of ``z I - closed`` over the unit circle.
 
     Singular values move by no more than z does, so half the distance of two grid points is taken off.
@@ -90,9 +90,9 @@ def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> Dis
         return DiscreteBound(radius, circle_distance(closed), 0.0, 1.0)
 
     def margin(scale: float) -> float:
-        return circle_distance(scaled(closed, scale), FEW) / transition_lipschitz(model, period, scale)
+        return circle_distance(scaled(closed, scale), _FEW) / transition_lipschitz(model, period, scale)
 
-    scale = best_scale(margin, closed, SCALES)
+    scale = best_scale(margin, closed, _SCALES)
     return DiscreteBound(
         radius, circle_distance(scaled(closed, scale)), transition_lipschitz(model, period, scale), scale
     )

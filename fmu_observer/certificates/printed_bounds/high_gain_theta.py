@@ -9,7 +9,7 @@ import scipy
 
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 
-THETAS = np.geomspace(1.0, 1e4, 4001)
+_THETAS = np.geomspace(1.0, 1e4, 4001)
 
 
 def binomial_gain(order: int) -> np.ndarray:
@@ -67,9 +67,9 @@ def theta_from_slopes(model: ObserverModel, K: np.ndarray) -> float:
     last = max(_surely_enough(np.asarray(slope), 2.0 * size) for slope in model.slopes)
     if last == inf:
         return inf
-    ratio = THETAS[1] / THETAS[0]
-    beyond = THETAS[-1] * ratio ** np.arange(1, 2 + max(0, ceil(log(last / THETAS[-1]) / log(ratio))))
-    thetas = np.r_[THETAS, beyond]
+    ratio = _THETAS[1] / _THETAS[0]
+    beyond = _THETAS[-1] * ratio ** np.arange(1, 2 + max(0, ceil(log(last / _THETAS[-1]) / log(ratio))))
+    thetas = np.r_[_THETAS, beyond]
     sizes = thetas[:, None] ** np.arange(model.order)
     steepest = [np.linalg.norm(slope * sizes[:, None, :] / sizes[:, :, None], 2, axis=(1, 2)) for slope in model.slopes]
     enough = np.max(steepest, axis=0) * 2.0 * size < thetas

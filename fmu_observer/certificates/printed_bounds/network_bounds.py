@@ -11,8 +11,8 @@ from math import inf, log, log1p
 import numpy as np
 import scipy
 
-POINTS = 400
-SPAN = 1e3  # the grid of frequencies reaches from the slowest pole over this to the fastest times this
+_POINTS = 400
+_SPAN = 1e3  # the grid of frequencies reaches from the slowest pole over this to the fastest times this
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def largest_gain(A: np.ndarray, B: np.ndarray) -> float:
 
     poles = np.linalg.eigvals(A)
     rates = np.abs(poles)
-    about = np.geomspace(rates.min() / SPAN, rates.max() * SPAN, POINTS)
+    about = np.geomspace(rates.min() / _SPAN, rates.max() * _SPAN, _POINTS)
     grid = np.unique(np.concatenate([[0.0], np.abs(poles.imag), about]))
     best = int(np.argmax([norm(w) for w in grid]))
     around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])

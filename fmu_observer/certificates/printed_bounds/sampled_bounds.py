@@ -18,8 +18,8 @@ from fmu_observer.certificates.printed_bounds.high_gain_bounds import HighGainBo
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.models.observer_model import shift_matrix
 
-SHAPE = (2.0, 1.0)  # K of the train observers, Bouchama 2024, (3.29)
-THETAS = (1.0, 2.0, 4.0, 5.0, 8.0)  # [1/s], those of the table
+_SHAPE = (2.0, 1.0)  # K of the train observers, Bouchama 2024, (3.29)
+_THETAS = (1.0, 2.0, 4.0, 5.0, 8.0)  # [1/s], those of the table
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def gain_matrix(n: int = 2) -> np.ndarray:
     return np.asarray(scipy.linalg.solve_continuous_lyapunov((shift_matrix(n) + 0.5 * np.eye(n)).T, measured))
 
 
-def smallest_theta_1_51(lipschitz: float, K: Sequence[float] = SHAPE, mu: float = 1.0) -> float:
+def smallest_theta_1_51(lipschitz: float, K: Sequence[float] = _SHAPE, mu: float = 1.0) -> float:
     """``theta >= 2 L sqrt(n) lambda_max(P) / mu`` [1/s], Bouchama 2024, (1.51); see `high_gain_bounds`.
 
     Args:
@@ -77,7 +77,7 @@ def smallest_theta_1_51(lipschitz: float, K: Sequence[float] = SHAPE, mu: float 
     return _bounds(1.0, lipschitz, K, mu).smallest_theta
 
 
-def longest_gap_1_52(theta: float, lipschitz: float, K: Sequence[float] = SHAPE, mu: float = 1.0) -> float:
+def longest_gap_1_52(theta: float, lipschitz: float, K: Sequence[float] = _SHAPE, mu: float = 1.0) -> float:
     """tau [s] with ``2 tau (L + theta) |K| lambda_max^1.5 / (mu lambda_min^0.5) = 1``: Bouchama 2024, (1.52).
 
     Args:
@@ -129,7 +129,7 @@ def longest_gap_3_87(theta: float, lipschitz: float) -> float:
     return (theta - 2.0 * lipschitz / theta) / (2.0 * theta**2 * _gain_size())
 
 
-def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tuple[DesignBoundRow, ...]:
+def bound_table(thetas: Sequence[float] = _THETAS, lipschitz: float = 0.0) -> tuple[DesignBoundRow, ...]:
     """Printed bounds beside the exact limits of the double integrator with K = (2, 1).
 
     Args:
@@ -162,7 +162,7 @@ def bound_text(rows: Sequence[DesignBoundRow]) -> str:
 def _row(theta: float, lipschitz: float) -> DesignBoundRow:
     if not theta > 0.0:
         raise ValueError(f"Bounds: theta must be positive [1/s], got {theta!r}.")
-    gain, decay = (theta * SHAPE[0], theta**2 * SHAPE[1]), theta * SHAPE[0]
+    gain, decay = (theta * _SHAPE[0], theta**2 * _SHAPE[1]), theta * _SHAPE[0]
     vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, decay) for s in sorted({0.0, lipschitz}))
     exact = certify_sampled_error(vertices, 2.0 / theta, "double integrator with drag")
     return DesignBoundRow(

@@ -12,7 +12,7 @@ import numpy as np
 
 from fmu_observer.design.cone_solver import Matrix, Rows, smallest_eigenvalue
 
-DECAY, GAIN, SCALE = "(4.41)", "(4.42)", "(4.44)"
+DECAY, GAIN, _SCALE = "(4.41)", "(4.42)", "(4.44)"
 """Names of the inequalities: decay of the error, size of the gain, P at least the identity."""
 
 
@@ -77,7 +77,7 @@ def inequalities(
     Returns:
         By words for a message: the name of the inequality, and its rows.
     """
-    found: dict[str, tuple[str, Rows]] = {SCALE: (SCALE, [[P - np.eye(problem.order)]])}
+    found: dict[str, tuple[str, Rows]] = {_SCALE: (_SCALE, [[P - np.eye(problem.order)]])}
     for i, (A, product) in enumerate(zip(problem.A, M, strict=True)):
         where = f" at vertex {i + 1}" if len(problem.A) > 1 else ""
         moved = P @ A - product @ problem.C
@@ -100,7 +100,7 @@ def margins(problem: Proposition41Problem, P: np.ndarray, gains: np.ndarray) -> 
     M = [(P @ K)[:, None] for K in gains]
     blocks = inequalities(problem, P, M, problem.alpha)
     found = {name: smallest_eigenvalue(np.block(rows)) for name, (_, rows) in blocks.items()}
-    return found | {SCALE: smallest_eigenvalue(P)}
+    return found | {_SCALE: smallest_eigenvalue(P)}
 
 
 def train_vertices(slopes: Sequence[float]) -> np.ndarray:

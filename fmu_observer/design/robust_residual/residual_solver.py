@@ -13,7 +13,7 @@ from fmu_observer.design.cone_solver import Rows, attempts, load_cvxpy, symmetri
 from fmu_observer.design.robust_residual.problem import ResidualProblem
 from fmu_observer.design.robust_residual.residual_inequalities import robustness, sensitivity
 
-Least = Literal["attenuation", "alpha"]
+_Least = Literal["attenuation", "alpha"]
 
 _STRICT = (1e-7, 1e-6, 1e-5, 1e-4)  # asked of every inequality in the scaled problem, one attempt after the other
 
@@ -36,7 +36,7 @@ class ResidualCandidate:
 
 def candidates(
     problem: ResidualProblem,
-    least: Least = "attenuation",
+    least: _Least = "attenuation",
     gains: np.ndarray | None = None,
     attenuation: float | None = None,
     sized: bool = True,

@@ -27,10 +27,10 @@ import numpy as np
 from plant_models.hybrid import Signal, state, vector
 from plant_models.hybrid.system import Array
 
-LARGEST_CLOSED = 3  # sizes whose smallest eigenvalue is given in closed form
-TINY = 1e-60  # keeps quotients and slopes finite where there is nothing yet
-GUARD = 1e-3  # of the least excitation
-NEARLY_ONE = 1.0 - 1e-15
+_LARGEST_CLOSED = 3  # sizes whose smallest eigenvalue is given in closed form
+_TINY = 1e-60  # keeps quotients and slopes finite where there is nothing yet
+_GUARD = 1e-3  # of the least excitation
+_NEARLY_ONE = 1.0 - 1e-15
 
 
 class Sizes(NamedTuple):
@@ -234,7 +234,7 @@ def gentle_gain(R: Array, seen: Array, quickest: float) -> Array:
     return R - outer / (quickest + seen @ moved)
 
 
-def told_excitation(E: Array, size: int, guard: Array = TINY) -> Array:
+def told_excitation(E: Array, size: int, guard: Array = _TINY) -> Array:
     """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
 
     Args:
@@ -245,10 +245,10 @@ def told_excitation(E: Array, size: int, guard: Array = TINY) -> Array:
         return vector(E[0, 0])
     own = [E[i, i] + guard for i in range(size)]
     if size == 2:
-        return vector(*(E[i, i] - E[0, 1] ** 2 / np.maximum(own[1 - i], TINY) for i in range(2)))
+        return vector(*(E[i, i] - E[0, 1] ** 2 / np.maximum(own[1 - i], _TINY) for i in range(2)))
     told = []
     for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
-        others = np.maximum(own[j] * own[k] - E[j, k] ** 2, TINY)
+        others = np.maximum(own[j] * own[k] - E[j, k] ** 2, _TINY)
         shared = E[i, j] ** 2 * own[k] - 2.0 * E[i, j] * E[i, k] * E[j, k] + E[i, k] ** 2 * own[j]
         told.append(E[i, i] - shared / others)
     return vector(*told)
@@ -260,7 +260,7 @@ def learnt_constants(E: Array, least: Array, size: int) -> Array:
     Args:
         E: mean Gramian, shape (m, m). least: excitation below which a constant is held; 0 for never. size: m.
     """
-    told = told_excitation(E, size, GUARD * least + TINY)
+    told = told_excitation(E, size, _GUARD * least + _TINY)
     return vector(*(np.where(least > 0.0, np.where(told[i] >= least, 1.0, 0.0), 1.0) for i in range(size)))
 
 
@@ -273,20 +273,20 @@ def smallest_eigenvalue(E: Array, size: int) -> Array:
     Raises:
         ValueError: the size is larger.
     """
-    if size > LARGEST_CLOSED:
-        raise ValueError(f"The smallest eigenvalue is known in closed form up to size {LARGEST_CLOSED}, got {size}.")
+    if size > _LARGEST_CLOSED:
+        raise ValueError(f"The smallest eigenvalue is known in closed form up to size {_LARGEST_CLOSED}, got {size}.")
     mean = sum((E[i, i] for i in range(size)), 0.0) / size
     if size == 1:
         return mean
     if size == 2:
-        return mean - np.sqrt(0.25 * (E[0, 0] - E[1, 1]) ** 2 + E[0, 1] * E[0, 1] + TINY)
+        return mean - np.sqrt(0.25 * (E[0, 0] - E[1, 1]) ** 2 + E[0, 1] * E[0, 1] + _TINY)
     off = E[0, 1] ** 2 + E[0, 2] ** 2 + E[1, 2] ** 2
-    spread = np.sqrt((sum((E[i, i] - mean) ** 2 for i in range(3)) + 2.0 * off) / 6.0 + TINY)
+    spread = np.sqrt((sum((E[i, i] - mean) ** 2 for i in range(3)) + 2.0 * off) / 6.0 + _TINY)
     unit = (E - mean * np.eye(3)) / spread
     half = 0.5 * (
         unit[0, 0] * (unit[1, 1] * unit[2, 2] - unit[1, 2] ** 2)
         - unit[0, 1] * (unit[0, 1] * unit[2, 2] - unit[1, 2] * unit[0, 2])
         + unit[0, 2] * (unit[0, 1] * unit[1, 2] - unit[1, 1] * unit[0, 2])
     )
-    angle = np.arccos(np.clip(half, -NEARLY_ONE, NEARLY_ONE)) / 3.0
+    angle = np.arccos(np.clip(half, -_NEARLY_ONE, _NEARLY_ONE)) / 3.0
     return mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)

@@ -7,7 +7,7 @@ import numpy as np
 from plant_models.hybrid import Signal, parameter, state
 from plant_models.hybrid.system import Array
 
-NOTHING = 1e-300  # in place of zero, of which a power has no derivative by its exponent
+_NOTHING = 1e-300  # in place of zero, of which a power has no derivative by its exponent
 ELAPSED = state("elapsed", "s", 0.0, "Time since the last sample")
 
 
@@ -34,5 +34,5 @@ def innovation_left(elapsed: Array, rate: Array, exponent: Array) -> Array:
             to 1.
     """
     ending = np.where(exponent < 1.0, 1.0 - exponent, 1.0)
-    linear = np.maximum(1.0 - ending * rate * elapsed, NOTHING)
+    linear = np.maximum(1.0 - ending * rate * elapsed, _NOTHING)
     return np.where(exponent < 1.0, linear ** (1.0 / ending), np.exp(-rate * elapsed))

@@ -14,7 +14,7 @@ import numpy as np
 from fmu_observer.formulas.delay.delay_memory import weighted
 from plant_models.hybrid.system import Array
 
-ITERATIONS = 3  # of the implicit end of the trapezoidal rule; each wins a factor of 2 / (period Lipschitz)
+_ITERATIONS = 3  # of the implicit end of the trapezoidal rule; each wins a factor of 2 / (period Lipschitz)
 
 
 class Prediction(NamedTuple):
@@ -58,7 +58,7 @@ def moved_on(
     roots = [np.where(first, now[i], less[i]) for i in indices]
     fixed = [base[i] + past[i] + roots[i] * np.abs(roots[i]) for i in indices]
     x = [before.state[i] + period * old[i][0] for i in indices]
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         rate = rate_at(x)
         x = [fixed[i] + period * weights[0] * rate[i] for i in indices]
     state = [np.where(first, before.state[i], x[i]) for i in indices]

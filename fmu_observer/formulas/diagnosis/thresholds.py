@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-HOUR = 3600.0  # [s]
+_HOUR = 3600.0  # [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ def rate_threshold(recordings: Sequence[np.ndarray], sample_period: float, alarm
         ValueError: there is no recording, an empty one, or a value that is not finite.
     """
     kept = _checked(recordings)
-    allowed = int(alarms_per_hour * sum(map(len, kept)) * sample_period / HOUR)
+    allowed = int(alarms_per_hour * sum(map(len, kept)) * sample_period / _HOUR)
     # An alarm begins where the residual rises past the threshold: each rise from a to b begins one for thresholds
     # from a up to b. Tried are the values from which rises begin, and where they end.
     before = np.concatenate([np.concatenate([[-np.inf], values[:-1]]) for values in kept])
@@ -149,7 +149,7 @@ def checked(
     """
     kept = _checked(recordings)
     alarms = sum(count_alarms(values > threshold) for values in kept)
-    return alarm_rate(alarms, sum(map(len, kept)) * sample_period / HOUR, confidence)
+    return alarm_rate(alarms, sum(map(len, kept)) * sample_period / _HOUR, confidence)
 
 
 @dataclass(frozen=True, slots=True)

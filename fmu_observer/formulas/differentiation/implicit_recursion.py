@@ -12,7 +12,7 @@ from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GA
 from plant_models.hybrid.system import Array
 
 ITERATIONS = 7  # Newton from at most twice the root: the last two change nothing any more
-SMALLEST = 1e-200  # stands in for an excess that is not positive, where the root is not used
+_SMALLEST = 1e-200  # stands in for an excess that is not positive, where the root is not used
 
 
 def implicit_step(
@@ -69,7 +69,7 @@ def solve_first_filter_equation(b: Array, a: Sequence[Array]) -> tuple[Array, Ar
     """
     degree = len(a)
     excess = np.abs(b) - a[0]
-    right = np.maximum(excess, SMALLEST)
+    right = np.maximum(excess, _SMALLEST)
     r = right ** (1.0 / degree)
     for j in range(1, degree):
         r = np.minimum(r, (right / a[j]) ** (1.0 / j))

@@ -17,10 +17,10 @@ import scipy
 
 Verdict = Literal["consistent", "overconfident", "underconfident", "not finite", "too few samples"]
 
-POINTWISE = 0.95  # of the samples of a consistent filter lie inside the band
-TEST_LEVEL = 0.99  # of consistent runs pass the test of the mean
-FEWEST = 5  # independent samples below which nothing is said
-SINGULAR = 1e-12  # smallest eigenvalue of a correlation matrix that is inverted
+_POINTWISE = 0.95  # of the samples of a consistent filter lie inside the band
+_TEST_LEVEL = 0.99  # of consistent runs pass the test of the mean
+_FEWEST = 5  # independent samples below which nothing is said
+_SINGULAR = 1e-12  # smallest eigenvalue of a correlation matrix that is inverted
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def normalised_squares(errors: np.ndarray, covariances: np.ndarray) -> np.ndarra
         found[usable] = (scaled**2).sum(axis=1)
         return found
     correlations = covariances[usable] / (deviations[:, :, None] * deviations[:, None, :])
-    regular = np.linalg.eigvalsh(correlations)[:, 0] > SINGULAR if len(correlations) else np.zeros(0, dtype=bool)
+    regular = np.linalg.eigvalsh(correlations)[:, 0] > _SINGULAR if len(correlations) else np.zeros(0, dtype=bool)
     solved = np.linalg.solve(correlations[regular], scaled[regular][:, :, None])[:, :, 0]
     squares = np.full(len(scaled), nan)
     squares[regular] = (scaled[regular] * solved).sum(axis=1)
@@ -96,7 +96,7 @@ def quantile(degrees: float | np.ndarray, probability: float) -> np.ndarray:
     return np.asarray(2.0 * scipy.special.gammaincinv(0.5 * np.asarray(degrees), probability))
 
 
-def chi_square_band(degrees: float, count: float = 1.0, level: float = POINTWISE) -> Band:
+def chi_square_band(degrees: float, count: float = 1.0, level: float = _POINTWISE) -> Band:
     """Band of the mean of independent chi-square numbers.
 
     Args:
@@ -136,7 +136,7 @@ def independent_count(values: np.ndarray) -> float:
     return float(count / max(length, 1.0))
 
 
-def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, level: float = TEST_LEVEL) -> Consistency:
+def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, level: float = _TEST_LEVEL) -> Consistency:
     """Whether normalised squares are those of a consistent filter.
 
     Args:
@@ -161,14 +161,14 @@ def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, leve
     band = chi_square_band(of_one, independent, level)
     inside = float(np.mean(is_inside(values, each)))
     verdict: Verdict = "consistent"
-    if independent < FEWEST:
+    if independent < _FEWEST:
         verdict = "too few samples"
     elif not band.low <= mean <= band.high:
         verdict = "overconfident" if mean > band.high else "underconfident"
     return Consistency(of_one, mean, len(values), independent, inside, band, verdict)
 
 
-def is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = POINTWISE) -> np.ndarray:
+def is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = _POINTWISE) -> np.ndarray:
     """Which samples lie inside the band of one, shape (rows,).
 
     Args:
@@ -179,7 +179,7 @@ def is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = P
     return np.asarray((squares >= low) & (squares <= high))
 
 
-def average_over_runs(squares: np.ndarray, degrees: float, level: float = POINTWISE) -> tuple[np.ndarray, Band]:
+def average_over_runs(squares: np.ndarray, degrees: float, level: float = _POINTWISE) -> tuple[np.ndarray, Band]:
     """Averages over independent runs at each instant, with the band that holds them for a consistent filter.
 
     Args:

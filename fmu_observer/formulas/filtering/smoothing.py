@@ -182,11 +182,11 @@ def unscented_pass(
     return _passed(start, P, predict, update, len(samples))
 
 
-Predict = Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
-Update = Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, float, int, float]]
+_Predict = Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+_Update = Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, float, int, float]]
 
 
-def _passed(start: np.ndarray, P: np.ndarray, predict: Predict, update: Update, count: int) -> FilterPass:
+def _passed(start: np.ndarray, P: np.ndarray, predict: _Predict, update: _Update, count: int) -> FilterPass:
     n = len(start)
     estimates, predictions = np.empty((count, n)), np.empty((count, n))
     covariances, predicted, crosses = (np.zeros((count, n, n)) for _ in range(3))

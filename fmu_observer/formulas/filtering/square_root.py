@@ -126,11 +126,11 @@ def corrected_by(x: Array, innovation: Array, noise: Array, seen: Array, spread:
     lower = triangular(block)
     root, cross = lower[:q, :q], lower[q:, :q]
     scaled = solved_lower(root, innovation.reshape(q, 1))
-    K = solved_lower_transposed(root, cross.T).T
+    K = _solved_lower_transposed(root, cross.T).T
     return Corrected(x + (cross @ scaled)[:, 0], lower[q:, q:], K, root @ root.T)
 
 
-def solved_lower_transposed(L: Array, right: Array) -> Array:
+def _solved_lower_transposed(L: Array, right: Array) -> Array:
     """``inv(L') right`` by backward substitution; a row of zeros in L gives zeros.
 
     Args:

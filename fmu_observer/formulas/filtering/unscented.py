@@ -139,7 +139,7 @@ def moments(found: Scattered, w: Weights) -> tuple[Array, Array]:
     return found.centre + apart, symmetric(_covariance(found, found, apart, apart, w))
 
 
-def root_columns(found: Scattered, w: Weights) -> Array:
+def _root_columns(found: Scattered, w: Weights) -> Array:
     """Columns C with ``C C'`` the weighted covariance, shape (m, 2 n + 1); for ``beta >= alpha^2``.
 
     Args:
@@ -194,7 +194,7 @@ def correct_root(
     Returns:
         Estimate, lower factor of the covariance, gain and covariance of the innovation.
     """
-    spread, looks = root_columns(states, w), root_columns(seen, w)
+    spread, looks = _root_columns(states, w), _root_columns(seen, w)
     if unseen is not None:
         spread = np.hstack([spread, unseen])
         looks = np.hstack([looks, np.zeros((looks.shape[0], unseen.shape[1]))])
@@ -208,4 +208,4 @@ def predicted_root(found: Scattered, noise: Array, w: Weights) -> Array:
         found: the transition at the points. noise: factor of the process noise, shape (n, r).
         w: weights, ``beta >= alpha^2``.
     """
-    return triangular(np.hstack([root_columns(found, w), noise]))
+    return triangular(np.hstack([_root_columns(found, w), noise]))

@@ -21,13 +21,13 @@ from fmu_observer.formulas.moving_horizon.gauss_newton import FAR, WindowProblem
 from fmu_observer.formulas.moving_horizon.window_program import Step, WindowProgram, window_program
 from fmu_observer.formulas.moving_horizon.window_stages import Stages, WindowStages, forward_substituted
 
-SMALLEST_SHARE = 1.0 / 64.0
+_SMALLEST_SHARE = 1.0 / 64.0
 """Of a step; where not even this makes the cost smaller, the search has ended."""
 
-LEAST_CURVATURE = 0.25
+_LEAST_CURVATURE = 0.25
 """Of a loss, as a share of its weight: where it is less, steps would be too long."""
 
-KEPT, NEAR = 1e-4, 1e-6
+_KEPT, _NEAR = 1e-4, 1e-6
 """How well a trajectory keeps the transitions to be called feasible, and how near a bound it touches it, in its own
 standard deviations."""
 
@@ -218,7 +218,7 @@ class _Search:
                 kept, feasible = point, self.keeps(point)
             if linear:
                 break
-            if share <= SMALLEST_SHARE and size > effort.tolerance:
+            if share <= _SMALLEST_SHARE and size > effort.tolerance:
                 reason = "no part of the last step makes the cost smaller"
                 break
         return self.told(kept if reason else point, size, iterations, began, reason)
@@ -254,7 +254,7 @@ class _Search:
             if loss == "geman_mcclure":
                 share = point.squares[:, j] / self.doubts**2
                 exact = self.used[:, j] * (1.0 - 3.0 * share) / (1.0 + share) ** 3
-                weights[:, j] = np.maximum(exact, LEAST_CURVATURE * weights[:, j])
+                weights[:, j] = np.maximum(exact, _LEAST_CURVATURE * weights[:, j])
         return weights
 
     def whitened(self, point: _Point, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -288,7 +288,7 @@ class _Search:
             noises = point.noises + share * (step.noises - point.noises)
             after = self.at(point.states + share * step.change, noises)
             better = self.merit(after, prices) <= before + 1e-9 * (1.0 + abs(before))
-            if free or better or share <= SMALLEST_SHARE:
+            if free or better or share <= _SMALLEST_SHARE:
                 return after, share
             share *= 0.5
 
@@ -324,8 +324,8 @@ class _Search:
 
     def keeps(self, point: _Point) -> bool:
         """Whether a point keeps the transitions and the bounds of disturbances; every point keeps those of states."""
-        kept = bool((np.abs(self.missing(point)) <= KEPT * self.scale).all())
-        return kept and self.disturbs(point.stages, point.noises) <= KEPT * float(self.scale.max())
+        kept = bool((np.abs(self.missing(point)) <= _KEPT * self.scale).all())
+        return kept and self.disturbs(point.stages, point.noises) <= _KEPT * float(self.scale.max())
 
     def disturbs(self, stages: Stages, noises: np.ndarray) -> float:
         """How far disturbances are beyond their bounds at most; negative where none is."""
@@ -348,14 +348,14 @@ class _Search:
 
     def active(self, states: np.ndarray) -> int:
         """How many bounds are touched."""
-        near, last = NEAR * self.scale, slice(-len(states), None)
+        near, last = _NEAR * self.scale, slice(-len(states), None)
         return int(((states <= self.lower[last] + near) | (states >= self.upper[last] - near)).sum())
 
     def pushed(self, point: _Point) -> int:
         """How many disturbances into the last row touch their bounds."""
         if self.noise_limits is None:
             return 0
-        w, near = (point.stages.G[-1] @ point.noises[-1])[self.disturbed], NEAR * self.scale[self.disturbed]
+        w, near = (point.stages.G[-1] @ point.noises[-1])[self.disturbed], _NEAR * self.scale[self.disturbed]
         return int(((w <= self.noise_limits[0][-1] + near) | (w >= self.noise_limits[1][-1] - near)).sum())
 
     def far_pushed(self, point: _Point) -> float:

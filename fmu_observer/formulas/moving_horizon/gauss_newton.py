@@ -125,7 +125,7 @@ class Solution(NamedTuple):
         estimates: of each row, shape (N, n). covariance: of the last one, row by row, shape (n * n,).
         residual: root of the mean square of the weighted residuals, in their deviations [1].
         step: largest change of an estimate in the last pass, in its standard deviations [1].
-        moved: passes after which an estimate had changed by more than `SETTLED` of its deviation.
+        moved: passes after which an estimate had changed by more than `_SETTLED` of its deviation.
         bounds: bounds that are active in the last row.
         far: measurements that are more than `FAR` of their deviations off, whatever they weigh, and transitions that
             need a disturbance so far off, for each measurement [1].
@@ -145,11 +145,11 @@ class Solution(NamedTuple):
 
 KEPT = 8  # problems whose sweeps are known as functions, so that they are traced once
 FAR = 5.0  # of a measurement's own deviations: noise is not that far off [ours]
-NEAR = 1e-6  # of its standard deviation: so near a bound a disturbance touches it
-SOFT = 1e-10  # of its variance: what a state may still move where a bound holds it, so that bounds that depend on each
+_NEAR = 1e-6  # of its standard deviation: so near a bound a disturbance touches it
+_SOFT = 1e-10  # of its variance: what a state may still move where a bound holds it, so that bounds that depend on each
 # other share a force, whose sign tells which of them to let go
-COLLAPSED = 1e-6  # of its variance: a state that has less is held by a bound, or known
-SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
+_COLLAPSED = 1e-6  # of its variance: a state that has less is held by a bound, or known
+_SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 
 
 def solve(
@@ -177,7 +177,7 @@ def solve(
         )
         active, fewest = _exchanged(active, wanted, wrong, fewest)
         fresh = np.zeros((count, 1))
-        used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
+        used = used + np.where(sums[1:2] > _SETTLED, 1.0, 0.0)
     before = arrival.mean - np.reshape(arrival.covariance, (n, n)) @ adjoint
     ahead = (arrival.point, before, np.zeros(2))
     (_, _, lacks), (points,) = scan_table(_followed(problem), ahead, (rows, points, pushes, swept[2]), (shared,))
@@ -236,7 +236,7 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         mean = np.where(goes, moved.state + moved.F @ (mean - before) + push, mean)
         P = np.where(goes, predicted_covariance(P, moved.F, noise), P)
         spread = vector(*(P[i, i] for i in range(n)))
-        own: Array = np.where(spread > COLLAPSED * free, spread, free)
+        own: Array = np.where(spread > _COLLAPSED * free, spread, free)
         pushed = (np.where(goes, push, 0.0 * push), np.where(goes, noise, 0.0 * noise))
         seen = problem.seen(point, row, shared)
         scale = vector(*_scales(problem, row, seen, P, fresh[0], shared))
@@ -246,7 +246,7 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         after = correct(mean, P, error, H, noise, None, problem.form)
         forces = np.reshape(np.linalg.solve(after.innovation_covariance, np.reshape(error, (q, 1))), (q,))
         limits = (problem.bounded, problem.limits(shared))
-        mean, P, gains, pulls = _held(after.estimate, after.covariance, *limits, active, SOFT * own)
+        mean, P, gains, pulls = _held(after.estimate, after.covariance, *limits, active, _SOFT * own)
         handed = (point, mean, np.reshape(P, (n * n,)), own)
         kept = (*(np.reshape(m, (m.shape[0] * m.shape[1],)) for m in (F, H, after.gain, noise)), forces, gains, pulls)
         off = row.measured - seen.measured
@@ -306,7 +306,7 @@ def _followed(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
             values[i] = np.where(goes, within, values[i])
         x = problem.clipped(vector(*values), shared)
         off = np.abs(x - np.where(goes, moved + push, before))
-        rounding = SOFT * (1.0 + np.abs(x))  # a state that is known has no deviation, but is off where bounds push it
+        rounding = _SOFT * (1.0 + np.abs(x))  # a state that is known has no deviation, but is off where bounds push it
         off = np.where(off > rounding, off / np.sqrt(np.maximum(own, rounding * rounding)), 0.0)
         far = [np.where(push[i] * push[i] > FAR * FAR * into.noise[i, i], 1.0, 0.0) for i in range(n)]
         disturbed = np.where(goes, np.max(vector(*far)), 0.0)
@@ -408,7 +408,7 @@ def _touched(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple
         moved, (lower, upper) = problem.moved(before, row, shared), problem.noise_limits(row, shared)
         at = []
         for k, i in enumerate(problem.disturbed):
-            w, near = point[i] - moved.state[i], NEAR * np.sqrt(moved.noise[i, i])
+            w, near = point[i] - moved.state[i], _NEAR * np.sqrt(moved.noise[i, i])
             side = np.where(w >= upper[k] - near, 1.0, 0.0) - np.where(w <= lower[k] + near, 1.0, 0.0)
             at.append(np.where(row.moves > 0.5, side, 0.0))
         return (point,), (vector(*at),)

@@ -19,7 +19,7 @@ from plant_models.hybrid.scan import enclosed
 from plant_models.hybrid.system import Array
 
 MOST_ROWS, MOST_PASSES = 1000, 20
-MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within what is told of its error [ours]
+_MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within what is told of its error [ours]
 
 WINDOW_MEMORY = ("arrival_cost", "window", "window_estimates", "last_pass")
 TOLD = {
@@ -33,7 +33,7 @@ TOLD = {
     "unsettled": "1 while the window is not a course of the model, or its last pass changed an estimate much",
 }
 """What is told of a window, outputs by name."""
-WARNINGS = {
+_WARNINGS = {
     "bounds_contradicted": OutputWarning(
         "its bounds contradict its window: they hold the estimate while more than half of the measurements, or of the "
         "disturbances between them, are over 5 deviations off, or no course of the model keeps them all. Check the "
@@ -104,7 +104,7 @@ def told_outputs(window: int) -> tuple[Signal, ...]:
         "the run last longer, or take a smaller window",
         reaches=float(window),
     )
-    warnings = {**WARNINGS, "rows_in_window": filled}
+    warnings = {**_WARNINGS, "rows_in_window": filled}
     return tuple(
         output_signal(name, "1", text, variability="discrete", warning=warnings.get(name))
         for name, text in TOLD.items()
@@ -181,4 +181,4 @@ def unsettled(step: Array, broken: Array) -> Array:
     Args:
         step: by which the last pass has moved an estimate, shape (1,) [1]. broken: `Solution.broken`, shape (1,) [1].
     """
-    return np.where(np.maximum(step, broken) > MUCH, 1.0, 0.0)
+    return np.where(np.maximum(step, broken) > _MUCH, 1.0, 0.0)

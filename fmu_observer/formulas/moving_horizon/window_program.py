@@ -16,9 +16,9 @@ import numpy as np
 from fmu_observer.formulas.moving_horizon.free_sweep import free_sweep
 from fmu_observer.formulas.moving_horizon.window_stages import BufferedCall
 
-SOLVER, OPTIONS = "piqp", {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100}
-SOLVED = "SOLVER_RET_SUCCESS"
-FREE = 1e6  # standard deviations, so many that they are no bound of a disturbance
+_SOLVER, _OPTIONS = "piqp", {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100}
+_SOLVED = "SOLVER_RET_SUCCESS"
+_FREE = 1e6  # standard deviations, so many that they are no bound of a disturbance
 
 
 class Step(NamedTuple):
@@ -37,7 +37,7 @@ class Step(NamedTuple):
     @property
     def solved(self) -> bool:
         """Whether the solver says that it is solved."""
-        return self.status == SOLVED
+        return self.status == _SOLVED
 
 
 class Programme(NamedTuple):
@@ -70,8 +70,8 @@ class WindowProgram:
         self,
         count: int,
         order: int,
-        solver: str = SOLVER,
-        options: Mapping[str, Any] = MappingProxyType(OPTIONS),
+        solver: str = _SOLVER,
+        options: Mapping[str, Any] = MappingProxyType(_OPTIONS),
         disturbed: tuple[int, ...] = (),
     ) -> None:
         self.count, self.order, self.disturbed = count, order, list(disturbed)
@@ -123,7 +123,7 @@ class WindowProgram:
         columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
         of_noise = np.concatenate([G, G[:, self.disturbed]], axis=1).transpose(0, 2, 1)
         coupling = np.concatenate([columns.ravel()[self._kept], of_noise.ravel()])
-        none = FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without sides
+        none = _FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without sides
         low, high = (-none, none) if noise is None else (np.maximum(noise[0], -none), np.minimum(noise[1], none))
         free, zero = np.full(N * n, np.inf), np.zeros(N * n)
         given = Programme(
@@ -169,7 +169,9 @@ class SweptProgram(WindowProgram):
     def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
         """See `WindowProgram.solve_free`."""
         found = free_sweep(self.count, self.order).solve(A, b, F, G, c)
-        return Step(*found, SOLVED if all(np.isfinite(part).all() for part in found) else "numbers that are not finite")
+        return Step(
+            *found, _SOLVED if all(np.isfinite(part).all() for part in found) else "numbers that are not finite"
+        )
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,7 @@ from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.formulas.moving_horizon.gauss_newton import WindowProblem
 from plant_models.hybrid.system import Array
 
-Numbers = np.ndarray
+_Numbers = np.ndarray
 
 
 class Stages(NamedTuple):
@@ -31,13 +31,13 @@ class Stages(NamedTuple):
             was measured in a row, zero for the rest, shape (N, q, q). variances: of each measurement, shape (N, q).
     """
 
-    moved: Numbers
-    F: Numbers
-    G: Numbers
-    measured: Numbers
-    H: Numbers
-    whitening: Numbers
-    variances: Numbers
+    moved: _Numbers
+    F: _Numbers
+    G: _Numbers
+    measured: _Numbers
+    H: _Numbers
+    whitening: _Numbers
+    variances: _Numbers
 
 
 class BufferedCall:
@@ -61,7 +61,7 @@ class BufferedCall:
         for i, result in enumerate(self._results):
             self._buffer.set_res(i, result.data)
 
-    def __call__(self, *arguments: Numbers) -> list[Numbers]:
+    def __call__(self, *arguments: _Numbers) -> list[_Numbers]:
         """The results, which the next call overwrites.
 
         Args:
@@ -86,7 +86,7 @@ class WindowStages:
         self._shared_count = 0
 
     def along(
-        self, states: Numbers, arrival: ArrivalCost, rows: Numbers, shared: Numbers, *, empty_first: bool = False
+        self, states: _Numbers, arrival: ArrivalCost, rows: _Numbers, shared: _Numbers, *, empty_first: bool = False
     ) -> Stages:
         """The stages along a trajectory.
 
@@ -113,7 +113,7 @@ class WindowStages:
         measured, H, whitening, variances = self._called("reading", count, q, states, rows, shared)
         return Stages(moved, F, G, measured[:, :, 0], H, whitening, variances[:, :, 0])
 
-    def covariances(self, stages: Stages, rows: Numbers) -> tuple[Numbers, Numbers]:
+    def covariances(self, stages: Stages, rows: _Numbers) -> tuple[_Numbers, _Numbers]:
         """Covariance of the last row before and after what is measured in it, by the Kalman filter along the stages.
 
         Args:
@@ -133,8 +133,8 @@ class WindowStages:
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _called(
-        self, name: str, count: int, height: int, states: Numbers, rows: Numbers, shared: Numbers
-    ) -> list[Numbers]:
+        self, name: str, count: int, height: int, states: _Numbers, rows: _Numbers, shared: _Numbers
+    ) -> list[_Numbers]:
         """Results of a function for all rows, each of shape (count, height, width of a result)."""
         if (name, count) not in self._mapped:
             function = self._transition if name == "transition" else self._reading

@@ -9,7 +9,7 @@ import numpy as np
 from fmu_observer.formulas.signatures.envelope import Envelope
 from plant_models.hybrid.system import Array
 
-NO_LINE = 1e9
+_NO_LINE = 1e9
 """Distance along a line that misses the envelope; finite, so that it traces."""
 
 
@@ -32,7 +32,7 @@ def class_distance(point: Array, numbers: Array, slope: Array) -> Array:
             envelope's frame, neither of them 0, shape (2,); see `line_slopes`.
 
     Returns:
-        A number [1]; 0 in the envelope, `NO_LINE` where the line misses it.
+        A number [1]; 0 in the envelope, `_NO_LINE` where the line misses it.
     """
     slabs = (len(numbers) - 3) // 3
     x = numbers[0] * point[0] - numbers[1] * point[1]
@@ -42,9 +42,9 @@ def class_distance(point: Array, numbers: Array, slope: Array) -> Array:
     begin = np.maximum(np.minimum(across[:-1], across[1:]), np.minimum(lower, upper))
     end = np.minimum(np.maximum(across[:-1], across[1:]), np.maximum(lower, upper))
     whole = np.sum(np.maximum(end - begin, 0.0))
-    nearest = np.min(np.where(end >= begin, np.maximum(np.maximum(begin, -end), 0.0), NO_LINE))
-    share = np.where(whole > 0.0, nearest / np.where(whole > 0.0, whole, 1.0), NO_LINE)
-    return np.where(nearest > 0.0, np.minimum(share, NO_LINE), 0.0)
+    nearest = np.min(np.where(end >= begin, np.maximum(np.maximum(begin, -end), 0.0), _NO_LINE))
+    share = np.where(whole > 0.0, nearest / np.where(whole > 0.0, whole, 1.0), _NO_LINE)
+    return np.where(nearest > 0.0, np.minimum(share, _NO_LINE), 0.0)
 
 
 def line_slopes(directions: int) -> np.ndarray:

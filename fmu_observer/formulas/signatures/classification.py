@@ -17,7 +17,7 @@ from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.formulas.signatures.pencil import EPS, NextScaling
 from fmu_observer.formulas.signatures.properties import PROPERTIES
 
-UNDECIDED = -1
+_UNDECIDED = -1
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class SignatureClassifier:
                 0 for a verdict everywhere.
         """
         count = np.asarray(records).shape[1]
-        index, open_ = np.full(count, UNDECIDED), np.ones(count, dtype=bool)
+        index, open_ = np.full(count, _UNDECIDED), np.ones(count, dtype=bool)
         nearest = np.full(count, np.inf)
         for stage in self.stages:
             points = stage.plane.points(records)

@@ -12,11 +12,11 @@ from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.formulas.signatures.pencil import EPS, NextScaling
 from fmu_observer.formulas.signatures.properties import PROPERTIES
 
-DIRECTIONS = np.arange(180) * np.pi / 180.0
+_DIRECTIONS = np.arange(180) * np.pi / 180.0
 """Directions in which two clouds are held apart: one a degree [rad]."""
-THIN = 1e-9
+_THIN = 1e-9
 """Range below which clouds have no extent in a direction, in units of the coordinates."""
-NORMALS = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+_NORMALS = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 
 
 class Coordinate(NamedTuple):
@@ -71,7 +71,7 @@ class Separation(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """How far a cloud reaches in each of `DIRECTIONS`.
+    """How far a cloud reaches in each of `_DIRECTIONS`.
 
     Attributes:
         low: smallest projection, shape (k,). high: largest, shape (k,).
@@ -87,7 +87,7 @@ def extent(points: np.ndarray) -> Extent:
     Args:
         points: shape (2, n).
     """
-    projected = NORMALS.T @ points
+    projected = _NORMALS.T @ points
     return Extent(projected.min(axis=1), projected.max(axis=1))
 
 
@@ -102,9 +102,9 @@ def separation(first: Extent, second: Extent) -> Separation:
     """
     gaps = np.stack([first.low - second.high, second.low - first.high])
     widths = np.maximum(first.high, second.high) - np.minimum(first.low, second.low)
-    shares = np.where(widths > THIN, gaps / np.maximum(widths, THIN), -1.0)
+    shares = np.where(widths > _THIN, gaps / np.maximum(widths, _THIN), -1.0)
     side, at = np.unravel_index(int(np.argmax(shares)), shares.shape)
     margin, gap = float(shares[side, at]), float(gaps[side, at])
     if side == 0:
-        return Separation(margin, gap, NORMALS[:, at], float(0.5 * (first.low[at] + second.high[at])))
-    return Separation(margin, gap, -NORMALS[:, at], float(-0.5 * (second.low[at] + first.high[at])))
+        return Separation(margin, gap, _NORMALS[:, at], float(0.5 * (first.low[at] + second.high[at])))
+    return Separation(margin, gap, -_NORMALS[:, at], float(-0.5 * (second.low[at] + first.high[at])))

@@ -13,9 +13,9 @@ import scipy
 
 from fmu_observer.formulas.signatures.classification import Drawn, PencilSpace, Plane, drawn_planes
 
-PLACES = 400
+_PLACES = 400
 """Places at which a curve is compared with a point."""
-CLOSE = 1e-9
+_CLOSE = 1e-9
 """Centres nearer than this, in units of the ranges, count as this far apart."""
 
 
@@ -93,9 +93,9 @@ def _curve(drawn: Drawn, values: np.ndarray) -> ClassCurve:
     classes = np.unique(values)
     clouds = [drawn.points[:, values == value] for value in classes]
     centres = np.stack([0.5 * (cloud.min(axis=1) + cloud.max(axis=1)) for cloud in clouds], axis=1)
-    steps = np.maximum(np.hypot(*np.diff(centres, axis=1)), CLOSE)
+    steps = np.maximum(np.hypot(*np.diff(centres, axis=1)), _CLOSE)
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    fine = np.linspace(0.0, along[-1], PLACES)
+    fine = np.linspace(0.0, along[-1], _PLACES)
     smooth = scipy.interpolate.make_interp_spline(along, centres, k=min(3, len(classes) - 1), axis=1)
     curve = ClassCurve(drawn.plane, classes, smooth(fine), np.interp(fine, along, classes), 0.0)
     return replace(curve, reach=float(curve.nearest(drawn.points).distance.max()))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SLABS = 30
+_SLABS = 30
 """Slabs of the example of Omar 2012, section 4.5."""
 ANGLES = 181
 """Angles from 0 to pi at which the best envelope is sought: one a degree."""
@@ -69,7 +69,7 @@ def rotated(points: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
     return np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y])
 
 
-def envelope(points: np.ndarray, slabs: int = SLABS, angle: float = 0.0) -> Envelope:
+def envelope(points: np.ndarray, slabs: int = _SLABS, angle: float = 0.0) -> Envelope:
     """Envelope at an angle, ``E_th = E_0(R_th S)``: Omar 2012, (4.5.2)-(4.5.4), (4.5.12).
 
     A slab reaches from the last point of the slab before it to its own last point. (4.5.2) prints (i - 1) / N_p for the
@@ -86,7 +86,7 @@ def envelope(points: np.ndarray, slabs: int = SLABS, angle: float = 0.0) -> Enve
     return Envelope(float(angle), edges, lower, upper)
 
 
-def envelope_areas(points: np.ndarray, slabs: int = SLABS, angles: np.ndarray | None = None) -> np.ndarray:
+def envelope_areas(points: np.ndarray, slabs: int = _SLABS, angles: np.ndarray | None = None) -> np.ndarray:
     """Areas A_th of the envelopes at several angles: Omar 2012, (4.5.14).
 
     Args:
@@ -103,7 +103,7 @@ def envelope_areas(points: np.ndarray, slabs: int = SLABS, angles: np.ndarray | 
     return np.asarray(np.sum(np.diff(edges) * (upper - lower), axis=-1))
 
 
-def best_envelope(points: np.ndarray, slabs: int = SLABS, angles: np.ndarray | None = None) -> Envelope:
+def best_envelope(points: np.ndarray, slabs: int = _SLABS, angles: np.ndarray | None = None) -> Envelope:
     """Envelope at the angle of the smallest area: Omar 2012, (4.5.13).
 
     Args:

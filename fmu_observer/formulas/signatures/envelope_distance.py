@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_observer.formulas.signatures.envelope import Envelope, rotated
 
-DIRECTIONS = 90
+_DIRECTIONS = 90
 """Lines through a point among which the smallest distance is sought: one every two degrees."""
 
 
@@ -39,7 +39,7 @@ def line_distance(points: np.ndarray, envelope: Envelope, direction: float | np.
     return distance if np.ndim(direction) else distance[..., 0]
 
 
-def envelope_distance(points: np.ndarray, envelope: Envelope, directions: int = DIRECTIONS) -> np.ndarray:
+def envelope_distance(points: np.ndarray, envelope: Envelope, directions: int = _DIRECTIONS) -> np.ndarray:
     """Smallest distance over lines in all directions: Omar 2012, (4.5.18).
 
     Args:

@@ -16,7 +16,7 @@ import numpy as np
 from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
-TINY = 1e-300
+_TINY = 1e-300
 """Keeps quotients finite where both of their sides vanish."""
 
 
@@ -93,7 +93,7 @@ def _distance(_carry: Any, curve: Any, shared: Any) -> Any:
     """Distance of a point from one polygonal line."""
     along = [values[1:] - values[:-1] for values in curve]
     to = [shared[0][i] - curve[i][:-1] for i in range(2)]
-    share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + TINY)
+    share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + _TINY)
     share = np.clip(share, 0.0, 1.0)
     square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
     return (), (np.stack([np.sqrt(np.min(square))]),)
@@ -108,7 +108,7 @@ def place_on_curve(nodes: np.ndarray, curve: Array, point: Array) -> Array:
     best: tuple[Array, ...] | None = None
     for i in range(len(nodes) - 1):
         along, to = [curve[k, i + 1] - curve[k, i] for k in range(2)], [point[k] - curve[k, i] for k in range(2)]
-        share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + TINY)
+        share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + _TINY)
         share = np.clip(share, 0.0, 1.0)
         square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
         found = (square, nodes[i] + share * (nodes[i + 1] - nodes[i]))
@@ -178,7 +178,7 @@ def _in_cell(corners: Array, cell: Array, point: Array, extrapolated: float) -> 
         error = point - (corner + s * right + t * up + s * t * twist)
         by_s, by_t = right + t * twist, up + s * twist
         area = by_s[0] * by_t[1] - by_s[1] * by_t[0]
-        area = np.where(np.abs(area) > TINY, area, TINY)
+        area = np.where(np.abs(area) > _TINY, area, _TINY)
         s = s + (error[0] * by_t[1] - error[1] * by_t[0]) / area
         t = t + (by_s[0] * error[1] - by_s[1] * error[0]) / area
     beyond = np.maximum(np.maximum(np.abs(s - 0.5), np.abs(t - 0.5)) - 0.5, 0.0)
@@ -237,7 +237,7 @@ def nearest_two(distances: Sequence[Array], labels: np.ndarray) -> Array:
             for a, b, c in zip(first, second, (distance, label), strict=True)
         )
         first = tuple(np.where(leads, c, a) for a, c in zip(first, (distance, label), strict=True))
-    total = first[0] + second[0] + TINY
+    total = first[0] + second[0] + _TINY
     return (second[0] * first[1] + first[0] * second[1]) / total
 
 
@@ -280,7 +280,7 @@ def best_candidate(candidates: np.ndarray, residuals: Array) -> Found:
     last = len(candidates) - 2
     for i in range(last + 1):
         along = residuals[:, i + 1] - residuals[:, i]
-        share = -np.sum(residuals[:, i] * along) / (np.sum(along * along) + TINY)
+        share = -np.sum(residuals[:, i] * along) / (np.sum(along * along) + _TINY)
         share = np.clip(share, 0.0, 1.0)
         cost = np.sum((residuals[:, i] + share * along) ** 2)
         at_end = 0.0 * share

@@ -12,9 +12,9 @@ from fmu_observer.formulas.signatures.tip_recursion import next_tips
 from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 
-TOLERANCE = 0.01
+_TOLERANCE = 0.01
 """Of the ordinate, as printed."""
-FLAT = -1e9  # below every second difference
+_FLAT = -1e9  # below every second difference
 
 PRINTED_MEMORY: tuple[Signal, ...] = (
     memory("ordinate_before", "1", 0.0, "Ordinate of the long signature one sample ago"),
@@ -24,9 +24,9 @@ PRINTED_MEMORY: tuple[Signal, ...] = (
     memory("short_abscissa", "1", 0.0, "Abscissa of the short signature one sample ago"),
     memory("short_ordinate", "1", 0.0, "Ordinate of the short signature one sample ago"),
     memory("short_earlier", "1", 0.0, "Ordinate of the short signature two samples ago"),
-    memory("bend", "1", FLAT, "Largest second difference of the short ordinates since the last tip"),
+    memory("bend", "1", _FLAT, "Largest second difference of the short ordinates since the last tip"),
     memory("bend_at", "1", 0.0, "Abscissa there"),
-    memory("bend_before", "1", FLAT, "Largest second difference between the last two tips"),
+    memory("bend_before", "1", _FLAT, "Largest second difference between the last two tips"),
     memory("bend_at_before", "1", 0.0, "Abscissa there"),
 )
 
@@ -44,7 +44,7 @@ def next_printed(
     """
     tips = next_tips(x, long_point[0], short_point[0], patience)
     tip = tips["since_tip"] < 0.5
-    near = np.where(np.abs(long_point[1] - x.tip_ordinate) < TOLERANCE, np.minimum(x.near, long_point[0]), x.near)
+    near = np.where(np.abs(long_point[1] - x.tip_ordinate) < _TOLERANCE, np.minimum(x.near, long_point[0]), x.near)
     bend = short_point[1] - 2.0 * x.short_ordinate + x.short_earlier
     sharper = bend > x.bend
     best, best_at = np.where(sharper, bend, x.bend), np.where(sharper, x.short_abscissa, x.bend_at)
@@ -60,7 +60,7 @@ def next_printed(
         "short_abscissa": short_point[0],
         "short_ordinate": short_point[1],
         "short_earlier": x.short_ordinate,
-        "bend": np.where(tip, FLAT, best),
+        "bend": np.where(tip, _FLAT, best),
         "bend_at": np.where(tip, x.short_abscissa, best_at),
         "bend_before": np.where(tip, best, x.bend_before),
         "bend_at_before": np.where(tip, best_at, x.bend_at_before),

@@ -11,21 +11,21 @@ import numpy as np
 
 from plant_models.hybrid.system import Array
 
-Property = Callable[[np.ndarray], np.ndarray]
-SMALLEST = 1e-3
+_Property = Callable[[np.ndarray], np.ndarray]
+_SMALLEST = 1e-3
 """eps of the largest quotient: keeps it finite where an ordinate is 0."""
 
 
-def largest_quotient(signature: np.ndarray) -> np.ndarray:
+def _largest_quotient(signature: np.ndarray) -> np.ndarray:
     """Largest ``xi / (eps + |eta|)``: Omar 2012, section 3.4.2.
 
     Args:
         signature: shape (2, M, ...).
     """
-    return np.asarray((signature[0] / (SMALLEST + np.abs(signature[1]))).max(axis=0))
+    return np.asarray((signature[0] / (_SMALLEST + np.abs(signature[1]))).max(axis=0))
 
 
-def path_length(signature: np.ndarray) -> np.ndarray:
+def _path_length(signature: np.ndarray) -> np.ndarray:
     """Length of the curve through the points [ours].
 
     Args:
@@ -35,7 +35,7 @@ def path_length(signature: np.ndarray) -> np.ndarray:
     return np.asarray(np.hypot(steps[0], steps[1]).sum(axis=0))
 
 
-def chord(signature: np.ndarray) -> np.ndarray:
+def _chord(signature: np.ndarray) -> np.ndarray:
     """Distance between first and last point [ours].
 
     Args:
@@ -86,7 +86,7 @@ def branch_tips(signature: Array, interpolate: bool = False) -> tuple[Array, Arr
     return np.where(found, far, top), np.where(found, near, top)
 
 
-def branch_gap(signature: np.ndarray) -> np.ndarray:
+def _branch_gap(signature: np.ndarray) -> np.ndarray:
     """Gap r3 between the two right-hand branches: Omar 2012, section 2.5, in the reading of `branch_tips`.
 
     Args:
@@ -96,7 +96,7 @@ def branch_gap(signature: np.ndarray) -> np.ndarray:
     return np.asarray(far - near)
 
 
-def length_to_middle(signature: np.ndarray) -> np.ndarray:
+def _length_to_middle(signature: np.ndarray) -> np.ndarray:
     """Length r1 from the left end to the middle between the right-hand branches: Omar 2012, section 2.5.
 
     Args:
@@ -131,7 +131,7 @@ def printed_tip(signature: Array) -> Array:
     return np.max(np.where(bend >= np.max(bend, axis=0), xi[1:-1], np.min(xi, axis=0)), axis=0)
 
 
-PROPERTIES: Mapping[str, Property] = {
+PROPERTIES: Mapping[str, _Property] = {
     "max_xi": lambda s: s[0].max(axis=0),
     "min_xi": lambda s: s[0].min(axis=0),
     "max_eta": lambda s: s[1].max(axis=0),
@@ -144,11 +144,11 @@ PROPERTIES: Mapping[str, Property] = {
     "deviation_eta": lambda s: s[1].std(axis=0),
     "median_xi": lambda s: np.median(s[0], axis=0),
     "median_eta": lambda s: np.median(s[1], axis=0),
-    "largest_quotient": largest_quotient,
-    "path_length": path_length,
-    "chord": chord,
+    "largest_quotient": _largest_quotient,
+    "path_length": _path_length,
+    "chord": _chord,
     "slope": slope,
-    "branch_gap": branch_gap,
-    "length_to_middle": length_to_middle,
+    "branch_gap": _branch_gap,
+    "length_to_middle": _length_to_middle,
 }
 """Properties among which a classifier is sought, by name: a signature of shape (2, M, ...) to shape (...)."""

@@ -9,7 +9,7 @@ from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3, acceler
 from plant_models.hybrid import input_signal, state
 from plant_models.hybrid.system import Array, vector
 
-CHAINS = np.kron(np.eye(3), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, each angle and its rate
+_CHAINS = np.kron(np.eye(3), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, each angle and its rate
 
 
 def cart_double_pendulum() -> ObserverModel:
@@ -32,7 +32,7 @@ def cart_double_pendulum() -> ObserverModel:
             input_signal("first_angle", "rad", 0.0, "Measured angle of the lower rod"),
             input_signal("second_angle", "rad", 0.0, "Measured angle of the upper rod"),
         ),
-        A=CHAINS,
+        A=_CHAINS,
         B=np.zeros((6, 1)),
         C=np.eye(6)[[0, 2, 4]],
         phi=_remainder,

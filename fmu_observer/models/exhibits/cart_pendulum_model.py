@@ -9,7 +9,7 @@ from plant_models.exhibits.cart_pendulum import TABLE_4_1, accelerations
 from plant_models.hybrid import input_signal, state
 from plant_models.hybrid.system import Array, vector
 
-CHAINS = np.kron(np.eye(2), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, angle and rate
+_CHAINS = np.kron(np.eye(2), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, angle and rate
 
 
 def cart_pendulum() -> ObserverModel:
@@ -29,7 +29,7 @@ def cart_pendulum() -> ObserverModel:
             input_signal("position", "m", 0.0, "Measured position of the cart"),
             input_signal("angle", "rad", 0.0, "Measured angle of the pendulum"),
         ),
-        A=CHAINS,
+        A=_CHAINS,
         B=np.zeros((4, 1)),
         C=np.eye(4)[[0, 2]],
         phi=_remainder,

@@ -19,7 +19,7 @@ from plant_models.exhibits.flexible_joint_arm import (
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
 
-NAMES = ("motor_angle", "link_angle", "motor_speed", "link_speed")
+_NAMES = ("motor_angle", "link_angle", "motor_speed", "link_speed")
 
 
 def flexible_joint_arm(gravity: Gravity = "link_angle") -> ObserverModel:
@@ -31,7 +31,7 @@ def flexible_joint_arm(gravity: Gravity = "link_angle") -> ObserverModel:
     Raises:
         ValueError: another word.
     """
-    at = NAMES.index(checked_gravity(gravity, "flexible_joint_arm"))
+    at = _NAMES.index(checked_gravity(gravity, "flexible_joint_arm"))
     return ObserverModel(
         name="flexible_joint_arm" + ("" if gravity == "link_angle" else "_as_printed"),
         description="Robot arm with a flexible joint, two angles measured by two nodes",

@@ -12,12 +12,12 @@ from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
 
-LARGEST_PREMISE = 5.0  # sum of the printed bounds, 1 of sin(y1) and 4 of y2^2
-STATES = tuple(state(f"x{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4))
-INPUTS = (input_signal("drive", "1", 0.0, "Known input u"),)
-FIRST = input_signal("x1", "1", 0.0, "First output")
-SECOND = input_signal("x2", "1", 0.0, "Second output")
-SOURCE = "Bouchama 2024, section 2.5.1"
+_LARGEST_PREMISE = 5.0  # sum of the printed bounds, 1 of sin(y1) and 4 of y2^2
+_STATES = tuple(state(f"x{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4))
+_INPUTS = (input_signal("drive", "1", 0.0, "Known input u"),)
+_FIRST = input_signal("x1", "1", 0.0, "First output")
+_SECOND = input_signal("x2", "1", 0.0, "Second output")
+_SOURCE = "Bouchama 2024, section 2.5.1"
 
 
 def triangularisable_example() -> TakagiSugenoModel:
@@ -27,7 +27,7 @@ def triangularisable_example() -> TakagiSugenoModel:
     4 for y2^2, which cannot be negative, and its gains belong to these vertices.
     """
     return sector_nonlinearity(
-        premises=(Premise("damping", "1", -LARGEST_PREMISE, LARGEST_PREMISE, _damping, "sin(x1) + x2^2"),),
+        premises=(Premise("damping", "1", -_LARGEST_PREMISE, _LARGEST_PREMISE, _damping, "sin(x1) + x2^2"),),
         A=lambda f: [
             [-1.25, -48.6, 1.0, 0.0],
             [1.0, 0.0, 0.0, 1.0],
@@ -37,11 +37,11 @@ def triangularisable_example() -> TakagiSugenoModel:
         B=lambda _f: [[21.6], [0.0], [0.0], [0.0]],
         name="triangularisable_example",
         description="Four states with one premise, first example of chapter 2",
-        source=SOURCE,
-        states=STATES,
-        inputs=INPUTS,
-        sampled=(FIRST,),
-        continuous=(SECOND,),
+        source=_SOURCE,
+        states=_STATES,
+        inputs=_INPUTS,
+        sampled=(_FIRST,),
+        continuous=(_SECOND,),
         C_sampled=np.eye(4)[:1],
         C_continuous=np.eye(4)[1:2],
         G=np.eye(4)[:, 3:],
@@ -59,9 +59,9 @@ def triangularisable_chain() -> ObserverModel:
         name="triangularisable_chain",
         description="First example of chapter 2 as a chain of two blocks",
         source="Bouchama 2024, (2.42)",
-        states=STATES,
-        inputs=INPUTS,
-        measurements=(FIRST, SECOND),
+        states=_STATES,
+        inputs=_INPUTS,
+        measurements=(_FIRST, _SECOND),
         A=shift_matrix(2, 2),
         B=np.array([[21.6], [0.0], [0.0], [0.0]]),
         C=np.eye(4)[:2],

@@ -9,8 +9,8 @@ import numpy as np
 from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid import input_signal, state
 
-CART, BOB, LENGTH, GRAVITY = 4.0, 0.4, 5.0, 9.81  # [kg], [kg], [m], [m/s2]
-RESISTANCE, INDUCTANCE, MOTOR, ROLLER = 1.0, 0.5, 0.5, 0.1  # [Ohm], [H], [N.m/A], [m]
+_CART, _BOB, _LENGTH, _GRAVITY = 4.0, 0.4, 5.0, 9.81  # [kg], [kg], [m], [m/s2]
+_RESISTANCE, _INDUCTANCE, _MOTOR, _ROLLER = 1.0, 0.5, 0.5, 0.1  # [Ohm], [H], [N.m/A], [m]
 
 
 def inverted_pendulum_cart() -> ObserverModel:
@@ -24,15 +24,15 @@ def inverted_pendulum_cart() -> ObserverModel:
     ``dv = -(m g / M) a + f / M``, ``dq = ((M + m) g / (M l)) a - f / (M l)``, ``di = (u - R i - (k / r) v) / L``,
     ``dp = v``, ``da = q``. The pendulum falls with the time constant ``sqrt(M l / ((M + m) g))`` = 0.68 s.
     """
-    force = MOTOR / ROLLER
-    fall = (CART + BOB) * GRAVITY / (CART * LENGTH)
+    force = _MOTOR / _ROLLER
+    fall = (_CART + _BOB) * _GRAVITY / (_CART * _LENGTH)
     A = np.zeros((5, 5))
-    A[0, 2], A[0, 4] = force / CART, -BOB * GRAVITY / CART
-    A[1, 2], A[1, 4] = -force / (CART * LENGTH), fall
-    A[2, 0], A[2, 2] = -force / INDUCTANCE, -RESISTANCE / INDUCTANCE
+    A[0, 2], A[0, 4] = force / _CART, -_BOB * _GRAVITY / _CART
+    A[1, 2], A[1, 4] = -force / (_CART * _LENGTH), fall
+    A[2, 0], A[2, 2] = -force / _INDUCTANCE, -_RESISTANCE / _INDUCTANCE
     A[3, 0], A[4, 1] = 1.0, 1.0
     B = np.zeros((5, 1))
-    B[2, 0] = 1.0 / INDUCTANCE
+    B[2, 0] = 1.0 / _INDUCTANCE
     measured = (
         input_signal("current", "A", 0.0, "Motor current"),
         input_signal("position", "m", 0.0, "Position of the cart at a mark"),

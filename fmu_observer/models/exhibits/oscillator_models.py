@@ -8,8 +8,8 @@ from fmu_observer.models.state_affine import StateAffineModel
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
 
-PULSATION = 20.0  # [rad/s], w1
-DRIVE = 10.0  # size of the printed drive, u = 10 sin t
+_PULSATION = 20.0  # [rad/s], w1
+_DRIVE = 10.0  # size of the printed drive, u = 10 sin t
 
 
 def time_varying_oscillator(excitation: str = "fading") -> StateAffineModel:
@@ -32,7 +32,7 @@ def time_varying_oscillator(excitation: str = "fading") -> StateAffineModel:
             state("rho2", "1", 0.0, "Second unknown constant"),
         ),
         drift=lambda _t, _u: np.array([[0.0, 1.0], [-1.0, 0.0]]),
-        drive=lambda t, u: vector(0.0, (2.0 + np.tanh(t)) * (DRIVE * np.sin(t) + u[0])),
+        drive=lambda t, u: vector(0.0, (2.0 + np.tanh(t)) * (_DRIVE * np.sin(t) + u[0])),
         regressor=_fading if excitation == "fading" else _lasting,
         C=np.array([[1.0, 0.0]]),
         example=(20.0, -40.0, 10.0, 20.0),
@@ -40,11 +40,11 @@ def time_varying_oscillator(excitation: str = "fading") -> StateAffineModel:
 
 
 def _fading(t: Array, _u: Array) -> Array:
-    return _diagonal(np.sin(PULSATION * t), np.cos(PULSATION * t) / (1.0 + t * t))
+    return _diagonal(np.sin(_PULSATION * t), np.cos(_PULSATION * t) / (1.0 + t * t))
 
 
 def _lasting(t: Array, _u: Array) -> Array:
-    return _diagonal(np.sin(PULSATION * t), np.sin(PULSATION * t))
+    return _diagonal(np.sin(_PULSATION * t), np.sin(_PULSATION * t))
 
 
 def _diagonal(first: Array, second: Array) -> Array:

@@ -9,8 +9,8 @@ from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from plant_models.hybrid.system import Array
 
-LOWEST = -0.21723362821122166  # smallest value of sin(x)/x, at 4.4934 rad
-SMALL = 1e-4  # [rad]; below it the series 1 - x^2/6 is exact to rounding
+_LOWEST = -0.21723362821122166  # smallest value of sin(x)/x, at 4.4934 rad
+_SMALL = 1e-4  # [rad]; below it the series 1 - x^2/6 is exact to rounding
 
 
 def takagi_sugeno_pendulum() -> TakagiSugenoModel:
@@ -21,7 +21,7 @@ def takagi_sugeno_pendulum() -> TakagiSugenoModel:
     """
     plain = pendulum()
     return sector_nonlinearity(
-        premises=(Premise("restoring", "1", LOWEST, 1.0, _sine_ratio, "sin(angle) / angle"),),
+        premises=(Premise("restoring", "1", _LOWEST, 1.0, _sine_ratio, "sin(angle) / angle"),),
         A=lambda f: [[0.0, 1.0], [-STIFFNESS * f[0], -DAMPING]],
         B=lambda _f: [[0.0], [1.0]],
         name="pendulum",
@@ -38,5 +38,5 @@ def takagi_sugeno_pendulum() -> TakagiSugenoModel:
 
 def _sine_ratio(x: Array, _u: Array) -> Array:
     angle, _ = x
-    safe = np.where(np.abs(angle) < SMALL, 1.0, angle)
-    return np.where(np.abs(angle) < SMALL, 1.0 - angle * angle / 6.0, np.sin(safe) / safe)
+    safe = np.where(np.abs(angle) < _SMALL, 1.0, angle)
+    return np.where(np.abs(angle) < _SMALL, 1.0 - angle * angle / 6.0, np.sin(safe) / safe)

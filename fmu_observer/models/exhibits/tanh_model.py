@@ -11,8 +11,8 @@ from plant_models.exhibits.tanh_system import Reading, tanh_term
 from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
 
-STIFFNESS = 0.1  # [1/s2]
-LARGEST_SECOND = 3.2  # of x2, on the orbit through (5, 3)
+_STIFFNESS = 0.1  # [1/s2]
+_LARGEST_SECOND = 3.2  # of x2, on the orbit through (5, 3)
 
 
 def tanh_system(reading: Reading = "minus") -> ObserverModel:
@@ -26,8 +26,8 @@ def tanh_system(reading: Reading = "minus") -> ObserverModel:
         reading: which term with tanh, see the plant of this name.
     """
     slopes = tuple(
-        np.array([[0.0, 0.0], [-STIFFNESS + steep, across]])
-        for steep in (-LARGEST_SECOND, LARGEST_SECOND)
+        np.array([[0.0, 0.0], [-_STIFFNESS + steep, across]])
+        for steep in (-_LARGEST_SECOND, _LARGEST_SECOND)
         for across in (-1.0, 1.0)
     )
     return ObserverModel(
@@ -48,4 +48,4 @@ def tanh_system(reading: Reading = "minus") -> ObserverModel:
 
 def _remainder(reading: Reading, x: Array, _u: Array) -> Array:
     first, second = x
-    return vector(0.0, -STIFFNESS * first + tanh_term(first, second, reading))
+    return vector(0.0, -_STIFFNESS * first + tanh_term(first, second, reading))

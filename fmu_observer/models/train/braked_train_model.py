@@ -9,11 +9,11 @@ from fmu_observer.models.suitability import require_mass
 from plant_models.hybrid import input_signal, state
 
 DRAG = 0.1  # w1 of set A [1/s]
-EFFORT = 0.1  # b of set A [1]
-START = 30.0  # [m/s]
+_EFFORT = 0.1  # b of set A [1]
+_START = 30.0  # [m/s]
 
 
-def braked_train(mass: float = 1.0, drag: float = DRAG, effort: float = EFFORT) -> ObserverModel:
+def braked_train(mass: float = 1.0, drag: float = DRAG, effort: float = _EFFORT) -> ObserverModel:
     """``dv = -w1 v + b u / m + d``, the speed is measured: Aguiar Cota 2019, (3.1)-(3.3) and (3.15), set A.
 
     The disturbance d holds what the model leaves out, ``-w0 - w2 v^2`` and the slope. The position is no state: no
@@ -28,9 +28,9 @@ def braked_train(mass: float = 1.0, drag: float = DRAG, effort: float = EFFORT) 
         name="braked_train",
         description="Speed of a train under an effort and an unknown disturbance, its speed measured",
         source="Aguiar Cota 2019, (3.1)-(3.3), set A",
-        states=(state("speed", "m/s", START, "Speed of the train"),),
+        states=(state("speed", "m/s", _START, "Speed of the train"),),
         inputs=(input_signal("effort", "N", 0.0, "Effort: traction > 0, brake < 0"),),
-        measurements=(input_signal("speed", "m/s", START, "Speed by the odometer"),),
+        measurements=(input_signal("speed", "m/s", _START, "Speed by the odometer"),),
         A=np.array([[-drag]]),
         B=np.array([[effort / mass]]),
         C=np.eye(1),

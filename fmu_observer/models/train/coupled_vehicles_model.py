@@ -10,18 +10,18 @@ from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_mass
 from plant_models.hybrid import input_signal, state
 
-LOCOMOTIVE, WAGON = 90e3, 60e3  # [kg]
-STIFFNESS, DAMPING = 2.5e6, 5e4  # of the coupler [N/m], [N.s/m]
+_LOCOMOTIVE, _WAGON = 90e3, 60e3  # [kg]
+_STIFFNESS, _DAMPING = 2.5e6, 5e4  # of the coupler [N/m], [N.s/m]
 DRAG = 2e-3  # slope of the running resistance per mass [1/s]
 
 
 def coupled_vehicles(
-    mass: float = LOCOMOTIVE,
-    wagon_mass: float = WAGON,
+    mass: float = _LOCOMOTIVE,
+    wagon_mass: float = _WAGON,
     drag: float = DRAG,
     effort: float = 1.0,
-    stiffness: float = STIFFNESS,
-    damping: float = DAMPING,
+    stiffness: float = _STIFFNESS,
+    damping: float = _DAMPING,
 ) -> ObserverModel:
     """``de = v1 - v2``, ``dv1 = (b u - F) / m1 - r v1 + d``, ``dv2 = F / m2 - r v2``, ``F = K e + D (v1 - v2)`` [ours].
 

@@ -9,9 +9,9 @@ from plant_models.hybrid import input_signal, state, vector
 from plant_models.hybrid.system import Array
 
 MASS = 90e3  # [kg]
-DAVIS_A, DAVIS_B, DAVIS_C = 900.0, 32.4, 1.65287  # [N], [N.s/m], [N.s2/m2]
+_DAVIS_A, DAVIS_B, DAVIS_C = 900.0, 32.4, 1.65287  # [N], [N.s/m], [N.s2/m2]
 TOP_SPEED = 50.0  # [m/s]
-REST = 0.1  # [m/s]; below it constant resistance and brake fade, so that they cannot push a train that stands
+_REST = 0.1  # [m/s]; below it constant resistance and brake fade, so that they cannot push a train that stands
 
 
 def freight_train() -> ObserverModel:
@@ -43,6 +43,6 @@ def freight_train() -> ObserverModel:
 def _remainder(x: Array, u: Array) -> Array:
     """Resistance, and what a brake near rest is less than the effort that B lets act in full."""
     _, speed = x
-    forward = np.clip(speed / REST, -1.0, 1.0)
-    resistance = DAVIS_A * forward + DAVIS_B * speed + DAVIS_C * speed * np.abs(speed)
+    forward = np.clip(speed / _REST, -1.0, 1.0)
+    resistance = _DAVIS_A * forward + DAVIS_B * speed + DAVIS_C * speed * np.abs(speed)
     return vector(0.0, -(resistance + (1.0 - forward) * np.minimum(u[0], 0.0)) / MASS)

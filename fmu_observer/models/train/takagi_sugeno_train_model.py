@@ -12,11 +12,11 @@ from fmu_observer.models.train.freight_train_model import DAVIS_B, DAVIS_C, MASS
 from plant_models.hybrid import input_signal
 from plant_models.hybrid.system import Array
 
-SLOWEST = 5.0  # [m/s] of the first vertex, printed
+_SLOWEST = 5.0  # [m/s] of the first vertex, printed
 
 
 def takagi_sugeno_train(
-    mass: float = MASS, b: float = DAVIS_B, c: float = DAVIS_C, slowest: float = SLOWEST, fastest: float = TOP_SPEED
+    mass: float = MASS, b: float = DAVIS_B, c: float = DAVIS_C, slowest: float = _SLOWEST, fastest: float = TOP_SPEED
 ) -> TakagiSugenoModel:
     """``dp = v``, ``M dv = F - b v - c v^2`` with the speed as premise: Bouchama 2024, (3.44)-(3.46).
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
-DIFFERENCE = 1e-4  # half of the distance of central differences, as a share of the range
+_DIFFERENCE = 1e-4  # half of the distance of central differences, as a share of the range
 
 
 class _WantedError(Exception):
@@ -65,7 +65,7 @@ class LikelihoodGradient(Optimiser):
             return np.empty((0, self.dimension))
         units = np.stack(self._wanted)
         if not self._gradients:
-            moves = DIFFERENCE * np.eye(self.dimension)
+            moves = _DIFFERENCE * np.eye(self.dimension)
             around = np.concatenate([np.zeros((1, self.dimension)), moves, -moves])
             units = np.clip(units[:, np.newaxis] + around, 0.0, 1.0).reshape(-1, self.dimension)
         return np.asarray(self.lower + units * (self.upper - self.lower))

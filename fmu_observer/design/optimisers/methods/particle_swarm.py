@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
-START_SPEED = 0.2  # of the range of each parameter, at most [ours]
+_START_SPEED = 0.2  # of the range of each parameter, at most [ours]
 
 
 class ParticleSwarm(Optimiser):
@@ -40,7 +40,7 @@ class ParticleSwarm(Optimiser):
         super().__init__(lower, upper, seed=seed)
         self.inertia, self.own, self.common = inertia, own, common
         self._positions = self.uniform(population)
-        reach = START_SPEED * (self.upper - self.lower)
+        reach = _START_SPEED * (self.upper - self.lower)
         self._velocities = self.random.uniform(-reach, reach, self._positions.shape)
         self._own_best = self._positions
         self._own_costs: Array | None = None
