@@ -44,15 +44,6 @@ class RecoveryBounds:
     contraction: float
 
 
-def held_speed_error(held: np.ndarray | float, p: Any, onset_error: float) -> np.ndarray:
-    """Bound of the speed error while the model runs alone [m/s]: ``e_0 + delta T``.
-
-    Args:
-        held: how long, T [s]. p: parameters of the rules. onset_error: bound e_0 at the onset [m/s].
-    """
-    return np.asarray(onset_error + p.disturbance_bound * np.asarray(held))
-
-
 def held_position_error(held: np.ndarray | float, p: Any, onset_error: float) -> np.ndarray:
     """Bound of what the position error grows while the model runs alone [m]: ``e_0 T + delta T^2 / 2``.
 

@@ -5,14 +5,11 @@ The period may be a traced value: it is a parameter of the observers and may dif
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel
-from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.hybrid.integration import rk4_step
-from plant_models.hybrid.system import Array, vector
+from plant_models.hybrid.system import Array
 
 _TAYLOR_DEGREE = 10
 _SQUARINGS = 6  # the remainder of the series is below 1e-14 while the norm of A times the period is below 16
@@ -57,15 +54,3 @@ def transition(model: ObserverModel, x: Array, u: Array, period: Array) -> Array
     for _ in range(_SUBSTEPS):
         x = rk4_step(lambda _t, at: model.flow(at, u), 0.0, period / _SUBSTEPS, x)
     return x
-
-
-def transition_jacobian(model: ObserverModel) -> Callable[[Array, Array, Array], Array]:
-    """Exact Jacobian of `transition` by x: a function of (x, u, period) that returns shape (n, n); also on traced
-    symbols.
-
-    Args:
-        model: the plant as the observer knows it.
-    """
-    m = len(model.inputs)
-    jacobian = exact_jacobian(lambda x, known: transition(model, x, known[:m], known[m]), model.order, m + 1)
-    return lambda x, u, period: jacobian(x, vector(*(u[i] for i in range(m)), period))

@@ -7,13 +7,13 @@ from math import pi
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from fmu_observer.certificates.printed_bounds.network_bounds import (
     NetworkBounds,
-    cycle_radius,
     exact_predictor_delay,
     largest_gain,
 )
@@ -263,6 +263,18 @@ def test_a_gain_over_all_frequencies() -> None:
     d = 0.1
     A, B = np.array([[0.0, 1.0], [-1.0, -2.0 * d]]), np.array([[0.0], [1.0]])
     assert largest_gain(A, B) >= 1.0 / (2.0 * d * np.sqrt(1.0 - d * d))
+
+
+def cycle_radius(generator: np.ndarray, C: np.ndarray, order: tuple[tuple[int, ...], ...], interval: float) -> float:
+    """Spectral radius over a period of a protocol: of the error of the estimate, and of the outputs kept since."""
+    q, n = C.shape
+    flow, whole = scipy.linalg.expm(generator * interval), np.eye(n + q)
+    for received in order:
+        reset = np.eye(n + q)
+        for i in received:
+            reset[n + i] = 0.0  # an output just received has no error
+        whole = reset @ flow @ whole
+    return float(np.abs(np.linalg.eigvals(whole)).max())
 
 
 def test_the_exact_interval_is_where_a_run_begins_to_grow() -> None:

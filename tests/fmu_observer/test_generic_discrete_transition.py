@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
 from fmu_observer.design.noise_covariance import process_covariance
-from fmu_observer.models.discrete_model import transition, transition_jacobian, zero_order_hold
+from fmu_observer.models.discrete_model import transition, zero_order_hold
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.train.freight_train_model import freight_train
@@ -48,25 +48,6 @@ def test_the_nonlinear_transition_is_the_flow(make: object, seed: int) -> None:
     exact = solve_ivp(lambda _t, at: model.flow(at, u), (0.0, 0.1), x, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     # Four Runge-Kutta steps of 25 ms: (0.025)^5 / 120 a step and a unit of the fifth derivative.
     np.testing.assert_allclose(transition(model, x, u, 0.1), exact, atol=1e-8)
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10_000), st.floats(0.01, 0.5))
-def test_its_jacobian_is_exact(seed: int, period: float) -> None:
-    model, generator = pendulum(), np.random.default_rng(seed)
-    jacobian = JACOBIAN
-    x, u = generator.normal(0.0, 2.0, 2), generator.normal(size=1)
-    sides = [[transition(model, x + s * 1e-5 * e, u, period) for s in (1.0, -1.0)] for e in np.eye(2)]
-    differences = np.stack([(a - b) / 2e-5 for a, b in sides], axis=1)
-    np.testing.assert_allclose(jacobian(x, u, period), differences, atol=1e-9)  # central differences: 1e-10
-
-
-JACOBIAN = transition_jacobian(pendulum())
-
-
-def test_the_jacobian_of_a_linear_model_is_the_exponential() -> None:
-    found = transition_jacobian(linear_pendulum())(np.ones(2), np.ones(1), 0.4)
-    np.testing.assert_allclose(found, expm(linear_pendulum().A * 0.4), rtol=1e-13)
 
 
 def test_van_loan_against_the_integral() -> None:

@@ -144,23 +144,3 @@ def exact_predictor_delay(A: np.ndarray, predictors: int = 1) -> float:
         elif value.real > 0.0:
             shares.append(1.0 / float(value.real))
     return max(predictors, 1) * min(shares)
-
-
-def cycle_radius(generator: np.ndarray, C: np.ndarray, order: Sequence[Sequence[int]], interval: float) -> float:
-    """Spectral radius of an observer's error over one period of a protocol.
-
-    The error is that of the estimate, and behind it of the outputs kept since each was received. [ours]
-
-    Args:
-        generator: of both, shape (n + q, n + q). C: shape (q, n).
-        order: measurements received at each transmission of the period, from 0. interval: between transmissions [s].
-    """
-    q, n = C.shape
-    flow = scipy.linalg.expm(generator * interval)
-    whole = np.eye(n + q)
-    for received in order:
-        reset = np.eye(n + q)
-        for i in received:
-            reset[n + i] = 0.0  # an output just received has no error
-        whole = reset @ flow @ whole
-    return float(np.abs(np.linalg.eigvals(whole)).max())

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.filtering.kalman import Corrected, solved, symmetric
-from fmu_observer.formulas.filtering.square_root import corrected_by, factor, triangular
+from fmu_observer.formulas.filtering.square_root import corrected_by, triangular
 from plant_models.hybrid.system import Array
 
 Function = Callable[[Array], Array]  # (state of shape (n,)) -> shape (m,)
@@ -147,18 +147,6 @@ def _root_columns(found: Scattered, w: Weights) -> Array:
     """
     bend = np.sqrt(np.maximum(w.bend, 0.0)) * shift(found, w)
     return np.hstack([np.sqrt(w.each) * found.deviations, bend.reshape(bend.shape[0], 1)])
-
-
-def unscented_transform(x: Array, P: Array, function: Function, w: Weights) -> tuple[Array, Array]:
-    """Mean and covariance of a function of Gaussian numbers: Allaoui 2024, (2.32)-(2.36).
-
-    Args:
-        x: mean, shape (n,). P: covariance, shape (n, n). function: of one point, plain NumPy. w: weights for n.
-
-    Returns:
-        Mean of shape (m,) and covariance of shape (m, m).
-    """
-    return moments(scattered(function, sigma_points(x, factor(P), w.spread)), w)
 
 
 def correct(x: Array, P: Array, states: Scattered, seen: Scattered, y: Array, RN: Array, w: Weights) -> Corrected:
