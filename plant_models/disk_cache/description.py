@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import FunctionType, MappingProxyType, MethodType, ModuleType
 from typing import Any
@@ -66,7 +66,7 @@ class Description:
             return f"{type(value).__name__} {value!r}"
         if depth > MAX_DEPTH:
             raise NoIdentityError(f"{type(value).__qualname__} is nested too deep.")
-        for kinds, describe in self._special:
+        for kinds, describe in self._special if type(value) not in CONTAINERS else ():
             if isinstance(value, kinds):
                 return describe(value, depth + 1)
         return f"{self._kind(value)} {{{self._content(value, depth + 1)}}}"
@@ -92,16 +92,29 @@ class Description:
             return value.name
         if type(value).__module__ == "casadi.casadi" and hasattr(value, "serialize"):
             return str(value.serialize())
-        parts: Iterable[str] = ()
-        if isinstance(value, Mapping):
-            parts = [f"{self.text(k, depth)}: {self.text(v, depth)}" for k, v in value.items()]
+        parts: list[str] = []
+        if isinstance(value, list | tuple):
+            parts = self._texts(value, depth)
+        elif isinstance(value, Mapping):
+            keys, values = self._texts(value, depth), self._texts(value.values(), depth)
+            parts = [f"{key}: {one}" for key, one in zip(keys, values, strict=True)]
         elif isinstance(value, Set):
-            parts = sorted(self.text(v, depth) for v in value)
-        elif isinstance(value, list | tuple):
-            parts = [self.text(v, depth) for v in value]
+            parts = sorted(self._texts(value, depth))
         elif not hasattr(value, "__dict__") and not is_dataclass(value):
             raise NoIdentityError(f"{type(value).__qualname__} cannot be described.")
-        return ", ".join([*parts, *(f"{n} = {self.text(v, depth)}" for n, v in _attributes(value).items())])
+        names, values = _attributes(value)
+        if names:
+            parts += [f"{name} = {one}" for name, one in zip(names, self._texts(values, depth), strict=True)]
+        return ", ".join(parts)
+
+    def _texts(self, values: Iterable[Any], depth: int) -> list[str]:
+        """`text` of several; most are plain, so those are described without a call."""
+        texts = []
+        for value in values:
+            kind = type(value)
+            plain = kind in PLAIN or value is None
+            texts.append(f"{kind.__name__} {value!r}" if plain else self.text(value, depth))
+        return texts
 
     def _function(self, function: FunctionType, depth: int) -> str:
         """A function by its place in the files of this project, with what it holds of the call that made it."""
@@ -145,9 +158,20 @@ def _is_numerical(module: str) -> bool:
     return module.partition(".")[0] in NUMERICAL_PACKAGES
 
 
-def _attributes(value: Any) -> dict[str, Any]:
-    """The attributes of an object, without those that follow from the others."""
-    if hasattr(value, "__dict__"):
-        kind = type(value)
-        return {n: v for n, v in vars(value).items() if not isinstance(getattr(kind, n, None), cached_property)}
-    return {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {}
+def _attributes(value: Any) -> tuple[tuple[str, ...], Iterable[Any]]:
+    """Names and values of the attributes of an object, without those that follow from the others."""
+    held = getattr(value, "__dict__", None)
+    names = _attribute_names(type(value), None if held is None else tuple(held))
+    return names, map(partial(getattr, value) if held is None else held.__getitem__, names)
+
+
+@lru_cache(1024)
+def _attribute_names(kind: type, held: tuple[str, ...] | None) -> tuple[str, ...]:
+    """Names of the attributes of an object that follow from no others.
+
+    Args:
+        kind: its class. held: the names in its dictionary; None where it has none, as a data class with slots.
+    """
+    if held is not None:
+        return tuple(name for name in held if not isinstance(getattr(kind, name, None), cached_property))
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()

@@ -72,20 +72,20 @@ def folder_digest(name: str) -> str:
     if spec is None or not spec.submodule_search_locations:
         raise NoIdentityError(f"The files of {name} are not on disk.")
     root = Path(next(iter(spec.submodule_search_locations)), rest)
-    digest = hashlib.sha256()
+    digest, length = hashlib.sha256(), len(str(root))
     for path in [str(root)] if root.is_file() else _files(str(root)):
         with FileIO(path) as file:
             if os.fstat(file.fileno()).st_mtime > LOADED_AT:
                 raise NoIdentityError(f"{path} was changed after it was loaded.")
             content = file.read()
-        digest.update(f"{path[len(str(root)) :]} {len(content)}\0".encode() + content)
+        digest.update(f"{path[length:]} {len(content)}\0".encode() + content)
     return f"{name} {digest.hexdigest()}"
 
 
 def _files(folder: str) -> list[str]:
     """All files in a folder and those in it, without byte code, in an order of their own."""
     walk = os.walk(folder)
-    return sorted(f"{at}{os.sep}{name}" for at, _, names in walk if "__pycache__" not in at for name in names)
+    return sorted([f"{at}{os.sep}{name}" for at, _, names in walk if "__pycache__" not in at for name in names])
 
 
 @cache

@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import logging
 import os
+import sys
 import time
-from collections import namedtuple
+from collections import Counter, namedtuple
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -144,6 +146,30 @@ def test_what_is_not_equal_has_another_identity() -> None:
     assert len(set(texts)) == len(values)
     options = [{}, {"spacing": "learnt"}] if "spacing" in OBSERVERS["adaptive_gain_cdo"].option_choices else [{}]
     assert len({identity.identity(OBSERVERS["adaptive_gain_cdo"](**o)) for o in options}) == len(options)
+
+
+def test_an_attribute_more_or_of_another_value_counts() -> None:
+    system: Any = PLANTS["driver"]()
+    texts = {Description().text(system)}
+    for value in (1, 2, 2.0):
+        system.of_this_test = value
+        texts.add(Description().text(system))
+    assert len(texts) == 4
+
+
+def test_describing_a_system_takes_few_calls() -> None:
+    system, calls = PLANTS["locomotive"](), Counter[str]()
+    Description().text(system)  # names of attributes are found once for each class
+
+    def count(_frame: FrameType, event: str, _: Any) -> None:
+        calls[event] += 1
+
+    sys.setprofile(count)
+    try:
+        Description().text(system)
+    finally:
+        sys.setprofile(None)
+    assert calls["call"] < 700  # 425 were counted; with a call for each plain value 1760
 
 
 def test_a_file_counts_by_its_content(tmp_path: Path) -> None:
