@@ -73,16 +73,16 @@ class TrackLayout:
         ``[after, before)``.
         """
         if after >= before:
-            first, last = np.searchsorted(self.positions, [before, after], side="right")
+            first, last = self.positions.searchsorted([before, after], side="right")
             return list(self.balises[first:last])
-        first, last = np.searchsorted(self.positions, [after, before], side="left")
+        first, last = self.positions.searchsorted([after, before], side="left")
         return list(reversed(self.balises[first:last]))
 
     def gaps(self, position: float) -> tuple[float, float]:
         """Distances [m] to the nearest balise behind and ahead of a position [m], infinite where there is none; one
         exactly there is passed already and counts for neither."""
-        behind = int(np.searchsorted(self.positions, position, side="left")) - 1
-        ahead = int(np.searchsorted(self.positions, position, side="right"))
+        behind = int(self.positions.searchsorted(position, side="left")) - 1
+        ahead = int(self.positions.searchsorted(position, side="right"))
         return (
             position - float(self.positions[behind]) if behind >= 0 else inf,
             float(self.positions[ahead]) - position if ahead < len(self.positions) else inf,

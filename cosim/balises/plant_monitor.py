@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from cosim.balises.plant_error import PlantError
-from cosim.components.component import Component
 from cosim.coupling.planned import PlannedComponent
 
 
 class PlantMonitor:
-    """Steps the plant and reads its position and speed.
+    """Steps the plant, `component`, and reads its position and speed. `outputs` are all its outputs, a view, shape
+    (q,); `save`, `restore` and `release` are those of the plant.
 
     Args:
         planned: the plant in the plan.
@@ -28,7 +26,8 @@ class PlantMonitor:
         position_scale: float = 1.0,
         speed_scale: float = 1.0,
     ) -> None:
-        self._planned = planned
+        self._planned, self.component, self.outputs = planned, planned.component, planned.outputs
+        self.save, self.restore, self.release = self.component.save, self.component.restore, self.component.release
         self._position, self._speed = position, speed
         self._scales = position_scale, speed_scale
         self.redo_differences = 0
@@ -56,24 +55,14 @@ class PlantMonitor:
         return self._scales[0]
 
     @property
-    def component(self) -> Component:
-        """The plant."""
-        return self._planned.component
-
-    @property
-    def outputs(self) -> np.ndarray:
-        """All outputs of the plant, a view, shape (q,)."""
-        return self._planned.outputs
-
-    @property
     def position(self) -> float:
         """Position [m]."""
-        return float(self._planned.outputs[self._position]) * self._scales[0]
+        return float(self.outputs[self._position]) * self._scales[0]
 
     @property
     def speed(self) -> float:
         """Speed [m/s]."""
-        return float(self._planned.outputs[self._speed]) * self._scales[1]
+        return float(self.outputs[self._speed]) * self._scales[1]
 
     def between(self, start: np.ndarray, share: float, position: float) -> np.ndarray:
         """The plant's outputs at a share of a step that began with outputs `start`, where its position was `position`
@@ -81,7 +70,7 @@ class PlantMonitor:
 
         Continuous outputs lie on a line between the ends, discrete ones are held, the position is the given one.
         """
-        end = self._planned.outputs
+        end = self.outputs
         outputs = np.where(self._planned.continuous, start + share * (end - start), start)
         outputs[self._position] = position / self._scales[0]
         return outputs
@@ -101,15 +90,3 @@ class PlantMonitor:
     def read(self) -> None:
         """Read the outputs."""
         self._planned.read()
-
-    def save(self) -> Any:
-        """Save the plant's state."""
-        return self.component.save()
-
-    def restore(self, state: Any) -> None:
-        """Restore the plant's state."""
-        self.component.restore(state)
-
-    def release(self, state: Any) -> None:
-        """Free a saved state."""
-        self.component.release(state)

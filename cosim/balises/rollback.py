@@ -139,7 +139,7 @@ class _Trial:
 
         Safeguarded Newton iteration on the plant's own steps, started from the Hermite crossing.
         """
-        low, high = segment.start, segment.end
+        low, high, rising = segment.start, segment.end, segment.rising
         guess = min(max(self._guess(target, segment), low), high)
         for _ in range(MAX_ROOT_STEPS):
             self.go(self.t + guess)
@@ -147,7 +147,7 @@ class _Trial:
             # too short a step to take: `go` stayed at the start, and so does the linear rest
             if guess <= TIME_TOLERANCE:
                 return min(max(-miss / speed, 0.0), high) if speed else guess
-            if (miss < 0.0) == segment.rising:
+            if (miss < 0.0) == rising:
                 low = max(low, guess)
             else:
                 high = min(high, guess)

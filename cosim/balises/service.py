@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -268,7 +269,7 @@ class BaliseService:
                 delivery.logged_in(outcomes, name)
             for time in times:
                 rows += self._pair(time, t, until, deliveries, at_stamp.get(telegram.delivered_at))
-        return sorted(rows, key=lambda row: row[0])
+        return sorted(rows, key=itemgetter(0))
 
     def _pair(
         self, time: float, t: float, until: float, deliveries: dict[str, Delivery], plant_there: np.ndarray | None

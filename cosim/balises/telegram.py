@@ -6,6 +6,7 @@ missed, some telegrams are false. All chance comes from (seed, number of the cro
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, nan
@@ -19,6 +20,7 @@ from cosim.results.result import BaliseRecord
 from plant_models.hybrid.noise import Purpose, standard_normal, uniform_pair
 
 T = TypeVar("T", bound=Sent)
+_delivery, _instant = attrgetter("delivered_at", "stamp"), attrgetter("delivered_at")
 NO_OUTCOMES: Mapping[str, str] = MappingProxyType({})
 
 
@@ -118,11 +120,11 @@ class Mailbox(Generic[T]):
             self.log.append(telegram)
             return
         self.waiting.append(telegram)
-        self.waiting.sort(key=lambda e: (e.delivered_at, e.stamp))
+        self.waiting.sort(key=_delivery)
 
     def due(self, until: float) -> list[T]:
         """Take out what is delivered at or before `until` [s]."""
-        count = sum(1 for e in self.waiting if e.delivered_at <= until)
+        count = bisect_right(self.waiting, until, key=_instant)
         taken, self.waiting = self.waiting[:count], self.waiting[count:]
         return taken
 

@@ -82,7 +82,7 @@ class Component(DescribedComponent, Slave):
         self.log: LogSwitch | None = None
         self.call_statistics = new_call_statistics()
         self.trespasses: dict[str, str] = {}
-        self._numbers = LAST_CALL.numbers(name)
+        self._numbers, self._call_numbers = LAST_CALL.numbers(name), dict[str, int]()
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
         self._readers: dict[tuple[str, ...], Callable[[], Mapping[str, int] | None]] = {}
 
@@ -199,8 +199,9 @@ class Component(DescribedComponent, Slave):
 
         Of an FMU that cannot say any more those that were read last.
         """
-        if getattr(self.slave, "counters", None) is not None:
-            return dict(vars(self.slave.counters))
+        counters = getattr(self.slave, "counters", None)
+        if counters is not None:
+            return dict(vars(counters))
         return self._read_counts(OUTCOME_VARIABLES)
 
     def missed_samples(self) -> Mapping[str, int]:
@@ -297,17 +298,23 @@ class Component(DescribedComponent, Slave):
             call, lambda error: self.explained(what, error), LAST_CALL.call, self._numbers + number
         )
 
-    def guard(self, what: str, call: Callable[[], Any]) -> Any:  # noqa: D102 - see Instance
-        before = None if self._running else Surroundings()  # in a run its steps are looked at
-        LAST_CALL.begin(self.name, what, self.time)
+    def guard(self, what: str, call: Callable[..., Any], *arguments: Any) -> Any:  # noqa: D102 - see Instance
+        before = None if self._running else Surroundings()  # those of its steps are compared elsewhere
+        number = self._call_numbers.get(what) or self._number_of(what)
+        LAST_CALL.call[0], LAST_CALL.time[0] = number, self.time
         try:
-            return call()
+            return call(*arguments)
         except Exception as error:
             raise self.explained(what, error) from error
         finally:
             LAST_CALL.call[0] = 0
             for changed in () if before is None else before.put_back():
                 self.trespasses[changed] = what
+
+    def _number_of(self, what: str) -> int:
+        """The number of a call among all; what stands behind ``=``, a value, is no part of it."""
+        number = self._call_numbers[what] = LAST_CALL.number(self.name, what.partition(" = ")[0])
+        return number
 
     def _quietly(self, what: str, call: Callable[[], Any]) -> None:
         """A component that fails while it is put away changes nothing any more."""

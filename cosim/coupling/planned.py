@@ -160,11 +160,15 @@ class PlannedComponent:
             begin = end
 
     def _go(self, t: float, until: float) -> None:
-        self.send(t, until)
+        if self.interpolator is None:
+            self.inputs.send()
+            self.component.advance(t, until)
+            return
+        self.interpolator.send(t, until)
         self.component.advance(t, until)
-        if self.interpolator is not None and not self.component.terminated:
+        if not self.component.terminated:
             self.interpolator.arrive(until)
 
     def _drive(self, t: float, until: float) -> None:
-        self._advance(t, until)
+        (self._go if self.substeps == 1 else self._advance)(t, until)
         self.read()

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from math import isfinite
+from operator import attrgetter
 
 import numpy as np
 
 from fmu_observer.block.block_journal import Journal, Mark, Record, Stamped
-from fmu_observer.block.policy import Counters, advance, communicate, jump, replay
+from fmu_observer.block.policy import Counters, advance, jump, replay
 from fmu_observer.description import STAMP_NOW, exposed_inputs
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol, LatePolicy
 from plant_models.hybrid import HybridSystem, Runtime, width
@@ -56,6 +56,7 @@ class Events:
         self.protocol = list(self._start)
         self.stamps = [STAMP_NOW] * len(self._names)
         self.listener: Callable[[str], None] | None = None
+        self.counters = Counters()
         self.reset()
 
     @property
@@ -71,7 +72,7 @@ class Events:
         self.counts, self.seen = [0] * count, [0] * count
         self.active: set[int] = set()
         self.queue: list[Stamped] = []
-        self.counters = Counters()
+        vars(self.counters).update(vars(Counters()))
         self.restore_past(())
 
     def warn(self, text: str, *values: object) -> None:
@@ -94,7 +95,7 @@ class Events:
         """Where the events stand, for `undo`."""
         waiting = None
         if self.queue or self.counts != self.seen:
-            waiting = (list(self.queue), list(self.stamps), list(self.seen), replace(self.counters))
+            waiting = (list(self.queue), list(self.stamps), list(self.seen), self.counters.copy())
         return (None if self.journal is None else self.journal.mark(), waiting)
 
     def undo(self, mark: EventsMark) -> None:
@@ -103,17 +104,8 @@ class Events:
         if self.journal is not None and past is not None:
             self.journal.undo(past)
         if waiting is not None:
-            self.queue, self.stamps[:], self.seen, self.counters = waiting
-
-    def advance(self, end: float) -> None:
-        """Move the runtime to `end` [s] through the waiting events whose stamps lie before it or at it."""
-        if self.queue:
-            self._take_until(end)
-        advance(self._runtime, self.journal, end)
-
-    def end_step(self) -> None:
-        """A communication step ends now."""
-        communicate(self._runtime, self.journal)
+            self.queue, self.stamps[:], self.seen, counters = waiting
+            vars(self.counters).update(vars(counters))
 
     def tick(self) -> bool:
         """The events of the active clocks happen, in declared order, their payload in the inputs, their stamp in
@@ -123,7 +115,7 @@ class Events:
         self.active.clear()
         for number in ticked:
             self._announce(number)
-        self._take_until(self._runtime.t)
+        self.take_until(self._runtime.t)
         return bool(ticked)
 
     def poll_counts(self) -> None:
@@ -153,10 +145,11 @@ class Events:
             self.warn("event %s at %r s: %d events are waiting already; this one is lost", name, stamp, QUEUE_CAPACITY)
             return
         positions = self.payloads[name]
-        self.queue.append(Stamped(name, stamp, positions, tuple(float(self._runtime.u[i]) for i in positions)))
-        self.queue.sort(key=lambda e: e.stamp)  # of equal stamps the one announced first stays first
+        self.queue.append(Stamped(name, stamp, positions, tuple(map(self._runtime.u.item, positions))))
+        self.queue.sort(key=attrgetter("stamp"))  # of equal stamps the one announced first stays first
 
-    def _take_until(self, end: float) -> None:
+    def take_until(self, end: float) -> None:
+        """Move the runtime to the waiting events whose stamps lie before `end` [s] or at it, and through them."""
         while self.queue and self.queue[0].stamp <= end + TIME_TOLERANCE:
             self._take(self.queue.pop(0))
 

@@ -7,16 +7,18 @@ What it refuses it refuses with a reason; the interface adds the name, the call 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from math import inf, isfinite
+from typing import NoReturn
 
 import numpy as np
 
 from fmu_observer.block.block_events import TIME_TOLERANCE, Events
 from fmu_observer.block.block_state import BlockState, Shape, check_owner
 from fmu_observer.block.block_variables import (
+    ALIVE,
     BEFORE_TIME,
     COMPUTED,
+    OUTPUTS,
     BlockError,
     BlockVariables,
     Mode,
@@ -24,6 +26,7 @@ from fmu_observer.block.block_variables import (
     Role,
     StepDiscarded,
 )
+from fmu_observer.block.policy import communicate
 from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
@@ -75,7 +78,7 @@ class BlockInstance:
         self.mode: Mode = "instantiated"
         self.discarded = False  # whether the last step was
         self._plain_step = 0.0
-        self.variables.touch()
+        self.variables.outdate()
 
     # -- variables --------------------------------------------------------------------------------------------------
 
@@ -88,8 +91,9 @@ class BlockInstance:
         Raises:
             BlockError: a value reference is unknown or of another type, or the block has been freed.
         """
-        self.require_alive()
-        places = [self.variables.readable(reference) for reference in references]
+        if self.mode == "freed":
+            self.require(*ALIVE)
+        places = self.variables.all_readable(references)
         self._refresh(places)
         return [self.runtime.t if p.role == "time" else float(p.values[p.index]) for p in places]
 
@@ -104,10 +108,10 @@ class BlockInstance:
         """
         if len(references) != len(values):
             raise BlockError(f"{len(references)} value references but {len(values)} values; all variables are scalars.")
-        places = [self.variables.settable(reference, self.mode) for reference in references]
-        for place, value in zip(places, [float(value) for value in values], strict=True):
+        places = self.variables.all_settable(references, self.mode)
+        for place, value in zip(places, list(map(float, values)), strict=True):
             place.values[place.index] = value
-        self.variables.touch()
+        self.variables.outdate()
 
     def get_whole(self, references: Sequence[int], roles: Sequence[Role]) -> list[int]:
         """Values of whole numbers that have one of these roles.
@@ -118,7 +122,7 @@ class BlockInstance:
         Raises:
             BlockError: a value reference is unknown or of another type, or a value is no whole number of 32 bits.
         """
-        self.require_alive()
+        self.require(*ALIVE)
         places = [self.variables.whole(reference, roles) for reference in references]
         self._refresh(places)
         return [self._whole_value(place) for place in places]
@@ -148,23 +152,28 @@ class BlockInstance:
 
     def output_reader(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
         """A call that reads these outputs into `values`, shape (len(references),)."""
-        y, refresh = self.runtime.y, self._refresh_outputs
+        runtime, y, stale = self.runtime, self.runtime.y, self.variables.stale
         index = np.array([self.variables.place(reference).index for reference in references], dtype=np.intp)
 
         def read() -> None:
-            refresh()
+            if "output" in stale:
+                try:
+                    runtime.compute_outputs(runtime.t)
+                except Exception as error:
+                    raise _model_failure(error) from error
+                stale.difference_update(OUTPUTS)
             y.take(index, out=values, mode="clip")
 
         return read
 
     def input_writer(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
         """A call that sets these inputs proper from `values`, shape (len(references),)."""
-        u, touch = self.runtime.u, self.variables.touch
+        u, outdate = self.runtime.u, self.variables.outdate
         index = np.array([self.variables.place(reference).index for reference in references], dtype=np.intp)
 
         def write() -> None:
             u[index] = values
-            touch()
+            outdate()
 
         return write
 
@@ -179,7 +188,7 @@ class BlockInstance:
         if not isfinite(start_time):
             raise BlockError(f"the start time {start_time!r} s is not a finite number.")
         self.runtime.t = self.runtime.t0 = float(start_time)
-        self.variables.touch()
+        self.variables.outdate()
 
     def start(self) -> None:
         """Leave initialisation: time begins to run.
@@ -187,7 +196,7 @@ class BlockInstance:
         Raises:
             BlockError: time cannot run with a parameter.
         """
-        self.variables.touch()
+        self.variables.outdate()
         horizon = self.events.protocol[1]
         if not (isfinite(horizon) and horizon >= 0.0):
             raise BlockError(
@@ -219,29 +228,32 @@ class BlockInstance:
             it is to be
                 seen; the block stands where it stood before.
         """
-        if self.mode != "step":
-            self.require("step")
-        if not 0.0 < h < inf:
-            raise BlockError(f"communicationStepSize = {h!r} s is not a positive number.")
-        if not abs(t - self.runtime.t) <= TIME_TOLERANCE + STEP_TOLERANCE * h:
-            raise BlockError(f"currentCommunicationPoint = {t!r} s, but the block stands at {self.runtime.t!r} s.")
-        runtime = self.runtime
+        runtime, events = self.runtime, self.events
+        if not (self.mode == "step" and 0.0 < h < inf and abs(t - runtime.t) <= TIME_TOLERANCE + STEP_TOLERANCE * h):
+            raise self._no_step(t, h)
         due = runtime.next_instant_before(t + h) if early_return else None
+        end = t + h if due is None else due
         if h > self._plain_step:
-            self._check_size(h, t + h if due is None else due)
-        before, mark = (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)), self.events.mark()
-        self.variables.touch()
+            self._check_size(h, end)
+        before, mark = (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)), events.mark()
+        self.variables.outdate()
         try:
-            self._move(t + h if due is None else due)
+            if events.counts != events.seen:
+                events.poll_counts()
+            if events.queue:
+                events.take_until(end)
+            if events.journal is not None and end > runtime.t:
+                events.journal.append(runtime, end)
+            runtime.advance(end)
+            if runtime.system.communication_events:
+                communicate(runtime, events.journal)
+            # the first is quick, the second right for huge states too
+            if not isfinite(sum(runtime.x.tolist())) and not np.isfinite(runtime.x).all():
+                raise self._not_finite()
         except Exception as error:
             runtime.restore(Snapshot(*before))
-            self.events.undo(mark)
-            self.discarded = True
-            reason = error if isinstance(error, BlockError) else _model_failure(error)
-            why = str(reason).rstrip(".")
-            raise StepDiscarded(f"{why}. The step is undone.") from reason.__cause__ or (
-                None if reason is error else error
-            )
+            events.undo(mark)
+            self._discard(error)
         self.discarded = False
         return due is not None
 
@@ -251,7 +263,7 @@ class BlockInstance:
         Raises:
             BlockError: the model fails.
         """
-        self.variables.touch()
+        self.variables.outdate()
         try:
             return self.events.tick()
         except Exception as error:
@@ -273,7 +285,7 @@ class BlockInstance:
             stamps=tuple(events.stamps),
             counts=tuple(events.counts),
             seen=tuple(events.seen),
-            counters=replace(events.counters),
+            counters=events.counters.copy(),
         )
 
     def check(self, state: BlockState) -> BlockState:
@@ -298,17 +310,19 @@ class BlockInstance:
         """
         if not isinstance(state, BlockState):
             raise BlockError(f"{type(state).__name__} is not a saved state of a block; deserialise bytes first.")
-        check_owner(state.token, self.shape.token)
+        if state.token != self.shape.token:
+            check_owner(state.token, self.shape.token)
         self.mode = state.mode
         self.runtime.restore(state.runtime)
         events = self.events
         events.active, events.queue, events.stamps[:] = set(state.active), list(state.queue), state.stamps
-        events.counts, events.seen, events.counters = list(state.counts), list(state.seen), replace(state.counters)
+        events.counts, events.seen = list(state.counts), list(state.seen)
+        vars(events.counters).update(vars(state.counters))
         events.protocol[:] = state.protocol
         events.restore_past(state.records)
         self.discarded = False
         self._plain_step = self._timing.plain_step(self.runtime.p)
-        self.variables.touch()
+        self.variables.outdate()
 
     # -- life -------------------------------------------------------------------------------------------------------
 
@@ -319,17 +333,10 @@ class BlockInstance:
             BlockError: the block is in none of these modes.
         """
         if self.mode not in modes:
+            if modes == ALIVE:
+                raise BlockError("the block has been freed; begin anew with instantiate().")
             hint = "; begin anew with reset() or instantiate()" if "instantiated" in modes else ""
             raise BlockError(f"not allowed in mode '{self.mode}', expected {' or '.join(modes)}{hint}.")
-
-    def require_alive(self) -> None:
-        """Refuse a call after the end of life.
-
-        Raises:
-            BlockError: the block has been freed.
-        """
-        if self.mode == "freed":
-            raise BlockError("the block has been freed; begin anew with instantiate().")
 
     # -- internals --------------------------------------------------------------------------------------------------
 
@@ -343,25 +350,25 @@ class BlockInstance:
                 f"(internal_step = {step!r} s); make it smaller."
             )
 
-    def _move(self, end: float) -> None:
-        events = self.events
-        if events.counts != events.seen:
-            events.poll_counts()
-        events.advance(end)
-        events.end_step()
-        self._check_finite()
+    def _no_step(self, t: float, h: float) -> BlockError:
+        """Why no step from `t` by `h` [s] can be taken."""
+        self.require("step")
+        if not 0.0 < h < inf:
+            return BlockError(f"communicationStepSize = {h!r} s is not a positive number.")
+        return BlockError(f"currentCommunicationPoint = {t!r} s, but the block stands at {self.runtime.t!r} s.")
+
+    def _discard(self, error: Exception) -> NoReturn:
+        """A step failed and is undone."""
+        self.discarded = True
+        reason = error if isinstance(error, BlockError) else _model_failure(error)
+        why = str(reason).rstrip(".")
+        raise StepDiscarded(f"{why}. The step is undone.") from reason.__cause__ or (None if reason is error else error)
 
     def _refresh(self, places: Sequence[Place]) -> None:
         try:
             for place in places:
                 if place.role in COMPUTED:
                     self.variables.refresh(place.role)
-        except Exception as error:
-            raise _model_failure(error) from error
-
-    def _refresh_outputs(self) -> None:
-        try:
-            self.variables.refresh("output")
         except Exception as error:
             raise _model_failure(error) from error
 
@@ -374,14 +381,11 @@ class BlockInstance:
             raise BlockError(f"{place.name} = {value!r} is not a whole number of 32 bits.")
         return round(value)
 
-    def _check_finite(self) -> None:
-        x = self.runtime.x
-        # the first is quick, the second right for huge states too
-        if not isfinite(sum(x.tolist())) and not np.isfinite(x).all():
-            broken = scalar_names(self.system.states)[int(np.flatnonzero(~np.isfinite(x))[0])]
-            raise BlockError(
-                f"state {broken} is not a finite number; check inputs, payloads, parameters and internal_step."
-            )
+    def _not_finite(self) -> BlockError:
+        broken = scalar_names(self.system.states)[int(np.flatnonzero(~np.isfinite(self.runtime.x))[0])]
+        return BlockError(
+            f"state {broken} is not a finite number; check inputs, payloads, parameters and internal_step."
+        )
 
 
 def _model_failure(error: Exception) -> BlockError:

@@ -55,11 +55,6 @@ class Record(NamedTuple):
     ticks: tuple[int, ...]
     event: Stamped | None
 
-    @property
-    def moves(self) -> bool:
-        """Whether it is an advance."""
-        return self.until > self.t
-
 
 Mark = tuple[list[Record], int, int, int]
 """Where a journal stood: its records, how many, the first that counts, when to prune; see `Journal.mark`."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -38,8 +39,10 @@ Role = Literal[
     "indicator",
 ]
 
-COMPUTED: frozenset[Role] = frozenset({"output", "integer_output", "derivative", "indicator"})
+OUTPUTS: frozenset[Role] = frozenset({"output", "integer_output"})
+COMPUTED: frozenset[Role] = OUTPUTS | {"derivative", "indicator"}
 BEFORE_TIME: tuple[Mode, ...] = ("instantiated", "initialization")
+ALIVE: tuple[Mode, ...] = (*BEFORE_TIME, "event", "step", "terminated")
 
 
 NOT_REAL: dict[Role, str] = {
@@ -79,7 +82,8 @@ class Place:
 class BlockVariables:
     """The variables of one runtime by value reference.
 
-    `derivatives` and `indicators` hold what `refresh` has computed last.
+    `derivatives` and `indicators` hold what `refresh` has computed last; `outdate`, a call without arguments, says that
+    something has changed since. `stale` are the roles of what is not up to date.
 
     Args:
         system: the hybrid system. runtime: its runtime. events: its events.
@@ -104,25 +108,23 @@ class BlockVariables:
             self._places += [Place(name, "outcome", events, i) for i, name in enumerate(OUTCOME_VARIABLES)]
         self._places += _rate_places(system, self.derivatives, self.indicators)
         self._settable = _settable_modes(counts_events)
-        self._stale: set[Role] = set(COMPUTED)
-
-    def touch(self) -> None:
-        """Something has changed: what is computed when it is read is not up to date."""
-        self._stale |= COMPUTED
+        self._listed: dict[tuple[tuple[int, ...], Mode | None], list[Place]] = {}
+        self.stale: set[Role] = set(COMPUTED)
+        self.outdate: Callable[[], None] = partial(self.stale.update, COMPUTED)
 
     def refresh(self, role: Role) -> None:
         """Compute the variables of this role, where that is due."""
-        if role not in self._stale:
+        if role not in self.stale:
             return
-        if role in ("output", "integer_output"):
+        if role in OUTPUTS:
             self._runtime.update_outputs()
-            self._stale -= {"output", "integer_output"}
+            self.stale -= OUTPUTS
         elif role == "derivative":
             self.derivatives[:] = self._runtime.derivatives()
-            self._stale.discard(role)
+            self.stale.discard(role)
         else:
             self.indicators[:] = self._runtime.indicators()
-            self._stale.discard(role)
+            self.stale.discard(role)
 
     def place(self, reference: int) -> Place:
         """Where the variable with this value reference is kept.
@@ -167,6 +169,20 @@ class BlockVariables:
             BlockError: there is no such variable, or it cannot be set, or not now.
         """
         return self.check_settable(reference, self.readable(reference), mode)
+
+    def all_readable(self, references: Sequence[int]) -> list[Place]:
+        """The places of real variables, looked up once for each list of them; raises as `readable`."""
+        key = tuple(references), None
+        if key not in self._listed:
+            self._listed[key] = [self.readable(reference) for reference in references]
+        return self._listed[key]
+
+    def all_settable(self, references: Sequence[int], mode: Mode) -> list[Place]:
+        """The places of real variables that may all be set in this mode, looked up once; raises as `settable`."""
+        key = tuple(references), mode
+        if key not in self._listed:
+            self._listed[key] = [self.settable(reference, mode) for reference in references]
+        return self._listed[key]
 
     def check_settable(self, reference: int, place: Place, mode: Mode) -> Place:
         """The place of a variable, if it may be set in this mode.

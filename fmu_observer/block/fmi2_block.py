@@ -8,7 +8,7 @@ from typing import Any
 from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 
 from fmu_observer.block.block_variables import BlockError, Role
-from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
+from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, allowed_in, refused
 
 WHOLE: tuple[Role, ...] = ("count", "integer_output", "outcome", "policy")
 
@@ -43,7 +43,7 @@ class FMI2Block(FMIInterface, FMU2Slave):
 
         self.instance.events.listener = listener if logger else None
 
-    @refused
+    @allowed_in("instantiated")
     def setupExperiment(
         self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
     ) -> None:
@@ -53,18 +53,15 @@ class FMI2Block(FMIInterface, FMU2Slave):
             tolerance: without effect: the integration step is a parameter. startTime: [s].
             stopTime: end of the run [s], without effect.
         """
-        self.instance.require("instantiated")
         self.instance.set_up(startTime)
 
-    @refused
+    @allowed_in("instantiated")
     def enterInitializationMode(self) -> None:
         """Begin initialisation at the start time."""
-        self.instance.require("instantiated")
         self.instance.mode = "initialization"
 
     # -- time -------------------------------------------------------------------------------------------------------
 
-    @refused
     def doStep(
         self,
         currentCommunicationPoint: float,
@@ -77,7 +74,10 @@ class FMI2Block(FMIInterface, FMU2Slave):
             currentCommunicationPoint: start of the step [s]. communicationStepSize: its length [s], above zero.
             noSetFMUStatePriorToCurrentPoint: as in FMI: no state of an earlier time will be set.
         """
-        self.instance.step(currentCommunicationPoint, communicationStepSize)
+        try:
+            self.instance.step(currentCommunicationPoint, communicationStepSize)
+        except BlockError as error:
+            raise self.refusal("doStep", error) from error.__cause__
 
     def cancelStep(self) -> None:
         """Nothing to cancel: steps are synchronous."""

@@ -7,8 +7,8 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from fmu_observer.block.block_variables import BlockError, Mode, Role
-from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
+from fmu_observer.block.block_variables import ALIVE, BlockError, Mode, Role
+from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, allowed_in, refused
 
 INT32: tuple[Role, ...] = ("count", "integer_output", "outcome")
 INT64: tuple[Role, ...] = ("policy",)
@@ -69,7 +69,7 @@ class FMI3Block(FMIInterface, FMU3Slave):
             if name not in known:
                 raise BlockError(f"there is no log category {name}; there are {', '.join(known)}.")
 
-    @refused
+    @allowed_in("instantiated")
     def enterInitializationMode(
         self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
     ) -> None:
@@ -79,24 +79,21 @@ class FMI3Block(FMIInterface, FMU3Slave):
             tolerance: without effect: the integration step is a parameter.
             stopTime: end of the run [s], without effect.
         """
-        self.instance.require("instantiated")
         self.instance.set_up(startTime)
         self.instance.mode = "initialization"
 
     # -- events -----------------------------------------------------------------------------------------------------
 
-    @refused
+    @allowed_in("step")
     def enterEventMode(self) -> None:
         """From step mode to event mode."""
-        self.instance.require("step")
         if self._event_mode_used is False:
             raise BlockError("the block was instantiated with eventModeUsed = False.")
         self.instance.mode, self._event_mode_used = "event", True
 
-    @refused
+    @allowed_in("event")
     def enterStepMode(self) -> None:
         """From event mode to step mode."""
-        self.instance.require("event")
         if self.instance.events.active:
             names = ", ".join(
                 self.system.triggered_events[number].name for number in sorted(self.instance.events.active)
@@ -104,26 +101,24 @@ class FMI3Block(FMIInterface, FMU3Slave):
             raise BlockError(f"clock {names} is active; call updateDiscreteStates first, or the event is lost.")
         self.instance.mode = "step"
 
-    @refused
+    @allowed_in("event")
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
         """Activate triggered input clocks; the events happen in `updateDiscreteStates`.
 
         Args:
             vr: value references.
         """
-        self.instance.require("event")
-        numbers = [self.instance.variables.clock_number(reference) for reference in vr]
-        for number, value in zip(numbers, values, strict=True):
-            (self.instance.events.active.add if value else self.instance.events.active.discard)(number)
+        active = self.instance.events.active
+        for number, value in zip(list(map(self.instance.variables.clock_number, vr)), values, strict=True):
+            (active.add if value else active.discard)(number)
 
-    @refused
+    @allowed_in(*ALIVE)
     def getClock(self, vr: Sequence[int]) -> list[bool]:
         """Whether clocks are active.
 
         Args:
             vr: value references.
         """
-        self.instance.require_alive()
         return [self.instance.variables.clock_number(reference) in self.instance.events.active for reference in vr]
 
     @refused
@@ -133,14 +128,14 @@ class FMI3Block(FMIInterface, FMU3Slave):
         Returns:
             (discreteStatesNeedUpdate, terminate, nominalsChanged, valuesChanged, nextEventTimeDefined, nextEventTime).
         """
-        if self.mode == "step" and self._event_mode_used is None:
+        if self._event_mode_used is None and self.mode == "step":
             self.enterEventMode()
-        self.instance.require("event")
+        if self.instance.mode != "event":
+            self.instance.require("event")
         return False, False, False, self.instance.tick(), False, 0.0
 
     # -- time -------------------------------------------------------------------------------------------------------
 
-    @refused
     def doStep(
         self,
         currentCommunicationPoint: float,
@@ -157,7 +152,10 @@ class FMI3Block(FMIInterface, FMU3Slave):
         Returns:
             (eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime).
         """
-        early = self.instance.step(currentCommunicationPoint, communicationStepSize, self._early_return_allowed)
+        try:
+            early = self.instance.step(currentCommunicationPoint, communicationStepSize, self._early_return_allowed)
+        except BlockError as error:
+            raise self.refusal("doStep", error) from error.__cause__
         return False, False, early, self.instance.runtime.t
 
     # -- values -----------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from fmpy.model_description import ModelDescription
 from fmu_observer.block.block_derivatives import BlockSensitivity
 from fmu_observer.block.block_instance import BlockInstance
 from fmu_observer.block.block_state import BlockState, deserialize, serialize
-from fmu_observer.block.block_variables import BlockError, Mode, Role, StepDiscarded
+from fmu_observer.block.block_variables import ALIVE, BlockError, Mode, Role, StepDiscarded
 from fmu_observer.block.policy import Counters
 from fmu_observer.description import describe
 from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON, Announcement, EventProtocol, LatePolicy
@@ -52,23 +52,36 @@ class BlockCallError(FMICallException, BlockError):
         return type(self), (self.function, self.reason, self.status)
 
 
-def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
-    """Turn the `BlockError` of a call into fmpy's exception, with the name of the call, of the block, and the time.
+Call = Callable[Concatenate[Any, P], R]
+
+
+def allowed_in(*modes: Mode) -> Callable[[Call[P, R]], Call[P, R]]:
+    """Refuse a call of the interface in any other mode than these, and turn its `BlockError` into fmpy's exception,
+    with the name of the call, of the block, and the time.
 
     Args:
-        function: a call of the interface.
+        modes: none for any.
     """
 
-    @wraps(function)
-    def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            return function(self, *args, **kwargs)
-        except BlockCallError:
-            raise
-        except BlockError as error:
-            raise self.refusal(function.__name__, error) from error.__cause__
+    def decorate(function: Call[P, R]) -> Call[P, R]:
+        @wraps(function)
+        def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                if modes and self.instance.mode not in modes:
+                    self.instance.require(*modes)
+                return function(self, *args, **kwargs)
+            except BlockCallError:
+                raise
+            except BlockError as error:
+                raise self.refusal(function.__name__, error) from error.__cause__
 
-    return call
+        return call
+
+    return decorate
+
+
+refused = allowed_in()
+"""The same in any mode."""
 
 
 class FMIInterface:
@@ -116,6 +129,8 @@ class FMIInterface:
         self.instanceName = instance_name or system.name
         self.modelIdentifier = system.name
         self.instance = BlockInstance(system, self.guid, counts_events, protocol, preset, self.instanceName)
+        self.counters: Counters = self.instance.events.counters
+        """What became of the events so far."""
         self._counts_events = counts_events
         self._sensitivity = BlockSensitivity(system, self.model_description.modelVariables)
         self._folder: str | None = None
@@ -126,11 +141,6 @@ class FMIInterface:
     def mode(self) -> Mode:
         """Mode of the life cycle."""
         return self.instance.mode
-
-    @property
-    def counters(self) -> Counters:
-        """What became of the events so far."""
-        return self.instance.events.counters
 
     @property
     def component(self) -> FMIInterface:
@@ -159,23 +169,20 @@ class FMIInterface:
 
     # -- life -------------------------------------------------------------------------------------------------------
 
-    @refused
+    @allowed_in("initialization")
     def exitInitializationMode(self) -> None:
         """End initialisation; time begins to run."""
-        self.instance.require("initialization")
         self.instance.start()
         self.instance.mode = self._mode_after_initialization()
 
-    @refused
+    @allowed_in("step", "event")
     def terminate(self) -> None:
         """End the run; values can still be read."""
-        self.instance.require("step", "event")
         self.instance.mode = "terminated"
 
-    @refused
+    @allowed_in(*ALIVE)
     def reset(self) -> None:
         """Back to the state after instantiation."""
-        self.instance.require_alive()
         self.instance.reset()
 
     def freeInstance(self) -> None:
@@ -223,23 +230,21 @@ class FMIInterface:
             unknowns: value references of outputs or derivatives. knowns: value references of inputs or states.
             seed: direction, one number for each known.
         """
-        self.instance.require_alive()
+        self.instance.require(*ALIVE)
         if self.mode == "instantiated":
             raise BlockError("directional derivatives are there from initialization mode on.")
         return self._sensitivity.directional(self.instance.runtime, unknowns, knowns, seed)
 
     # -- saved states -----------------------------------------------------------------------------------------------
 
-    @refused
+    @allowed_in(*ALIVE)
     def getFMUState(self) -> BlockState:
         """The whole state, mode and pending events included, as a value."""
-        self.instance.require_alive()
         return self.instance.save()
 
-    @refused
+    @allowed_in(*ALIVE)
     def setFMUState(self, state: BlockState) -> None:
         """Return to a state taken by `getFMUState`, exactly and as often as wanted."""
-        self.instance.require_alive()
         self.instance.load(state)
 
     def freeFMUState(self, state: BlockState) -> None:

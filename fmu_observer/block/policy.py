@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.block.block_journal import Journal, Record, Stamped
+from fmu_observer.block.block_journal import Journal, Stamped
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import Runtime, Snapshot
 from plant_models.hybrid.event import DOUBTED, IGNORED
@@ -37,6 +37,10 @@ class Counters:
     lost: int = 0
     doubted: int = 0
     ignored: int = 0
+
+    def copy(self) -> Counters:
+        """The same numbers, which stay as they are."""
+        return Counters(*vars(self).values())
 
     def judged(self, verdict: int) -> bool:
         """Count an event by what the model made of it; whether it took effect.
@@ -112,20 +116,16 @@ def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray
     past = journal.cut(event.stamp)
     present = runtime.memory[given]
     runtime.restore(Snapshot(past[0].memory, past[0].t, runtime.t0, past[0].ticks))
-    if past[0].moves:
+    if past[0].until > past[0].t:
         advance(runtime, journal, event.stamp)
     verdict = jump(runtime, journal, event)
     for record in past:
         runtime.memory[given] = record.memory[given]
-        _repeat(runtime, journal, record)
+        if record.event is not None:
+            jump(runtime, journal, record.event)
+        elif record.until > record.t:
+            advance(runtime, journal, record.until)
+        else:
+            communicate(runtime, journal)
     runtime.memory[given] = present
     return "", verdict
-
-
-def _repeat(runtime: Runtime, journal: Journal, record: Record) -> None:
-    if record.event is not None:
-        jump(runtime, journal, record.event)
-    elif record.moves:
-        advance(runtime, journal, record.until)
-    else:
-        communicate(runtime, journal)

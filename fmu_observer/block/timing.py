@@ -37,6 +37,7 @@ class Timing:
             (names.index(event.period), None if event.offset is None else names.index(event.offset))
             for event in system.periodic_events
         ]
+        self._lengths = [self.step_position, *(period for period, _ in self._periodic)]
 
     def count_steps(
         self, end: float, t: float, t0: float, p: Sequence[float] | np.ndarray, ticks: Sequence[int]
@@ -61,7 +62,7 @@ class Timing:
         Args:
             p: values of the parameters, shape (k,).
         """
-        shortest = min(float(p[i]) for i in (self.step_position, *(period for period, _ in self._periodic)))
+        shortest = min(map(float, map(p.__getitem__, self._lengths)))
         return (
             0.1 * MOST_INTERNAL_STEPS * shortest if GRID_TOLERANCE * float(p[self.step_position]) <= shortest else 0.0
         )
@@ -69,7 +70,7 @@ class Timing:
     def can_run(self, snapshot: Snapshot) -> bool:
         """Whether time can run on from a snapshot of a runtime whose time has begun."""
         p = snapshot.memory[self._offset :].tolist()
-        if not all(0.0 < p[i] < inf for i in (self.step_position, *(period for period, _ in self._periodic))):
+        if not all(0.0 < p[i] < inf for i in self._lengths):
             return False
         if not all(offset is None or isfinite(p[offset]) for _, offset in self._periodic):
             return False

@@ -41,7 +41,10 @@ class EventPort:
         Returns:
             Values by value reference, the stamp last.
         """
-        found = {self.payload[n]: float(payload[n]) for n in self.payload if n in payload}
+        found = dict[int, float]()
+        for name, reference in self.payload.items():
+            if name in payload:
+                found[reference] = float(payload[name])
         if self.stamp is not None:
             found[self.stamp] = stamp
         return found

@@ -71,8 +71,8 @@ class FMI2Slave(FMI2Instance, Slave):
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         self._counts[event.name] += 1
         fields, count = event.fields(stamp, payload), self._counts[event.name]
-        self.guard(f"payload of event '{event.name}'", lambda: self.slave.setReal(list(fields), list(fields.values())))
-        self.guard(f"count of event '{event.name}'", lambda: self.slave.setInteger([event.trigger], [count]))
+        self.guard(f"payload of event '{event.name}'", self.slave.setReal, list(fields), list(fields.values()))
+        self.guard(f"count of event '{event.name}'", self.slave.setInteger, [event.trigger], [count])
 
     def _remember(self) -> tuple[Any, ...]:
         return dict(self._counts), self.time, self.terminated

@@ -91,7 +91,7 @@ class FMI3Slave(FMI3Instance, Slave):
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Slave
         if self.clocks:
-            self.guard("intervals of clocks", lambda: self.clocks.begin(self.time))
+            self.guard("intervals of clocks", self.clocks.begin, self.time)
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
         if self.has_event_mode:
@@ -196,7 +196,7 @@ class FMI3Slave(FMI3Instance, Slave):
         Args:
             references: value references of the clocks.
         """
-        self.guard("setClock", lambda: self.slave.setClock(list(references), [True] * len(references)))
+        self.guard("setClock", self.slave.setClock, list(references), [True] * len(references))
 
     def ticking(self, references: Sequence[int]) -> list[bool]:
         """In Event Mode: which of these output clocks are active.
@@ -204,7 +204,7 @@ class FMI3Slave(FMI3Instance, Slave):
         Args:
             references: value references of the clocks.
         """
-        return [bool(x) for x in self.guard("getClock", lambda: self.slave.getClock(list(references)))]
+        return [bool(x) for x in self.guard("getClock", self.slave.getClock, list(references))]
 
     def update_discrete_states(self) -> bool:  # noqa: D102 - see Instance
         again, terminate, _, _, defined, next_time = self.guard("updateDiscreteStates", self.slave.updateDiscreteStates)
@@ -213,7 +213,7 @@ class FMI3Slave(FMI3Instance, Slave):
             raise self.failure("updateDiscreteStates says that the next event is at t = nan")
         self.next_event = float(next_time) if defined else NEVER
         if self.clocks:
-            self.guard("intervals of clocks", lambda: self.clocks.ask(self.time))
+            self.guard("intervals of clocks", self.clocks.ask, self.time)
             self.next_event = min(self.next_event, self.clocks.next)
         self.event_pending = False
         return bool(again)
@@ -251,7 +251,7 @@ class FMI3Slave(FMI3Instance, Slave):
         self.settle()
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
-        self.guard(f"event '{event.name}'", lambda: self._deliver(event, stamp, payload))
+        self.guard(f"event '{event.name}'", self._deliver, event, stamp, payload)
 
     def _deliver(self, event: EventPort, stamp: float, payload: Mapping[str, float]) -> None:
         slave, fields = self.slave, event.fields(stamp, payload)
@@ -271,7 +271,8 @@ class FMI3Slave(FMI3Instance, Slave):
 
     def _recall(self, remembered: tuple[Any, ...]) -> None:
         self.next_event, self.time, self.terminated, self.event_pending, clocks = remembered
-        self.clocks.restore(clocks)
+        if clocks:
+            self.clocks.restore(clocks)
 
     def _step_arguments(self) -> dict[str, Any]:
         early = self.capabilities.mightReturnEarlyFromDoStep

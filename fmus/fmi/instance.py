@@ -168,7 +168,7 @@ class Instance(Described):
             name: of the variable.
         """
         write = exact_writer(self, self.variables[name])
-        return lambda values: self.guard(f"writing {name}", lambda: write(values))
+        return lambda values: self.guard(f"writing {name}", write, values)
 
     def read(self, names: Sequence[str]) -> np.ndarray:
         """Values of numeric scalars and elements.
@@ -241,7 +241,7 @@ class Instance(Described):
             state: of this instance, from `save` or `deserialize`.
         """
         held, remembered = state
-        self.guard(self._set_state, lambda: getattr(self.slave, self._set_state)(held))
+        self.guard(self._set_state, getattr(self.slave, self._set_state), held)
         self._recall(remembered)
 
     def release(self, state: Any) -> None:
@@ -251,7 +251,7 @@ class Instance(Described):
             state: of this instance.
         """
         if self._alive:
-            self.guard(self._free_state, lambda: getattr(self.slave, self._free_state)(state[0]))
+            self.guard(self._free_state, getattr(self.slave, self._free_state), state[0])
 
     def serialize(self, state: Any) -> bytes:
         """A saved state as bytes.
@@ -259,7 +259,7 @@ class Instance(Described):
         Args:
             state: of this instance.
         """
-        return bytes(self.guard("serializeFMUState", lambda: self.slave.serializeFMUState(state[0])))
+        return bytes(self.guard("serializeFMUState", self.slave.serializeFMUState, state[0]))
 
     def deserialize(self, content: bytes) -> Any:
         """A saved state from bytes; what the slave's own state does not hold is as it is here and now.
@@ -267,7 +267,7 @@ class Instance(Described):
         Args:
             content: from `serialize`, of this or another instance of the FMU.
         """
-        return self.guard("deserializeFMUState", lambda: self.slave.deserializeFMUState(content)), self._remember()
+        return self.guard("deserializeFMUState", self.slave.deserializeFMUState, content), self._remember()
 
     # -- errors -----------------------------------------------------------------------------------------------------
 
@@ -290,18 +290,18 @@ class Instance(Described):
             category: as the slave names it.
         """
 
-    def guard(self, what: str, call: Callable[[], Any]) -> Any:
+    def guard(self, what: str, call: Callable[..., Any], *arguments: Any) -> Any:
         """Run a call of the slave; whatever it throws becomes an error of this instance.
 
         Args:
             what: the call, for the error.
-            call: takes no arguments.
+            arguments: of the call.
 
         Returns:
             What the call returned.
         """
         try:
-            return call()
+            return call(*arguments)
         except self.mistakes:
             raise
         except Exception as error:

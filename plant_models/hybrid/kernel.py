@@ -142,8 +142,7 @@ class TracedKernel(_Arrays):
         self.x[:] = self._x_next
 
     def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
-        if self._flows:
-            divided_step(self, t, h)
+        self.grid_steps(t, 0, 1, h)
 
     def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
         if not self._flows:
@@ -159,7 +158,12 @@ class TracedKernel(_Arrays):
             k += BATCH_OF_STEPS
             count -= BATCH_OF_STEPS
         for i in range(count):
-            self.step(t0 + (k + i) * h, h)
+            self._t[0], self._h[0] = t0 + (k + i) * h, h
+            self._step()
+            if self._switched[0]:
+                divided_step(self, t0 + (k + i) * h, h)
+            else:
+                self.x[:] = self._x_next
 
     def output(self, t: float) -> None:  # noqa: D102 - see Kernel
         self._t[0] = t
@@ -172,20 +176,19 @@ class TracedKernel(_Arrays):
 
 
 def _buffered(function: ca.Function, arguments: list[np.ndarray], *results: np.ndarray) -> Callable[[], Any]:
+    """A call of the function with these arrays, which are the caller's to keep."""
     for i, result in enumerate(results):
         if function.numel_out(i) != result.size:  # CasADi would write past the end of the array
             raise ValueError(f"{function.name()} returns {function.numel_out(i)} values, expected {result.size}.")
     buffer: Any  # CasADi's stubs ask for a size that its functions do not take
+    evaluate: Any
     buffer, evaluate = function.buffer()
     for i, array in enumerate(arguments):
         buffer.set_arg(i, array.data)
     for i, result in enumerate(results):
         buffer.set_res(i, result.data)
-
-    def call(_alive: Any = (buffer, function)) -> None:  # the buffer and its function must outlive the call
-        evaluate()
-
-    return call
+    evaluate.alive = buffer, function  # they must outlive the call
+    return evaluate
 
 
 def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:

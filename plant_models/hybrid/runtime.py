@@ -41,7 +41,8 @@ class Runtime:
     3. `start(t0)` fires the periodic events that are due at ``t0``, then the communication events; `communicate()`
        fires these at the end of a communication step.
     4. `trigger(event)` jumps now, with the payload that stands in `u`.
-    5. `snapshot` / `restore` are exact: what follows a restore is bit-identical to what followed the snapshot.
+    5. `compute_outputs(t)` brings `y` up to date with the rest at a time [s]; `update_outputs` does so now.
+    6. `snapshot` / `restore` are exact: what follows a restore is bit-identical to what followed the snapshot.
 
     Args:
         system: the hybrid system.
@@ -54,12 +55,16 @@ class Runtime:
         self.name = name or system.name
         self._kernel = kernel if kernel is not None else make_kernel(system)
         self.x, self.u, self.p, self.y = self._kernel.x, self._kernel.u, self._kernel.p, self._kernel.y
-        self.memory = self._kernel.memory
+        self.memory, self.compute_outputs = self._kernel.memory, self._kernel.output
         self.t = self.t0 = 0.0
         self.ticks = [0] * len(system.periodic_events)
-        self._parameter_names = list(scalar_names(system.parameter_signals))
+        self._places = {name: i for i, name in enumerate(scalar_names(system.parameter_signals))}
         self._verdicts = {event.name: system.verdict_index(event) for event in system.triggered_events}
+        events = system.periodic_events
+        self._step_place, self._period_places = self._places["internal_step"], [self._places[e.period] for e in events]
+        self._offset_places = [(i, self._places[e.offset]) for i, e in enumerate(events) if e.offset is not None]
         self._noise_offset = len(self.u) - sum(s.width for s in system.noises)
+        self._noise_counts = [width(event.noises) for event in events]
         self._read_timing()
 
     def reset(self) -> None:
@@ -89,15 +94,17 @@ class Runtime:
 
     def advance(self, t_end: float) -> None:
         """Integrate to `t_end` [s] and fire the periodic events on the way and at the end."""
-        tolerance = self._tolerance(t_end)
+        tolerance = self._grid_tolerance + 4.0 * ulp(t_end)
         while self._due <= t_end + tolerance:
-            self._integrate(self._due, self._tolerance(self._due))
+            self._integrate(self._due, self._grid_tolerance + 4.0 * ulp(self._due))
             self._fire_due()
-        self._integrate(t_end, tolerance)
+        if t_end > self.t:
+            self._integrate(t_end, tolerance)
 
     def next_instant_before(self, t_end: float) -> float | None:
         """The next periodic instant [s] that lies after now and before `t_end` [s], or None."""
-        return self._due if self.t + self._tolerance(self.t) < self._due < t_end - self._tolerance(t_end) else None
+        first = self.t + (self._grid_tolerance + 4.0 * ulp(self.t))
+        return self._due if first < self._due < t_end - (self._grid_tolerance + 4.0 * ulp(t_end)) else None
 
     def communicate(self) -> None:
         """A communication step ends now: fire the communication events, in the declared order."""
@@ -114,7 +121,7 @@ class Runtime:
 
     def update_outputs(self) -> np.ndarray:
         """Compute and return `y`, shape (q,)."""
-        self._kernel.output(self.t)
+        self.compute_outputs(self.t)
         return self.y
 
     def derivatives(self) -> np.ndarray:
@@ -147,12 +154,12 @@ class Runtime:
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _timing(self, name: str | None) -> float:
-        return 0.0 if name is None else float(self.p[self._parameter_names.index(name)])
+        return 0.0 if name is None else float(self.p[self._places[name]])
 
     def _choose_seed(self) -> None:
         """What is drawn follows from the parameter alone, which is saved and restored with the others."""
         if self.system.noises and self._timing("seed") == FROM_NAME:
-            self.p[self._parameter_names.index("seed")] = seed_of(RUN_SEED, self.name)
+            self.p[self._places["seed"]] = seed_of(RUN_SEED, self.name)
 
     def _check_timing(self) -> None:
         for name in ("internal_step", *(event.period for event in self.system.periodic_events)):
@@ -176,31 +183,29 @@ class Runtime:
 
     def _read_timing(self) -> None:
         """Fetch what stays fixed between events; parameters may have been set or restored."""
-        self._periods = [self._timing(event.period) for event in self.system.periodic_events]
-        self._offsets = [self._timing(event.offset) for event in self.system.periodic_events]
-        self._h = self._timing("internal_step")
-        self._due = self._next_due()
-
-    def _tolerance(self, t: float) -> float:
-        return GRID_TOLERANCE * self._h + 4.0 * ulp(t)
-
-    def _instant(self, i: int) -> float:
-        return self.t0 + self._offsets[i] + self.ticks[i] * self._periods[i]
-
-    def _next_due(self) -> float:
-        return min((self._instant(i) for i in range(len(self.ticks))), default=inf)
+        parameter, ticks = self.p.item, self.ticks
+        self._periods, self._offsets = list(map(parameter, self._period_places)), [0.0] * len(ticks)
+        for i, place in self._offset_places:
+            self._offsets[i] = parameter(place)
+        self._instants = [0.0] * len(ticks)  # the next one of each periodic event
+        for i in range(len(ticks)):
+            self._instants[i] = self.t0 + self._offsets[i] + ticks[i] * self._periods[i]
+        self._due = min(self._instants, default=inf)
+        self._h = parameter(self._step_place)
+        self._grid_tolerance = GRID_TOLERANCE * self._h
 
     def _fire_due(self) -> None:
-        position = self._noise_offset
+        last, position = self.t + (self._grid_tolerance + 4.0 * ulp(self.t)), self._noise_offset
         for i, event in enumerate(self.system.periodic_events):
-            if self._instant(i) <= self.t + self._tolerance(self.t):
-                for j in range(width(event.noises)):
-                    signal, seed = position - self._noise_offset + j, int(self._timing("seed"))
-                    self.u[position + j] = standard_normal(seed, signal, self.ticks[i], self.system.purpose)
+            if self._instants[i] <= last:
+                for j in range(position, position + self._noise_counts[i]):
+                    signal, seed = j - self._noise_offset, int(self._timing("seed"))
+                    self.u[j] = standard_normal(seed, signal, self.ticks[i], self.system.purpose)
                 self._kernel.jump(event.name, self.t)
                 self.ticks[i] += 1
-            position += width(event.noises)
-        self._due = self._next_due()
+                self._instants[i] = self.t0 + self._offsets[i] + self.ticks[i] * self._periods[i]
+            position += self._noise_counts[i]
+        self._due = min(self._instants, default=inf)
 
     def _integrate(self, target: float, tolerance: float) -> None:
         """Move to `target` through whole cells of the grid, with a part of a cell at either end."""
