@@ -188,7 +188,8 @@ def _buffered(function: ca.Function, arguments: list[np.ndarray], *results: np.n
     for i, result in enumerate(results):
         buffer.set_res(i, result.data)
     evaluate.alive = buffer, function  # they must outlive the call
-    return evaluate
+    call: Callable[[], Any] = evaluate
+    return call
 
 
 def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
