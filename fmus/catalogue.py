@@ -22,9 +22,9 @@ from plant_models.registry import Registry, RegistryError
 from plant_models.user_file import explained
 
 PACKAGES = ("plant_models", "fmu_observer")
-READERS = ("catalogue.py", "recipes.py")
+_READERS = ("catalogue.py", "recipes.py")
 """Files beside this one that decide what an entry says."""
-UNUSABLE = "Cannot be used"
+_UNUSABLE = "Cannot be used"
 """The room of models that cannot be loaded or made; their description says why."""
 
 
@@ -80,7 +80,7 @@ def by_room(entries: Iterable[CatalogueEntry]) -> dict[str, list[CatalogueEntry]
     rooms: dict[str, list[CatalogueEntry]] = {}
     for entry in entries:
         rooms.setdefault(entry.room, []).append(entry)
-    return dict(sorted(rooms.items(), key=lambda item: (item[0] == UNUSABLE, item[0].startswith("Registered by"))))
+    return dict(sorted(rooms.items(), key=lambda item: (item[0] == _UNUSABLE, item[0].startswith("Registered by"))))
 
 
 def _read(names: Iterable[str]) -> list[dict[str, Any]]:
@@ -96,7 +96,7 @@ def _entry_of_others(registry: Registry[Any], name: str) -> CatalogueEntry:
         return _entry(_read([name])[0])
     except Exception as error:  # whatever the code of others raises
         reason = str(error) if isinstance(error, RegistryError) else f"{registry.origin(name)}: {explained(error)}"
-        return CatalogueEntry(name, UNUSABLE, " ".join(reason.split()), "", (), None, ())
+        return CatalogueEntry(name, _UNUSABLE, " ".join(reason.split()), "", (), None, ())
 
 
 def _entry(data: dict[str, Any]) -> CatalogueEntry:
@@ -108,7 +108,7 @@ def _key(names: list[str]) -> str:
     """Digest of the names of the shipped models, and of all files that decide what these say of themselves."""
     folders = [Path(place) for package in PACKAGES for place in _places(package)]
     paths = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
-    paths += [Path(__file__).with_name(name) for name in READERS]
+    paths += [Path(__file__).with_name(name) for name in _READERS]
     digests = "\n".join(f"{path.name} {file_digest(path)}" for path in paths)
     return hashlib.sha256(f"{sys.version}\n{names}\n{digests}".encode()).hexdigest()
 

@@ -47,7 +47,7 @@ _FOLDERS = {
 }
 """What may lie in a folder named as in FMI 2.0; all others are platform tuples."""
 LARGEST = 2_000_000_000
-HEADER_SIZE = 4096
+_HEADER_SIZE = 4096
 
 
 def describe_file(path: Path) -> list[str]:
@@ -140,7 +140,7 @@ def _strays(archive: zipfile.ZipFile) -> list[str]:
         expected = _FOLDERS.get(folder, {folder})
         try:
             with archive.open(name) as stream:
-                found = platforms_of_library(stream.read(HEADER_SIZE))
+                found = platforms_of_library(stream.read(_HEADER_SIZE))
         except Exception:
             continue  # told as damage
         if not expected & set(found):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-TIMESTAMP = (1980, 1, 1, 0, 0, 0)
+_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Of every file in an FMU: the earliest a zip file can hold."""
 
 
@@ -69,7 +69,7 @@ def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
-    entry = zipfile.ZipInfo(name, TIMESTAMP)
+    entry = zipfile.ZipInfo(name, _TIMESTAMP)
     entry.create_system = 3  # the same on every system
     entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
     entry.compress_type = zipfile.ZIP_DEFLATED

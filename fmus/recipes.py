@@ -47,7 +47,7 @@ def recipe(name: str, **options: Any) -> HybridSystem:
 
     Args:
         name: model name, see `RECIPES`.
-        options: numbers and choices that shape its equations, see `recipe_options`.
+        options: numbers and choices that shape its equations, see `_recipe_options`.
 
     Raises:
         UnknownRecipeError: the name or an option does not exist.
@@ -55,7 +55,7 @@ def recipe(name: str, **options: Any) -> HybridSystem:
     """
     if name not in RECIPES:
         raise UnknownRecipeError(f"There is no model named {name!r}{_nearest(name, RECIPES)}; 'fmus list' shows all.")
-    known = recipe_options(name)
+    known = _recipe_options(name)
     for option in options:
         if option not in known:
             hint, has = _nearest(option, known) or ".", ", ".join(known) or "none"
@@ -63,7 +63,7 @@ def recipe(name: str, **options: Any) -> HybridSystem:
     return RECIPES[name](**options)
 
 
-def recipe_options(name: str) -> dict[str, Any]:
+def _recipe_options(name: str) -> dict[str, Any]:
     """Options of a model and their defaults (None where it has none).
 
     Args:
@@ -98,7 +98,7 @@ def recipe_entry(name: str) -> dict[str, Any]:
         name: model name, one of `RECIPES`.
     """
     cls = RECIPES[name]
-    presets, chosen = recipe_presets(name)
+    presets, chosen = _recipe_presets(name)
     options = [
         {
             "name": option,
@@ -106,7 +106,7 @@ def recipe_entry(name: str) -> dict[str, Any]:
             "legal": legal_values(cls.option_choices.get(option)),
             "listed": option in cls.option_choices,
         }
-        for option, default in recipe_options(name).items()
+        for option, default in _recipe_options(name).items()
     ]
     said = {"name": name, "room": _room(name), "description": cls.description, "source": cls.source}
     return said | {"presets": presets, "preset": chosen, "options": options}
@@ -120,7 +120,7 @@ def _room(name: str) -> str:
     return words[0].upper() + words[1:]
 
 
-def recipe_presets(name: str) -> tuple[list[str], str | None]:
+def _recipe_presets(name: str) -> tuple[list[str], str | None]:
     """Presets of a model with its default options, and the default preset.
 
     Args:

@@ -24,7 +24,7 @@ from cosim.results.summary_file import jsonable
 
 Change = Literal["new", "changed", "unchanged"]
 MARKERS = ("<<<<<<< ", "=======", ">>>>>>> ")
-HOW_TO_MAKE = "Make it with 'cosim baseline make', or with 'pytest --fmu-baseline=update' where a test uses it."
+_HOW_TO_MAKE = "Make it with 'cosim baseline make', or with 'pytest --fmu-baseline=update' where a test uses it."
 
 
 def parts(path: Path) -> dict[str, Path]:
@@ -116,7 +116,7 @@ def write_texts(texts: dict[str, str], path: Path) -> None:
     Raises:
         OutputError: a file cannot be written, or a table that belongs to no baseline is in the way.
     """
-    demand_free(path)
+    _demand_free(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as scratch:
@@ -134,7 +134,7 @@ def write_texts(texts: dict[str, str], path: Path) -> None:
         ) from error
 
 
-def demand_free(path: Path) -> None:
+def _demand_free(path: Path) -> None:
     """Refuse to write a table over one that belongs to no baseline: somebody's inputs, say.
 
     Args:
@@ -229,7 +229,7 @@ def _read_header(path: Path) -> Header:
     if not path.is_file():
         others = sorted(other.name for other in path.parent.glob("*.json")) if path.parent.is_dir() else []
         near = f" {path.parent} holds others; {nearest(path.name, others)}" if others else ""
-        raise BaselineError(f"There is no baseline {path}.{near} {HOW_TO_MAKE}")
+        raise BaselineError(f"There is no baseline {path}.{near} {_HOW_TO_MAKE}")
     text = _demanded(path, "it is the header of a baseline")
     try:
         return header_from(json.loads(text), path.parent)

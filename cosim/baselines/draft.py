@@ -28,7 +28,7 @@ from cosim.errors import BaselineError
 from cosim.results.events_file import COLUMNS, record_row
 from cosim.results.result import Result
 
-EVENT_DIGITS = 12
+_EVENT_DIGITS = 12
 """Significant digits of the numbers of a telegram, where they need not be exact."""
 
 
@@ -74,7 +74,7 @@ def make_draft(
     names = [info.name for info in chosen.signals]
     tolerances = resolved(tolerances or Tolerances(), names)
     table = _table_text(chosen, kept_rows(chosen, every), tolerances)
-    events = events_text(result, tolerances.default) if result.events else ""
+    events = _events_text(result, tolerances.default) if result.events else ""
     header = Header(
         title=_title(result),
         recipe=recipe or Recipe(),
@@ -158,7 +158,7 @@ def value_range(values: np.ndarray) -> float:
     return spread if spread > 0.0 else float(np.abs(finite).max())
 
 
-def events_text(result: Result, tolerance: Tolerance) -> str:
+def _events_text(result: Result, tolerance: Tolerance) -> str:
     """Telegrams as CSV, one a line.
 
     Args:
@@ -179,7 +179,7 @@ def _event_cell(value: float | str, allowed: float) -> str:
     """A cell; a number is rounded where that takes next to nothing from the difference allowed."""
     if isinstance(value, str):
         return value
-    short = float(f"{value:.{EVENT_DIGITS}g}")
+    short = float(f"{value:.{_EVENT_DIGITS}g}")
     return repr(value if abs(short - value) > SHARE * allowed else short).removesuffix(".0")
 
 

@@ -42,7 +42,7 @@ def header_data(header: Header, folder: Path) -> dict[str, Any]:
         "span": dict(header.span),
         "components": [_short(asdict(component)) for component in header.components],
         "signals": [_short(asdict(signal)) for signal in header.signals],
-        "tolerances": tolerances_data(header.tolerances),
+        "tolerances": _tolerances_data(header.tolerances),
         "selection": None if header.selection is None else list(header.selection),
         "every": header.every,
         "rows": header.rows,
@@ -56,7 +56,7 @@ def _short(data: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in data.items() if key not in DEFAULTS or value != DEFAULTS[key]}
 
 
-def tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
+def _tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
     """Plain data of tolerances.
 
     Args:
@@ -69,7 +69,7 @@ def tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
     }
 
 
-def tolerances_from(data: Mapping[str, Any]) -> Tolerances:
+def _tolerances_from(data: Mapping[str, Any]) -> Tolerances:
     """Tolerances from plain data.
 
     Args:
@@ -116,7 +116,7 @@ def _header(data: Mapping[str, Any], folder: Path, version: str) -> Header:
         span={key: float(data["span"][key]) for key in ("start", "stop", "step")},
         components=[_known(Identity, entry) for entry in data["components"]],
         signals=[_known(SignalInfo, entry) for entry in data["signals"]],
-        tolerances=tolerances_from(data["tolerances"]),
+        tolerances=_tolerances_from(data["tolerances"]),
         selection=data.get("selection"),
         every=data.get("every"),
         rows=int(data["rows"]),

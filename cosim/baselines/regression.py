@@ -53,7 +53,7 @@ def check(
     """
     outcome = result if isinstance(result, Outcome) else None
     actual = result if isinstance(result, Result) else result.result
-    demand_same_models(actual, baseline)
+    _demand_same_models(actual, baseline)
     if not len(actual.table):
         raise ComparisonError(f"The run is empty: it has no rows to compare with {baseline.label}.")
     names = [info.name for info in (*baseline.result.signals, *actual.signals)]
@@ -82,7 +82,7 @@ def regression(
     return Regression(**given, outcome=outcome, actual=actual, baseline=baseline)
 
 
-def demand_same_models(result: Result, baseline: Baseline) -> None:
+def _demand_same_models(result: Result, baseline: Baseline) -> None:
     """Refuse a result of another model; the same model with another GUID is a new delivery.
 
     Args:

@@ -32,7 +32,7 @@ class Subject:
     outcome: Outcome | None = None
 
 
-def run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[[str], None] | None = None) -> Subject:
+def _run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[[str], None] | None = None) -> Subject:
     """Run what a recipe says.
 
     Args:
@@ -84,11 +84,11 @@ def run_again(
     recipe = baseline.header.recipe if fmu is None else baseline.header.recipe.of(fmu)
     stimuli = baseline.more.get("stimuli")
     if stimuli is None or recipe.inputs:
-        return run_recipe(recipe, progress, warn)
+        return _run_recipe(recipe, progress, warn)
     with TemporaryDirectory(prefix="fmu-reference-") as folder:
         table = Path(folder) / "inputs.csv"
         table.write_bytes(stimuli)
-        return run_recipe(replace(recipe, inputs=str(table)), progress, warn)
+        return _run_recipe(replace(recipe, inputs=str(table)), progress, warn)
 
 
 def make_subject(
@@ -131,7 +131,7 @@ def make_subject(
         return Subject(Recipe(), what, None) if isinstance(what, Result) else Subject(Recipe(), what.result, what)
     if isinstance(what, str | Path) and Path(what).suffix.lower() == ".fmu":
         _refuse("an FMU alone", changed)
-        return run_recipe(_fmu_recipe(what, folder, times, of_fmu), progress, warn)
+        return _run_recipe(_fmu_recipe(what, folder, times, of_fmu), progress, warn)
     _refuse("a scenario", of_fmu)
     return _scenario_subject(what, folder, {**times, **(overrides or {})}, progress, warn)
 
@@ -163,14 +163,14 @@ def _scenario_subject(
         outcome = what.run(progress=progress, overrides=changes, warn=warn)
         return Subject(Recipe(), outcome.result, outcome)
     if isinstance(what, str | Path):
-        return run_recipe(Recipe("scenario", scenario_source(what, folder), overrides=dict(changes)), progress, warn)
+        return _run_recipe(Recipe("scenario", _scenario_source(what, folder), overrides=dict(changes)), progress, warn)
     raise BaselineError(
         "Expected the path of an FMU, the name or path of a scenario, a Scenario, an Outcome or a Result; "
         f"got {type(what).__name__}."
     )
 
 
-def scenario_source(what: str | Path, folder: Path) -> str:
+def _scenario_source(what: str | Path, folder: Path) -> str:
     """A scenario file beside the user's own as an absolute path, or the name of a shipped scenario.
 
     Args:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fmus.cli.commands import Argument, argument
 
-DEFAULT_SCENARIO = "freight_profile_d"
+_DEFAULT_SCENARIO = "freight_profile_d"
 OVERRIDES = (
     "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated; the "
     "others win over case"
@@ -27,7 +27,7 @@ def settings_argument(text: str = OVERRIDES) -> Argument:
     return argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=text)
 
 
-def scenario_arguments(default: str | None = DEFAULT_SCENARIO) -> tuple[Argument, Argument]:
+def scenario_arguments(default: str | None = _DEFAULT_SCENARIO) -> tuple[Argument, Argument]:
     """The arguments ``SCENARIO`` and ``--set``.
 
     Args:

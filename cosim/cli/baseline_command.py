@@ -40,8 +40,8 @@ EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
 FILE = argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
 FORCE = argument("--force", action="store_true", help="replace a baseline that is there already")
 ALLOWED = Group(TOLERANCES, "tolerances", "those in the baseline, or the usual ones, where not given")
-OUTPUT = (argument("--json", action="store_true", help="print JSON instead of text"), QUIET)
-MAKE = (
+_OUTPUT = (argument("--json", action="store_true", help="print JSON instead of text"), QUIET)
+_MAKE = (
     argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"),
     FILE,
     settings_argument(f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input"),
@@ -72,13 +72,13 @@ CHECK = (
     argument("--verbose", action="store_true", help="print all signals and everything that was found"),
     ALLOWED,
 )
-EMBED = (
+_EMBED = (
     FILE,
     argument("fmu", metavar="FMU", help="the FMU that the baseline is of"),
     argument("-o", "--output", metavar="COPY.fmu", required=True, help="the copy; may be the FMU itself"),
     argument("--name", help="of the reference (default: that of the baseline)"),
 )
-EXTRACT = (
+_EXTRACT = (
     argument("fmu", metavar="FMU", help="the FMU that holds it"),
     FILE,
     argument("--reference", metavar="NAME", help="which one, where there are several"),
@@ -240,19 +240,19 @@ def _progress(options: argparse.Namespace) -> ProgressBar:
 
 def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | Group]) -> Action:
     words = {"help": text, "description": f"{text[0].upper()}{text[1:]}."}
-    return Action(name, execute, words, (*OUTPUT, *arguments))
+    return Action(name, execute, words, (*_OUTPUT, *arguments))
 
 
 PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
 ARGUMENTS = (
     Actions(
         (
-            _action("make", _make, "run an FMU or a scenario and keep its outputs", MAKE),
+            _action("make", _make, "run an FMU or a scenario and keep its outputs", _MAKE),
             _action("check", _check, "run again, or take a given result, and compare", CHECK),
             _action("show", _show, "show what a baseline is of", (FILE,)),
             _action("update", _update, "run again and accept the outputs as they are now", (FILE, ALLOWED)),
-            _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", EMBED),
-            _action("extract", _extract, "take a reference (FMI-LS-REF) out of an FMU as a baseline", EXTRACT),
+            _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", _EMBED),
+            _action("extract", _extract, "take a reference (FMI-LS-REF) out of an FMU as a baseline", _EXTRACT),
         )
     ),
 )

@@ -14,7 +14,7 @@ from cosim.errors import CosimError
 from fmu_observer.certificates.bounds import ErrorBounds, bound_data, bound_text
 from fmus.cli.commands import argument
 
-KEPT, EXCEEDED = 0, 1
+KEPT, _EXCEEDED = 0, 1
 KINDS = ("carried", "exact")
 """What a limit may rest on; what is printed in the thesis is no bound."""
 
@@ -55,7 +55,7 @@ def execute(options: argparse.Namespace) -> int:
     else:
         print(text)
     exceeded = options.limit is not None and data["rows"][0][options.by] > options.limit
-    return EXCEEDED if exceeded else KEPT
+    return _EXCEEDED if exceeded else KEPT
 
 
 def _bounds(options: argparse.Namespace) -> ErrorBounds:

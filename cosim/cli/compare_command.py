@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from cosim.comparison.verdict import Comparison
     from cosim.results.result import Result
 
-EQUAL, DIFFERENT = 0, 1
-NO_TELEGRAMS = "Telegrams and packets were not compared (--no-telegrams)."
+EQUAL, _DIFFERENT = 0, 1
+_NO_TELEGRAMS = "Telegrams and packets were not compared (--no-telegrams)."
 EPILOG = (
     'A tolerance file is TOML: [default] with absolute, relative, time and time_relative; [signals."train.*"] with the '
     "same "
@@ -81,7 +81,7 @@ def execute(options: argparse.Namespace) -> int:
     asked = asked_tolerances(options)  # before anything is read: a mistake in them is told at once
     comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
     _tell(comparison, options)
-    return EQUAL if comparison.equal else DIFFERENT
+    return EQUAL if comparison.equal else _DIFFERENT
 
 
 def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
@@ -94,7 +94,7 @@ def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
     odd = list(other.notes) if other is not None else []
     if options.no_telegrams:
         reference, result = (replace(side, events=(), packets=()) for side in (reference, result))
-        odd = [*odd, NO_TELEGRAMS]
+        odd = [*odd, _NO_TELEGRAMS]
     if baseline is not None:
         regression = check(result, replace(baseline, result=reference), tolerances, label=options.result)
         return replace(regression, reference=options.reference, notes=[*regression.notes, *odd])

@@ -29,7 +29,7 @@ from fmus.cli.commands import Action, Actions, argument
 from fmus.text_table import text_table
 
 DONE, NOT_IDENTIFIED = 0, 1
-RUN_SECONDS, RUN_STEP = 60.0, 0.05
+_RUN_SECONDS, _RUN_STEP = 60.0, 0.05
 
 
 DAVIS = (
@@ -56,8 +56,8 @@ DAVIS = (
         help="widest half of an interval that counts as identified, as acceleration at top speed (default: 0.05)",
     ),
     argument("--input", metavar="NAME", help="of an FMU: the input that takes the effort"),
-    argument("--stop", type=float, default=RUN_SECONDS, help="of an FMU: length of the run [s] (default: 60)"),
-    argument("--step", type=float, default=RUN_STEP, help="of an FMU: sampling [s] (default: 0.05)"),
+    argument("--stop", type=float, default=_RUN_SECONDS, help="of an FMU: length of the run [s] (default: 60)"),
+    argument("--step", type=float, default=_RUN_STEP, help="of an FMU: sampling [s] (default: 0.05)"),
     settings_argument("of an FMU"),
     argument("--plot", type=Path, metavar="FILE", help="write speed and residuals as a picture"),
     PARAMETERS_FILE,
@@ -85,9 +85,9 @@ def execute(options: argparse.Namespace) -> int:
     if options.toml is not None:
         write_text(options.toml, estimate.toml())
     if options.json:
-        print_json(estimate_data(estimate))
+        print_json(_estimate_data(estimate))
     else:
-        print(estimate_text(estimate))
+        print(_estimate_text(estimate))
     return DONE if estimate.identified else NOT_IDENTIFIED
 
 
@@ -184,7 +184,7 @@ def _signal(result: Result, asked: str | None, what: str, option: str) -> str:
     return found[0]
 
 
-def estimate_text(estimate: DavisEstimate) -> str:
+def _estimate_text(estimate: DavisEstimate) -> str:
     """The estimate as a table with remarks below.
 
     Args:
@@ -205,7 +205,7 @@ def estimate_text(estimate: DavisEstimate) -> str:
     return "\n".join([*lines, *(f"- {remark}" for remark in estimate.remarks), "", estimate.toml().rstrip()])
 
 
-def estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
+def _estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
     """The estimate as plain data.
 
     Args:

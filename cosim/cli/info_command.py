@@ -45,7 +45,7 @@ def execute(options: argparse.Namespace) -> int:
     """
     if is_package(options.what):
         return _execute_package(options)
-    data = _described_model(options.what) if names_a_model(options.what) else describe_file(Path(options.what))
+    data = _described_model(options.what) if _names_a_model(options.what) else describe_file(Path(options.what))
     if options.json:
         print(json.dumps(data, indent=2))
         return 0
@@ -77,7 +77,7 @@ def _described_model(name: str) -> dict[str, Any]:
     return describe_model(name)
 
 
-def names_a_model(text: str) -> bool:
+def _names_a_model(text: str) -> bool:
     """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file.
 
     Args:

@@ -16,11 +16,11 @@ from plant_models.hybrid import TracingError
 from plant_models.hybrid.signal import Signal
 from plant_models.user_file import explained, names_code
 
-REGISTRIES = {"model": PLANTS, "observer": OBSERVERS}
+_REGISTRIES = {"model": PLANTS, "observer": OBSERVERS}
 
 
 def declared_model(
-    name: str, where: str, kinds: Sequence[str] = tuple(REGISTRIES), options: Mapping[str, Any] | None = None
+    name: str, where: str, kinds: Sequence[str] = tuple(_REGISTRIES), options: Mapping[str, Any] | None = None
 ) -> Any:
     """A plant or an observer by what a user calls it.
 
@@ -31,9 +31,9 @@ def declared_model(
     Raises:
         ScenarioError: there is none of these kinds, or it cannot be loaded or made.
     """
-    key = next((kind for kind in kinds if name in REGISTRIES[kind]), kinds[-1])
-    if name not in REGISTRIES[key] and not names_code(name):
-        known = [one for kind in kinds for one in REGISTRIES[kind]]
+    key = next((kind for kind in kinds if name in _REGISTRIES[kind]), kinds[-1])
+    if name not in _REGISTRIES[key] and not names_code(name):
+        known = [one for kind in kinds for one in _REGISTRIES[kind]]
         raise ScenarioError(f"There is no {' or '.join(kinds)} {name!r}; {nearest(name, known)}")
     return make_declared(ComponentTable.model_validate({key: name, "options": options or {}}), where)
 

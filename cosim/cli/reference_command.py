@@ -66,12 +66,12 @@ def execute(options: argparse.Namespace) -> int:
     result = load_result(options.source)
     name = _odometer(result, options.odometer)
     found = _smoothed(options, result, name)
-    written = save_result(as_result(found), options.out)
+    written = save_result(_as_result(found), options.out)
     if options.json:
         data = {"odometer": name, "file": str(options.out), "balises": found.balises, "readings": found.readings}
         print_json(data | {"left_out": found.left_out, "consistency": asdict(found.found)})
         return DONE
-    print(reference_text(found, name))
+    print(_reference_text(found, name))
     print(f"written: {', '.join(map(str, written))}")
     return DONE
 
@@ -97,7 +97,7 @@ def _smoothed(options: argparse.Namespace, result: Result, name: str) -> Referen
         raise CosimError(f"{options.source}, {name}: {error}") from error
 
 
-def as_result(found: ReferenceTrajectory) -> Result:
+def _as_result(found: ReferenceTrajectory) -> Result:
     """The trajectory as a result: the quantities, and each with ``_std``.
 
     Args:
@@ -117,7 +117,7 @@ def as_result(found: ReferenceTrajectory) -> Result:
     return Result(table, tuple(signals))
 
 
-def reference_text(found: ReferenceTrajectory, odometer: str) -> str:
+def _reference_text(found: ReferenceTrajectory, odometer: str) -> str:
     """What was smoothed, and how far it may be off.
 
     Args:

@@ -20,11 +20,11 @@ from cosim.studies.sweep import Sweep
 from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar
 
-DONE, SOME_FAILED = 0, 1
+DONE, _SOME_FAILED = 0, 1
 RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
-VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
+_VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
 a range, with --samples"""  # noqa: E501
 
 PARSER = {
@@ -37,7 +37,7 @@ PARSER = {
 }
 ARGUMENTS = (
     *scenario_arguments(default=None),
-    argument("--vary", action="append", default=[], metavar="NAME=VALUES", help=VARY),
+    argument("--vary", action="append", default=[], metavar="NAME=VALUES", help=_VARY),
     argument("--cases", action="store_true", help="run all cases of the scenario, each with all --vary"),
     argument("--by", metavar="NAME", help="one line for each value of NAME, such as case: means of its runs"),
     argument(
@@ -81,7 +81,7 @@ def execute(options: argparse.Namespace) -> int:
     else:
         print(result.text() if options.by is None else studies.groups_text(result, options.by))
         print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
-    return SOME_FAILED if result.failed else DONE
+    return _SOME_FAILED if result.failed else DONE
 
 
 def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:

@@ -18,8 +18,8 @@ from fmus.cli.commands import argument
 
 Asked = tuple[dict[str, Any], dict[str, Any], list[str]]
 """Keys of the default tolerance, tolerances by signal or pattern, and what to ignore."""
-FILE_TABLES = ("default", "signals", "ignore")
-BY_SIGNAL_EXAMPLE = "'train.*=1e-3', or 'train.speed={absolute = 0.01}'"
+_FILE_TABLES = ("default", "signals", "ignore")
+_BY_SIGNAL_EXAMPLE = "'train.*=1e-3', or 'train.speed={absolute = 0.01}'"
 
 
 TOLERANCES = (
@@ -33,7 +33,7 @@ TOLERANCES = (
         default=[],
         metavar="SIGNAL=VALUE",
         dest="tolerance_settings",
-        help=f"of one signal or pattern: {BY_SIGNAL_EXAMPLE}; may be repeated",
+        help=f"of one signal or pattern: {_BY_SIGNAL_EXAMPLE}; may be repeated",
     ),
     argument(
         "--ignore", action="append", default=[], metavar="PATTERN", help="signals not to compare; may be repeated"
@@ -99,7 +99,7 @@ def _setting(text: str) -> tuple[str, Any]:
             return name.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
     except tomllib.TOMLDecodeError:
         pass
-    raise ComparisonError(f"--set-tolerance {text!r}: expected SIGNAL=VALUE, for instance {BY_SIGNAL_EXAMPLE}.")
+    raise ComparisonError(f"--set-tolerance {text!r}: expected SIGNAL=VALUE, for instance {_BY_SIGNAL_EXAMPLE}.")
 
 
 def _read_file(path: Path) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
@@ -111,8 +111,8 @@ def _read_file(path: Path) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
     except ValueError as error:
         raise ComparisonError(f"{path}: not readable as TOML: {error}") from error
     for key in data:
-        if key not in FILE_TABLES:
-            raise ComparisonError(f"{path}: unknown key {key!r}; {nearest(key, FILE_TABLES)}")
+        if key not in _FILE_TABLES:
+            raise ComparisonError(f"{path}: unknown key {key!r}; {nearest(key, _FILE_TABLES)}")
     default, signals, ignore = data.get("default", {}), data.get("signals", {}), data.get("ignore", [])
     if not isinstance(default, Mapping) or not isinstance(signals, Mapping):
         raise ComparisonError(f"{path}: 'default' and 'signals' are tables, [default] and [signals.\"train.*\"].")

@@ -17,7 +17,7 @@ from cosim.tuning.tuning_result import Tuning
 from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar
 
-DONE, NOT_BETTER = 0, 1
+DONE, _NOT_BETTER = 0, 1
 
 
 def _seeds(text: str) -> list[int]:
@@ -102,7 +102,7 @@ def execute(options: argparse.Namespace) -> int:
         print(f"\nTuned scenario: {directory / 'tuned.toml'}")
     if found.interrupted:
         raise KeyboardInterrupt  # all there is has been printed
-    return NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
+    return _NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
 
 
 def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> Tuning:

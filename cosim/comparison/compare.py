@@ -92,11 +92,11 @@ def compare(
         OutputError: a file cannot be read.
     """
     allowed = Tolerances.of(tolerance, tolerances, ignore)
-    labels = label_of(reference, "reference"), label_of(result, "result")
+    labels = _label_of(reference, "reference"), _label_of(result, "result")
     return compare_results(_result_of(reference), _result_of(result), allowed, labels=labels, extra_fails=extra_fails)
 
 
-def label_of(given: Result | str | Path | Any, otherwise: str) -> str:
+def _label_of(given: Result | str | Path | Any, otherwise: str) -> str:
     """What a result is called in messages.
 
     Args:

@@ -11,8 +11,8 @@ from fmus.text_table import text_table
 
 HEAD = ("signal", "unit", "max error", "at [s]", "allowed", "shift [s]", "outside", "verdict")
 SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
-LONGEST_NAME = 48
-FINDINGS_SHOWN, EVENTS_SHOWN, FAILED_SHOWN = 4, 10, 40
+_LONGEST_NAME = 48
+FINDINGS_SHOWN, EVENTS_SHOWN, _FAILED_SHOWN = 4, 10, 40
 
 
 def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
@@ -24,7 +24,7 @@ def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
     """
     shared = _shared(comparison)
     shown = _shown(comparison, verbose, shared)
-    limit = len(shown) if verbose else FAILED_SHOWN
+    limit = len(shown) if verbose else _FAILED_SHOWN
     lines = [_headline(comparison)]
     if shown:
         lines += ["", *_table(shown[:limit])]
@@ -93,7 +93,7 @@ def _table(signals: Sequence[SignalComparison]) -> list[str]:
 
 
 def _row(signal: SignalComparison) -> tuple[str, ...]:
-    name = signal.name if len(signal.name) <= LONGEST_NAME else f"...{signal.name[3 - LONGEST_NAME :]}"
+    name = signal.name if len(signal.name) <= _LONGEST_NAME else f"...{signal.name[3 - _LONGEST_NAME :]}"
     share = "" if isnan(signal.max_error) else f"{100.0 * signal.share_outside:.3g} %"
     shift = f"{signal.max_shift:.3g}" if signal.max_shift else ""
     numbers = [

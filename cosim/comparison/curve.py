@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.errors import ComparisonError
 
-FEW_VALUES = 16  # a signal of so few whole numbers that mostly stands still is an indicator, a mode or a counter: held
+_FEW_VALUES = 16  # a signal of so few whole numbers that mostly stands still is an indicator, a mode or a counter: held
 
 
 ROUNDING, NOISE = 1e-12, 1e-6
@@ -111,4 +111,4 @@ def looks_held(values: np.ndarray) -> bool:
     if len(values) < 3 or not np.array_equal(values, np.rint(values)):
         return False
     changes = np.flatnonzero(np.diff(values))
-    return 2 * len(changes) < len(values) and len(np.unique(values[np.append(changes, len(values) - 1)])) <= FEW_VALUES
+    return 2 * len(changes) < len(values) and len(np.unique(values[np.append(changes, len(values) - 1)])) <= _FEW_VALUES

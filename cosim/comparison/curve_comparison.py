@@ -15,7 +15,7 @@ from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Curves, SignalComparison
 
 WORST = 5  # points that are kept
-WINDOW_STEPS, WINDOW_SHARE, WINDOW_TOLERANCES = 20.0, 0.01, 10.0  # how far off a jump is looked for
+_WINDOW_STEPS, _WINDOW_SHARE, _WINDOW_TOLERANCES = 20.0, 0.01, 10.0  # how far off a jump is looked for
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def compare_signal(task: Task) -> SignalComparison:
     Args:
         task: the signal with its reference and what is allowed.
     """
-    allowed = allowed_for(task)
+    allowed = _allowed_for(task)
     if _same(task.reference, task.result):
         return _equal(task, allowed)
     points, jumps = compare_points(task.reference, task.result, allowed)
@@ -68,7 +68,7 @@ def compare_signal(task: Task) -> SignalComparison:
     )
 
 
-def allowed_for(task: Task) -> Allowed:
+def _allowed_for(task: Task) -> Allowed:
     """What the tolerance means for this reference.
 
     Args:
@@ -77,7 +77,7 @@ def allowed_for(task: Task) -> Allowed:
     scale = task.reference.scale
     time = task.tolerance.time_for(task.length)
     step = max(task.reference.step, task.result.step)
-    window = max(WINDOW_TOLERANCES * time, WINDOW_STEPS * step, WINDOW_SHARE * task.length, 1e-9)
+    window = max(_WINDOW_TOLERANCES * time, _WINDOW_STEPS * step, _WINDOW_SHARE * task.length, 1e-9)
     slack = rounding(task.reference.time[0], task.reference.time[-1]) if time > 0.0 else 0.0
     return Allowed(task.tolerance.value_for(scale), time + slack, scale, window)
 

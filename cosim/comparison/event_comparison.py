@@ -14,8 +14,8 @@ from cosim.comparison.span import rounding
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.verdict import EventComparison, EventDifference, Record
 
-LARGEST_GROUP = 1000  # events with one name: more of them are paired in order, not by the best assignment
-NEAR_STEPS = 0.01  # of the length: how far off an event with another name may be the same
+_LARGEST_GROUP = 1000  # events with one name: more of them are paired in order, not by the best assignment
+_NEAR_STEPS = 0.01  # of the length: how far off an event with another name may be the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def compare_events(
         reference, result: the events. tolerance: of times and payload. length: of the reference [s].
     """
     limits = event_limits(reference, tolerance, length)
-    pairs, missing, extra = _match(reference, result, max(10.0 * limits.time, NEAR_STEPS * length))
+    pairs, missing, extra = _match(reference, result, max(10.0 * limits.time, _NEAR_STEPS * length))
     differences = [d for pair in pairs for d in _differences(*pair, limits)]
     differences += [EventDifference("missing", one.record, None, f"{one.name} is missing") for one in missing]
     differences += [EventDifference("extra", None, two.record, f"{two.name} is only in the result") for two in extra]
@@ -124,7 +124,7 @@ def _assign(one: list[Event], two: list[Event]) -> tuple[list[Pair], list[Event]
     """Pairs with the least sum of time differences, and what is left on either side."""
     count = min(len(one), len(two))
     rows = columns = np.arange(count)
-    if len(one) != len(two) and count and max(len(one), len(two)) <= LARGEST_GROUP:
+    if len(one) != len(two) and count and max(len(one), len(two)) <= _LARGEST_GROUP:
         stamps = [np.array([record.stamp for record in side]) for side in (one, two)]
         rows, columns = scipy.optimize.linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
     taken = set(rows.tolist()), set(columns.tolist())

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.comparison.curve import Curve
 
 NEIGHBOURS = 4  # steps on either side that a step is held against
-FAR_LARGER = 10.0  # times the steepest of them; an exponential must fall to a tenth in one sample to look like a jump
+_FAR_LARGER = 10.0  # times the steepest of them; an exponential must fall to a tenth in one sample to look like a jump
 SMALLEST = 1e-6  # of the range: rounding is no jump
 SAME_INSTANT = 1e-9  # of the time: how far rounding, also that of a file, moves an instant
 
@@ -103,4 +103,4 @@ def _stands_out(change: np.ndarray, duration: np.ndarray) -> np.ndarray:
         return np.zeros(len(slope), dtype=bool)
     padded, count = np.pad(slope, NEIGHBOURS), len(slope)
     sides = [padded[NEIGHBOURS + k :][:count] for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k]
-    return np.asarray((duration > 0.0) & (change > FAR_LARGER * np.maximum.reduce(sides) * duration))
+    return np.asarray((duration > 0.0) & (change > _FAR_LARGER * np.maximum.reduce(sides) * duration))

@@ -9,8 +9,8 @@ import numpy as np
 from cosim.comparison.jumps import Jumps, choose, shifts
 
 UNMATCHED = 0.9  # cost of a jump that stays alone; a pair costs up to 2.5
-UNLIKE = 0.3  # cost of a pair whose values are not within the tolerance, at least
-LARGEST_BAND = 64  # jumps to either side that are looked at
+_UNLIKE = 0.3  # cost of a pair whose values are not within the tolerance, at least
+_LARGEST_BAND = 64  # jumps to either side that are looked at
 
 Pairs = tuple[np.ndarray, np.ndarray]
 """Index into the jumps of the reference, and of the result, both rising."""
@@ -57,7 +57,7 @@ def _align(a: Jumps, b: Jumps, window: float, allowed: float, scale: float) -> P
     if not len(a) or not len(b):
         return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
     first, last = np.searchsorted(b.end, a.begin - window), np.searchsorted(b.begin, a.end + window, side="right")
-    band = int(min(max(np.max(last - first), 1), LARGEST_BAND))
+    band = int(min(max(np.max(last - first), 1), _LARGEST_BAND))
     centre = np.searchsorted(b.end, a.end)
     cost = _costs(a, b, centre, band, window, allowed, scale)
     return _trace(_moves(cost, centre, band, len(b)), centre, band, len(b))
@@ -76,7 +76,7 @@ def _costs(
     shift = np.abs(shifts(one, two))
     before, after = np.abs(one.before - two.before), np.abs(one.after - two.after)
     height = np.maximum(np.maximum(np.abs(one.size), np.abs(two.size)), np.finfo(float).tiny)
-    unlike = UNLIKE + 0.7 * np.minimum(np.abs(one.size - two.size) / height, 1.0)
+    unlike = _UNLIKE + 0.7 * np.minimum(np.abs(one.size - two.size) / height, 1.0)
     unlike += np.minimum(0.25 * (before + after) / max(scale, np.finfo(float).tiny), 0.5)
     pair = shift / window + np.where((before <= allowed) & (after <= allowed), 0.0, unlike)
     cost = np.full(other.shape, np.inf)

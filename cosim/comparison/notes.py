@@ -11,7 +11,7 @@ from cosim.comparison.tolerance import Tolerances
 from cosim.errors import nearest
 from cosim.results.result import Result
 
-RUN_KEYS = ("scenario", "start", "stop", "step")
+_RUN_KEYS = ("scenario", "start", "stop", "step")
 COMPONENT_KEYS = {"model": "is model", "guid": "has the GUID", "fmi_version": "has FMI version", "preset": "has preset"}
 
 
@@ -36,7 +36,7 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
     one, two = reference.summary, result.summary
     lines += [
         f"{key}: {two[key]} instead of {one[key]}."
-        for key in RUN_KEYS
+        for key in _RUN_KEYS
         if key in one and key in two and one[key] != two[key]
     ]
     lines += _versions(one.get("versions"), two.get("versions"))

@@ -11,7 +11,7 @@ from cosim.comparison.jumps import SAME_INSTANT, Jumps, choose, find_jumps, shif
 from cosim.comparison.matching import match_jumps
 from cosim.comparison.tube import band_of, held_band, project, widen_at_ends
 
-ROUNDED_TIME = 1e-2  # of the allowed time: a baseline rounds times to less than that
+_ROUNDED_TIME = 1e-2  # of the allowed time: a baseline rounds times to less than that
 MANY = 10  # jumps, from which on those at other instants must look like a delay
 
 
@@ -164,7 +164,7 @@ def _view(reference: Curve, result: Curve, tolerance: float) -> _View:
 
 def _same_rows(one: np.ndarray, two: np.ndarray, tolerance: float) -> bool:
     """Whether two sides have the same rows, but for digits of the times that a baseline does not keep."""
-    return len(one) == len(two) and bool(np.all(np.abs(one - two) <= ROUNDED_TIME * tolerance))
+    return len(one) == len(two) and bool(np.all(np.abs(one - two) <= _ROUNDED_TIME * tolerance))
 
 
 def _overlap_rows(curve: Curve, other: Curve) -> int:

@@ -8,7 +8,7 @@ from cosim.comparison.curve import Curve
 from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Kind
 
-GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
+_GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
 
 
 def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
@@ -64,7 +64,7 @@ def gap_findings(
             if off > allowed:
                 text = f"{name}: the {who} has no rows from {begin:.9g} to {end:.9g} s, the other has {b - a} there"
                 found.append(
-                    ComparisonFinding("gap", begin, end, np.nan, np.nan, end - begin, GAP_STEPS * lacking.step, text)
+                    ComparisonFinding("gap", begin, end, np.nan, np.nan, end - begin, _GAP_STEPS * lacking.step, text)
                 )
     return found
 
@@ -79,8 +79,8 @@ def rounding(*times: float) -> float:
 
 
 def _gaps(lacking: Curve, full: Curve) -> np.ndarray:
-    rows = np.flatnonzero(np.diff(lacking.time) > GAP_STEPS * lacking.step)
+    rows = np.flatnonzero(np.diff(lacking.time) > _GAP_STEPS * lacking.step)
     if not len(rows):
         return rows
     begin = np.searchsorted(full.time, lacking.time[rows], side="right")
-    return np.asarray(rows[np.searchsorted(full.time, lacking.time[rows + 1]) - begin >= GAP_STEPS])
+    return np.asarray(rows[np.searchsorted(full.time, lacking.time[rows + 1]) - begin >= _GAP_STEPS])

@@ -13,7 +13,7 @@ TIMES = {"stamp": "passed", "delivered_at": "delivered"}
 PAYLOAD = {"position": "m", "true_position": "m", "odometer_reading": "m/s", "location_accuracy": "m"}
 
 
-def keeps_telegrams(result: Result) -> bool:
+def _keeps_telegrams(result: Result) -> bool:
     """Whether a result would have telegrams if there had been any: a run does, a plain table does not.
 
     The summary may say so itself: ``events_recorded``.
@@ -31,7 +31,7 @@ def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, l
     Args:
         reference, result: whose telegrams. tolerance: of times and payload. length: of the reference [s].
     """
-    if not keeps_telegrams(reference) or not keeps_telegrams(result):
+    if not _keeps_telegrams(reference) or not _keeps_telegrams(result):
         return EventComparison(compared=False)
     ours, theirs = ([_event(record) for record in side.events] for side in (reference, result))
     return compare_events(ours, theirs, tolerance, length)

@@ -10,7 +10,7 @@ from cosim.comparison.curve import Curve
 
 
 @dataclass(frozen=True)
-class TubeBand:
+class _TubeBand:
     """Values a curve takes around instants; arrays of shape (instants,).
 
     Args:
@@ -29,7 +29,7 @@ def band_of(
     tolerance: float | np.ndarray,
     first: np.ndarray | int = 0,
     last: np.ndarray | int | None = None,
-) -> TubeBand:
+) -> _TubeBand:
     """Smallest and largest value of the curve in [at - tolerance, at + tolerance], within one piece.
 
     Args:
@@ -48,12 +48,12 @@ def band_of(
     a = np.maximum(np.searchsorted(time, low), first)
     b = np.minimum(np.searchsorted(time, high, side="right"), last)
     smallest, largest = _range_extremes(values, a, b)
-    return TubeBand(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), judged)
+    return _TubeBand(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), judged)
 
 
 def widen_at_ends(
-    band: TubeBand, curve: Curve, at: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray
-) -> TubeBand:
+    band: _TubeBand, curve: Curve, at: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray
+) -> _TubeBand:
     """The band with what the curve may have been within the allowed time before its first row and after its last one.
 
     Nobody knows, so the curve is continued by its own reflection in its end point: a ramp as the same ramp. Without
@@ -80,10 +80,10 @@ def widen_at_ends(
             inner = band_of(curve, end, reach, first[near], last[near])
             low[near] = np.minimum(low[near], 2.0 * value - inner.high)
             high[near] = np.maximum(high[near], 2.0 * value - inner.low)
-    return TubeBand(low, high, band.judged)
+    return _TubeBand(low, high, band.judged)
 
 
-def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> TubeBand:
+def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:
     """Values of a held curve that are allowed for another on the same rows, all the time that a row holds.
 
     A row holds from its own time until that of the next. A value that comes one row late is right at the begin of the
@@ -100,10 +100,10 @@ def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarra
     judged = np.stack([begin.judged, middle.judged & holds, end.judged & holds])
     low = np.max(np.where(judged, [begin.low, middle.low, end.low], -np.inf), axis=0)
     high = np.min(np.where(judged, [begin.high, middle.high, end.high], np.inf), axis=0)
-    return TubeBand(np.minimum(low, high), high, np.asarray(judged.any(axis=0)))
+    return _TubeBand(np.minimum(low, high), high, np.asarray(judged.any(axis=0)))
 
 
-def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> TubeBand:
+def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:
     """As `band_of`, of a held curve just before the instants."""
     time = curve.time
     begin, end = time[first], time[np.minimum(last, len(time) - 1)]
@@ -111,7 +111,7 @@ def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.nd
     low = np.clip(until - tolerance, begin, end)
     a = np.clip(np.searchsorted(time, low) - 1, first, last - 1)
     b = np.clip(np.searchsorted(time, until + tolerance), a + 1, last)
-    return TubeBand(*_range_extremes(curve.filled, a, b), judged)
+    return _TubeBand(*_range_extremes(curve.filled, a, b), judged)
 
 
 def project(curve: Curve, onto: Curve, tolerance: float) -> Curve:

@@ -15,7 +15,7 @@ from cosim.diagnostics.sampled_times import BINS, bin_of, typical_seconds
 
 EARLY, EVERY = 3, 64  # the third call is timed, the first ones are not like the others; then every 64th
 KINDS = ("get", "set", "event", "save", "restore", "release")
-OF_METHOD = {
+_OF_METHOD = {
     "notify": "event",
     "handle_event": "event",
     "report_clock": "event",
@@ -121,7 +121,7 @@ def count_methods(cls: type) -> None:
     Args:
         cls: the class.
     """
-    for name, kind in OF_METHOD.items():
+    for name, kind in _OF_METHOD.items():
         method = getattr(cls, name, None)
         if callable(method) and not hasattr(method, "counted_as") and not hasattr(method, "__isabstractmethod__"):
             setattr(cls, name, counted(method, kind))

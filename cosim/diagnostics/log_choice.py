@@ -10,7 +10,7 @@ from fmpy.model_description import ModelDescription
 from cosim.diagnostics.messages import LogChoice
 from cosim.errors import CouplingError, nearest
 
-STATUS_CATEGORIES = frozenset({"logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"})
+_STATUS_CATEGORIES = frozenset({"logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"})
 """Standard names of the categories for what is wrong."""
 
 
@@ -41,7 +41,7 @@ def log_switch(name: str, description: ModelDescription, choice: LogChoice | Non
     if choice == "all":
         return LogSwitch(True)
     if choice == "errors":
-        wrong = tuple(c for c in declared if c in STATUS_CATEGORIES)
+        wrong = tuple(c for c in declared if c in _STATUS_CATEGORIES)
         return LogSwitch(True, wrong) if wrong else None
     for category in choice:
         if category not in declared:

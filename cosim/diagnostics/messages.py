@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 from fmus.plain import plain
 
-FIRST_KEPT = LAST_KEPT = 200
-LONGEST_TEXT = 2000  # letters
+_FIRST_KEPT = _LAST_KEPT = 200
+_LONGEST_TEXT = 2000  # letters
 STATUSES = ("ok", "warning", "discard", "error", "fatal", "pending")
 OMITTED = "omitted"
 """Status of the line that stands for messages that were not kept."""
@@ -56,7 +56,7 @@ class MessageLog:
         component: its name. first, last: how many to keep of each.
     """
 
-    def __init__(self, component: str, first: int = FIRST_KEPT, last: int = LAST_KEPT) -> None:
+    def __init__(self, component: str, first: int = _FIRST_KEPT, last: int = _LAST_KEPT) -> None:
         self.component = component
         self.silent = False
         self.counts: Counter[str] = Counter()
@@ -74,7 +74,7 @@ class MessageLog:
         Args:
             time: where the component stands [s]. text: what it says. status: of FMI, number or word. category: its own.
         """
-        shown = _decoded(text).strip()[:LONGEST_TEXT]
+        shown = _decoded(text).strip()[:_LONGEST_TEXT]
         if not shown:
             return
         message = Message(time, self.component, _decoded(category).strip(), _status(status), shown)

@@ -12,7 +12,7 @@ from itertools import accumulate
 
 BINS = 40
 """The last one holds calls of nine minutes; as in the C stepper."""
-ABOVE_MEDIAN = 3
+_ABOVE_MEDIAN = 3
 """Bins above the one of the median that still count: calls up to 8 to 16 times as long."""
 
 
@@ -38,5 +38,5 @@ def typical_seconds(calls: Sequence[int], seconds: Sequence[float]) -> float:
     if not total:
         return 0.0
     median = next(number for number, below in enumerate(accumulate(calls)) if 2 * below >= total)
-    last = median + ABOVE_MEDIAN + 1
+    last = median + _ABOVE_MEDIAN + 1
     return sum(seconds[:last]) / sum(calls[:last])

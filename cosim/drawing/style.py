@@ -20,7 +20,7 @@ from matplotlib.rcsetup import cycler
 P = ParamSpec("P")
 T = TypeVar("T")
 
-BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
+BLUE, VERMILION, GREEN, _PURPLE, _ORANGE, _SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 SLATE, VIOLET, AMBER = "#33475B", "#7A4FA3", "#F0C36D"
 BLACK, INK, QUIET, MARK = "#000000", "#1B1B1B", "#5F5F5F", "#777777"  # lines; texts; what explains; what is no curve
 EDGE, GAP, BAND, GRID = "#9A9A9A", "#A9A9A9", "#B4B4B4", "#E3E3E3"  # frames; areas; the true values; the grid
@@ -31,9 +31,9 @@ OBSERVER_LINES: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linestyle": "-", "linewidth": 1.5},
     {"color": VERMILION, "linestyle": (0, (6, 1.5)), "linewidth": 1.5},
     {"color": GREEN, "linestyle": (0, (1.2, 1.0)), "linewidth": 1.9},
-    {"color": PURPLE, "linestyle": (0, (5, 1.2, 1.2, 1.2)), "linewidth": 1.5},
-    {"color": ORANGE, "linestyle": (0, (9, 3)), "linewidth": 1.5},
-    {"color": SKY, "linestyle": (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2)), "linewidth": 1.5},
+    {"color": _PURPLE, "linestyle": (0, (5, 1.2, 1.2, 1.2)), "linewidth": 1.5},
+    {"color": _ORANGE, "linestyle": (0, (9, 3)), "linewidth": 1.5},
+    {"color": _SKY, "linestyle": (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2)), "linewidth": 1.5},
 )
 # a band, on which the estimates lie
 TRUE_LINE: dict[str, Any] = {"color": BAND, "linestyle": "-", "linewidth": 5.0}
@@ -43,9 +43,9 @@ TRUE_LINE_ABOVE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth"
 NOISY_LINE: dict[str, Any] = {"linestyle": "-", "linewidth": 0.5, "alpha": 0.55, "zorder": 1.6}
 WILD_LINE: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.6, "zorder": 1.2}  # a diverged curve stays behind the others
 
-PANEL_SIZE = (8.2, 3.4)  # inches
+_PANEL_SIZE = (8.2, 3.4)  # inches
 HEADLINE = 11.5  # font size [pt]
-DPI = 130  # dots per inch
+_DPI = 130  # dots per inch
 TIME = "Time [s]"  # on the axis of every curve against time
 
 RC: dict[str, Any] = {
@@ -120,7 +120,7 @@ def run_line(index: int) -> dict[str, Any]:
     return {"color": colour["color"], "linestyle": dashed[(index - 1 + index // count) % len(dashed)], "linewidth": 1.5}
 
 
-def new_figure(size: tuple[float, float] = PANEL_SIZE) -> Figure:
+def new_figure(size: tuple[float, float] = _PANEL_SIZE) -> Figure:
     """An empty figure on a canvas of its own, without pyplot.
 
     Args:
@@ -144,7 +144,7 @@ def headline(figure: Figure, text: str) -> None:
     figure.suptitle(text, fontsize=HEADLINE, fontweight="bold", x=0.01, ha="left")
 
 
-def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL_SIZE) -> Axes:
+def axes_or_new(ax: Axes | None, size: tuple[float, float] = _PANEL_SIZE) -> Axes:
     """The axes given, or those of a new figure.
 
     Args:
@@ -154,7 +154,7 @@ def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL_SIZE) -> Axes
     return ax if ax is not None else new_figure(size).add_subplot()
 
 
-def png(figure: Figure | SubFigure, dpi: int = DPI) -> bytes:
+def png(figure: Figure | SubFigure, dpi: int = _DPI) -> bytes:
     """A figure as PNG, without time stamps, so that equal figures are equal bytes.
 
     Args:

@@ -23,7 +23,7 @@ LONGEST = 10
 FIXED_SHARE, SHARE_OF_DISTANCE = 5.0, 0.05
 ENVELOPE = "SUBSET-041: 5 m + 5 % of the distance since the last balise"
 PLAIN_ODOMETER = "plain odometer"
-DISTANCE = "distance"
+_DISTANCE = "distance"
 """Output of an odometer that counts the way of the wheel [m]."""
 STANDING = 0.5
 """Below this speed [m/s] an error in metres has no running time worth the name."""
@@ -244,7 +244,7 @@ def _odometer_way(result: Result, spec: ReportSpec) -> np.ndarray | None:
     reading = recorded(result, spec.odometer)
     if spec.odometer is None or reading is None:
         return None
-    name = f"{spec.odometer.rpartition('.')[0]}.{DISTANCE}"
+    name = f"{spec.odometer.rpartition('.')[0]}.{_DISTANCE}"
     counted = recorded(result, name)
     if counted is not None:
         sampled = any(info.name == name and info.variability == "discrete" for info in result.signals)

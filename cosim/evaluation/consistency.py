@@ -19,7 +19,7 @@ from fmu_observer.formulas.filtering.covariance_consistency import Consistency, 
 
 Kind = Literal["NIS", "NEES", "error"]
 STD = "_std"
-NOT_MEASUREMENTS = ("_std", "_covariance", "_likelihood")
+_NOT_MEASUREMENTS = ("_std", "_covariance", "_likelihood")
 
 ADVICE = {
     "overconfident": "it trusts itself more than its errors allow. Increase the covariance of the process noise, or "
@@ -33,9 +33,9 @@ MEANING = {
     "error": "how far this one is from the truth, squared, over the variance that it tells for that",
 }
 """What is judged, by kind, for those who do not know the words."""
-NOTHING_WRONG = 1e-6
+_NOTHING_WRONG = 1e-6
 """Mean square of errors, in units of what is told, below which a run holds no noise to judge a covariance by."""
-COLOURED = (
+_COLOURED = (
     "Innovations look small because the error lasts (a wheel that creeps, a bias): give it a state, or increase the "
     "covariance of the process noise"
 )
@@ -124,7 +124,7 @@ def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
                 f"{label(spec, observer)} leaves out an error that lasts (is not white): its {entry.name} is "
                 f"{number(found.mean)} on average where {number(found.degrees)} is expected, yet its {larger.name} is "
                 f"{number(larger.found.mean)} where {number(larger.found.degrees)} is ({entry.name}: "
-                f"{MEANING[entry.kind]}; {larger.name}: {MEANING[larger.kind]}). {COLOURED}; see docs/consistency.md."
+                f"{MEANING[entry.kind]}; {larger.name}: {MEANING[larger.kind]}). {_COLOURED}; see docs/consistency.md."
             )
             continue
         yield (
@@ -202,7 +202,7 @@ def _judged(
     if np.count_nonzero(known) < FEWEST_INSTANTS:
         return
     time, squares, degrees = time[known], squares[known], degrees[known]
-    if kind != "NIS" and squares.mean() < NOTHING_WRONG * degrees.mean():
+    if kind != "NIS" and squares.mean() < _NOTHING_WRONG * degrees.mean():
         return  # the plant moves without noise as the filter expects it to
     found = judge(squares, degrees, white=kind == "NIS")
     yield FilterConsistency(observer, kind, quantity, time, squares, degrees, found)
@@ -226,7 +226,7 @@ def measurement_count(outputs: Iterable[str]) -> int:
 
 
 def _ends(name: str) -> bool:
-    return name.partition("[")[0].endswith(NOT_MEASUREMENTS)
+    return name.partition("[")[0].endswith(_NOT_MEASUREMENTS)
 
 
 def _instants(result: Result, spec: ReportSpec) -> np.ndarray:

@@ -18,7 +18,7 @@ KINDS = {
     "states": ("save", "restore", "release"),
 }
 """Columns, and the kinds of calls in each."""
-NOT_TIMED_IN_C = ("get", "set")
+_NOT_TIMED_IN_C = ("get", "set")
 """Columns that the compiled stepper counts and does not time."""
 
 
@@ -59,7 +59,7 @@ def _row(entry: Mapping[str, Any], compiled: bool) -> list[str]:
     cost = entry["cost"] if isinstance(entry["cost"], Mapping) else {}
     counts = entry.get("message_counts")
     messages = sum(counts.values()) if isinstance(counts, Mapping) else 0
-    cells = [_cell(cost, kinds, not (compiled and column in NOT_TIMED_IN_C)) for column, kinds in KINDS.items()]
+    cells = [_cell(cost, kinds, not (compiled and column in _NOT_TIMED_IN_C)) for column, kinds in KINDS.items()]
     return [str(entry.get("name")), *cells, str(messages)]
 
 

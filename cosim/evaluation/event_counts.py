@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from cosim.results.result import BaliseRecord
 
-KNOWN_OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "repeated", "undelivered")
-UNDELIVERED = "undelivered"
+_KNOWN_OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "repeated", "undelivered")
+_UNDELIVERED = "undelivered"
 USED = ("accepted", "replayed", "late", "doubted", "told")
 """Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that does not say."""
-IN_WORDS = {"told": "told, does not say"}
+_IN_WORDS = {"told": "told, does not say"}
 
 
 @dataclass(frozen=True, slots=True)
-class EventCounts:
+class _EventCounts:
     """Counts over a run.
 
     Args:
@@ -32,19 +32,19 @@ class EventCounts:
     outcomes: dict[str, Counter[str]]
 
 
-def count_events(events: Sequence[BaliseRecord]) -> EventCounts:
+def count_events(events: Sequence[BaliseRecord]) -> _EventCounts:
     """Count telegrams by kind, and by receiver and outcome.
 
     Args:
         events: the telegrams.
     """
     kinds = Counter(event.kind for event in events)
-    waiting = sum(bool(event.outcomes) and set(event.outcomes.values()) == {UNDELIVERED} for event in events)
+    waiting = sum(bool(event.outcomes) and set(event.outcomes.values()) == {_UNDELIVERED} for event in events)
     outcomes: dict[str, Counter[str]] = {}
     for event in events:
         for receiver, outcome in event.outcomes.items():
             outcomes.setdefault(receiver, Counter())[outcome] += 1
-    return EventCounts(kinds["true"] + kinds["false"] - waiting, kinds["missed"], waiting, kinds["false"], outcomes)
+    return _EventCounts(kinds["true"] + kinds["false"] - waiting, kinds["missed"], waiting, kinds["false"], outcomes)
 
 
 def outcome_columns(outcomes: Iterable[Mapping[str, int]]) -> dict[str, str]:
@@ -54,8 +54,8 @@ def outcome_columns(outcomes: Iterable[Mapping[str, int]]) -> dict[str, str]:
         outcomes: number of telegrams by outcome, for each receiver.
     """
     seen = dict.fromkeys(outcome for counts in outcomes for outcome, count in counts.items() if count)
-    ordered = [*(o for o in KNOWN_OUTCOMES if o in seen), *(o for o in seen if o not in KNOWN_OUTCOMES)]
-    return {outcome: IN_WORDS.get(outcome, outcome) for outcome in ordered}
+    ordered = [*(o for o in _KNOWN_OUTCOMES if o in seen), *(o for o in seen if o not in _KNOWN_OUTCOMES)]
+    return {outcome: _IN_WORDS.get(outcome, outcome) for outcome in ordered}
 
 
 def accepted_stamps(events: Sequence[BaliseRecord], receiver: str | None = None) -> list[float]:

@@ -23,7 +23,7 @@ GRACE = 0.5
 """A detection that begins so soon after the end of a fault is still of that fault [s]."""
 LEVEL = 0.95
 HOUR = 3600.0
-SEPARATE = 1e-6  # [s]: intervals closer than that are one
+_SEPARATE = 1e-6  # [s]: intervals closer than that are one
 
 Interval = tuple[float, float]
 
@@ -88,7 +88,7 @@ class FaultDetection:
         Args:
             limit: longest delay [s].
         """
-        return not self.missed and max(self.start_delays, default=0.0) <= limit + SEPARATE
+        return not self.missed and max(self.start_delays, default=0.0) <= limit + _SEPARATE
 
     @property
     def missed_interval(self) -> Interval:
@@ -155,13 +155,13 @@ def judged_detections(
     starts, ends, matched = [], [], set()
     for number, (a, b) in enumerate(faults, 1):
         next_begin = faults[number][0] if number < len(faults) else inf
-        last_begin = min(b + grace, next_begin - SEPARATE)
-        own = [k for k, (c, _) in enumerate(detections) if a - SEPARATE <= c <= last_begin]
+        last_begin = min(b + grace, next_begin - _SEPARATE)
+        own = [k for k, (c, _) in enumerate(detections) if a - _SEPARATE <= c <= last_begin]
         matched |= set(own)
-        if own and (delay_limit is None or detections[own[0]][0] <= a + delay_limit + SEPARATE):
+        if own and (delay_limit is None or detections[own[0]][0] <= a + delay_limit + _SEPARATE):
             starts.append(max(detections[own[0]][0] - a, 0.0))
             last = detections[own[-1]][1]
-            ends.append(inf if last >= end - SEPARATE and last > b + grace else last - b)
+            ends.append(inf if last >= end - _SEPARATE and last > b + grace else last - b)
     return starts, ends, len(detections) - len(matched)
 
 
@@ -180,7 +180,7 @@ def intervals(time: np.ndarray, on: np.ndarray) -> list[Interval]:
     found = [(float(times[i]), float(times[k])) for i, k in zip(starts, ends, strict=True) if times[k] > times[i]]
     joined: list[Interval] = []
     for a, b in found:  # an event within has two rows of one time
-        if joined and a - joined[-1][1] <= SEPARATE:
+        if joined and a - joined[-1][1] <= _SEPARATE:
             joined[-1] = (joined[-1][0], b)
         else:
             joined.append((a, b))

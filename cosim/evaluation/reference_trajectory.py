@@ -15,7 +15,7 @@ from fmu_observer.formulas.filtering.smoothing import extended_pass, smooth
 
 JERK = 0.1  # spectral density of the train's jerk [m2/s5] [ours]
 SCALE = 0.02  # how far the odometer's wheel radius may be off, relative [1] [ours]
-DRIFT = 1e-7  # spectral density of that [1/s] [ours]
+_DRIFT = 1e-7  # spectral density of that [1/s] [ours]
 GATE = 5.0  # standard deviations beyond which a reading is taken for a slip
 SLIP = 1.0  # how far a reading may be off what the train can have reached, however uncertain that is [m/s] [ours]
 HELD = 0.5  # share of repeated readings from which on the odometer is taken to be held between samples
@@ -177,7 +177,7 @@ def _process(dt: float, density: float) -> np.ndarray:
     """Covariance of integrated white jerk over a step, and of the drift of the odometer."""
     Q = np.zeros((4, 4))
     Q[:3, :3] = integrated_noise(3, dt, density)
-    Q[3, 3] = DRIFT * dt
+    Q[3, 3] = _DRIFT * dt
     return Q
 
 

@@ -17,7 +17,7 @@ from cosim.evaluation.roles import estimation_error, label, phases, recorded
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
-STANDSTILL = 0.01
+_STANDSTILL = 0.01
 """A train that is never faster than this [m/s] stands."""
 
 
@@ -40,7 +40,7 @@ def _of_the_journey(result: Result, spec: ReportSpec) -> list[str]:
     speed = recorded(result, spec.true_speed)
     if speed is None or not len(result.time):
         return []
-    moving = np.flatnonzero(~(np.abs(speed) <= STANDSTILL))
+    moving = np.flatnonzero(~(np.abs(speed) <= _STANDSTILL))
     found = list(_standing(result, spec, moving))
     if result.failure is None and spec.observers:
         found += _empty_phases(result, spec)
@@ -61,7 +61,7 @@ def all_warnings(result: Result, spec: ReportSpec) -> list[str]:
 def _standing(result: Result, spec: ReportSpec, moving: np.ndarray) -> Iterator[str]:
     if not len(moving):
         yield (
-            f"The train never moves: {spec.true_speed} stays below {STANDSTILL:g} m/s up to {_given(result.time[-1])} "
+            f"The train never moves: {spec.true_speed} stays below {_STANDSTILL:g} m/s up to {_given(result.time[-1])} "
             f"s. "
             "Errors beside it say nothing; let the run go on, or have something drive the train."
         )
@@ -102,7 +102,7 @@ def largest_tolerable(result: Result, spec: ReportSpec) -> float:
     speed, settled = recorded(result, spec.true_speed), result.time >= spec.evaluate_after
     if speed is None or not np.any(settled):
         return inf
-    return max(judged_size(result.time[settled], speed[settled]).max_abs, STANDSTILL)
+    return max(judged_size(result.time[settled], speed[settled]).max_abs, _STANDSTILL)
 
 
 def _worse_than_none(result: Result, spec: ReportSpec) -> Iterator[str]:

@@ -13,9 +13,9 @@ from cosim.evaluation.facts import mapping_entry
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
-SPEC_ENTRY = "report"  # of the summary
-SIGNAL_ROLES = (*(f.name for f in fields(ReportSpec) if f.name.startswith("true_")), "odometer", "speed_reference")
-GUESSED = {  # role: signal of a plant
+_SPEC_ENTRY = "report"  # of the summary
+_SIGNAL_ROLES = (*(f.name for f in fields(ReportSpec) if f.name.startswith("true_")), "odometer", "speed_reference")
+_GUESSED = {  # role: signal of a plant
     "true_position": "position",
     "true_speed": "speed",
     "true_slip": "slip",
@@ -35,7 +35,7 @@ def spec_of(result: Result, fallback_title: str = "Co-simulation") -> ReportSpec
         ``slip_indicator`` beside a ``position`` or ``speed``; the plant is the first other component with both of
         these.
     """
-    stored = mapping_entry(result, SPEC_ENTRY)
+    stored = mapping_entry(result, _SPEC_ENTRY)
     title = result.summary.get("title")
     default = title if isinstance(title, str) and title else fallback_title
     return _stored(stored, default) if stored else _guessed(result, default)
@@ -47,11 +47,11 @@ def is_guessed(result: Result) -> bool:
     Args:
         result: with its summary.
     """
-    return not mapping_entry(result, SPEC_ENTRY)
+    return not mapping_entry(result, _SPEC_ENTRY)
 
 
 def _stored(data: Mapping[str, Any], title: str) -> ReportSpec:
-    roles = {role: data[role] for role in SIGNAL_ROLES if isinstance(data.get(role), str)}
+    roles = {role: data[role] for role in _SIGNAL_ROLES if isinstance(data.get(role), str)}
     return ReportSpec(
         title=data["title"] if isinstance(data.get("title"), str) else title,
         **roles,
@@ -79,7 +79,7 @@ def _guessed(result: Result, title: str) -> ReportSpec:
     estimates, marks = {"position", "speed"}, {"innovation", "slip_indicator"}
     observers = [name for name, own in signals.items() if own & estimates and own & marks]
     plants = [name for name, own in signals.items() if estimates <= own and name not in observers]
-    roles = {} if not plants else {r: f"{plants[0]}.{s}" for r, s in GUESSED.items() if s in signals[plants[0]]}
+    roles = {} if not plants else {r: f"{plants[0]}.{s}" for r, s in _GUESSED.items() if s in signals[plants[0]]}
     if "reading" in signals.get("odometer", ()):
         roles["odometer"] = "odometer.reading"
     return ReportSpec(title=title, observers=observers, **roles)  # type: ignore[arg-type]  # names of roles only

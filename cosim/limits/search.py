@@ -12,9 +12,9 @@ from fmus import Batch
 
 MEMBERS = 16
 LAST_PART = 0.8  # of a run; behind it the error counts
-LOWER = 32.0  # parts of the range's shortest value down to which is searched
-FEWEST_PERIODS = 10.0  # of a run, for a period to be judged
-COMMUNICATION_STEP = 0.01  # [s]; the inputs are held for so long
+_LOWER = 32.0  # parts of the range's shortest value down to which is searched
+_FEWEST_PERIODS = 10.0  # of a run, for a period to be judged
+_COMMUNICATION_STEP = 0.01  # [s]; the inputs are held for so long
 
 
 def survives(trial: Trial, values: Any) -> np.ndarray:
@@ -32,9 +32,9 @@ def survives(trial: Trial, values: Any) -> np.ndarray:
     if trial.delay_parameter:
         batch.set(trial.delay_parameter, delays)
     _tell(batch, trial, periods, delays)
-    instants = COMMUNICATION_STEP * np.arange(round(trial.stop / COMMUNICATION_STEP) + 1)
+    instants = _COMMUNICATION_STEP * np.arange(round(trial.stop / _COMMUNICATION_STEP) + 1)
     batch.start(0.0)
-    middles = np.minimum(instants + 0.5 * COMMUNICATION_STEP, trial.stop)
+    middles = np.minimum(instants + 0.5 * _COMMUNICATION_STEP, trial.stop)
     names = list(trial.truth(instants[:1]))
     found = batch.run(instants[1:], names, dict(trial.inputs(middles)))
     with np.errstate(invalid="ignore", over="ignore"):
@@ -53,8 +53,8 @@ def reach(trial: Trial) -> tuple[float, float]:
     Args:
         trial: what is run.
     """
-    longest = max(trial.high, trial.stop / FEWEST_PERIODS) if trial.varied == "period" else trial.high
-    return trial.low / LOWER, longest
+    longest = max(trial.high, trial.stop / _FEWEST_PERIODS) if trial.varied == "period" else trial.high
+    return trial.low / _LOWER, longest
 
 
 def practical_limit(trial: Trial, members: int = MEMBERS) -> float:

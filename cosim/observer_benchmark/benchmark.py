@@ -29,7 +29,7 @@ from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[str, int, int], None]
-MICROSECONDS = 1e6
+_MICROSECONDS = 1e6
 
 
 class ObserverBenchmark(BenchmarkScores):
@@ -206,7 +206,7 @@ class _Judge:
             reached = max(
                 round((outcome.result.summary["reached"] - self.sides.table.start) / self.sides.table.step), 1
             )
-            costs.append(MICROSECONDS * outcome.result.summary["seconds"][name] / reached)
+            costs.append(_MICROSECONDS * outcome.result.summary["seconds"][name] / reached)
         self.outcomes[name] = outcome
         kind = next(c["kind"] for c in outcome.result.summary["components"] if c["name"] == name)
         scores = measured(outcome.result, outcome.spec, name)

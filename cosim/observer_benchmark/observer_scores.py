@@ -26,7 +26,7 @@ WHOLE = "whole run"
 
 
 @dataclass(frozen=True)
-class ErrorAtBalises:
+class _ErrorAtBalises:
     """Errors just before telegrams are used: how far the estimate had drifted.
 
     Args:
@@ -91,8 +91,8 @@ class ObserverScore:
     failure: str | None = None
     whole: PhaseMetrics | None = None
     phases: tuple[PhaseMetrics, ...] = ()
-    speed_at_balises: ErrorAtBalises | None = None
-    position_at_balises: ErrorAtBalises | None = None
+    speed_at_balises: _ErrorAtBalises | None = None
+    position_at_balises: _ErrorAtBalises | None = None
     indicator: IndicatorStatistics | None = None
     false_alarms: int | None = None
     certificate: CertifiedGap | None = None
@@ -148,7 +148,7 @@ def measured(result: Result, spec: ReportSpec, name: str) -> dict[str, Any]:
     return found
 
 
-def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quantity) -> ErrorAtBalises | None:
+def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quantity) -> _ErrorAtBalises | None:
     """Errors of an observer on the row before each telegram that it used, from `evaluate_after` on; None without any.
 
     A row pair of the same time stands at each delivery, before and after; of an observer that could not be stopped
@@ -168,11 +168,11 @@ def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quan
         return None
     errors = error[rows_before(result.time, np.array(times))]
     if not np.all(np.isfinite(errors)):
-        return ErrorAtBalises(len(errors), inf, inf, inf)
+        return _ErrorAtBalises(len(errors), inf, inf, inf)
     largest = float(np.max(np.abs(errors)))
     scale = largest or 1.0  # so that the square of a diverged estimate does not overflow
     rms = scale * float(np.sqrt(np.mean((errors / scale) ** 2)))
-    return ErrorAtBalises(len(errors), float(np.mean(errors)), rms, largest)
+    return _ErrorAtBalises(len(errors), float(np.mean(errors)), rms, largest)
 
 
 def divergence(whole: PhaseMetrics | None, tolerable: float) -> str | None:

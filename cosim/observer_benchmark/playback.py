@@ -26,8 +26,8 @@ from cosim.simulation.scenario import Scenario
 from fmu_observer.observers.gated_observer import GatedObserver
 from plant_models.hybrid import Signal
 
-ESTIMATES = ("position", "speed")
-PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
+_ESTIMATES = ("position", "speed")
+_PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
 """Keys of the master table that matter to an observer that only listens: when its inputs reach it, and how."""
 
 
@@ -109,11 +109,11 @@ def _is_observer(scenario: Scenario, table: ScenarioTable, name: str) -> bool:
     if name in (table.report.observers or []):
         return True
     if component.observer is not None:
-        return any(signal.name in ESTIMATES for signal in make_declared(component, where).outputs)
+        return any(signal.name in _ESTIMATES for signal in make_declared(component, where).outputs)
     if component.fmu is None:
         return False
     described = describe_component(name, component, scenario.folder, where)
-    return BALISE_EVENT in described.events and any(n in described.names("output") for n in ESTIMATES)
+    return BALISE_EVENT in described.events and any(n in described.names("output") for n in _ESTIMATES)
 
 
 def _ancestors(roots: Iterable[str], links: Iterable[Link], components: Iterable[str]) -> tuple[str, ...]:
@@ -177,7 +177,7 @@ def playback_scenario(
     if name in wanted and name in sides.in_loop:
         raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
     components: dict[str, Any] = {n: {"recording": str(folder.resolve()), "component": n} for n in wanted if n != name}
-    master = {key: value for key, value in _table(table.master).items() if key in PLAYED_MASTER}
+    master = {key: value for key, value in _table(table.master).items() if key in _PLAYED_MASTER}
     if master.get("algorithm") == "iterate":
         del master["algorithm"]  # there is no loop any more
     data: dict[str, Any] = {
@@ -281,7 +281,7 @@ def train_observers() -> dict[str, type[GatedObserver]]:
         for n, kind in fmu_observer.OBSERVERS.usable().items()
         if isinstance(kind, type)
         and issubclass(kind, GatedObserver)
-        and {signal.name for signal in kind.outputs}.issuperset(ESTIMATES)
+        and {signal.name for signal in kind.outputs}.issuperset(_ESTIMATES)
     }
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger("cosim")
 Verdict = Literal["bit-identical", "within tolerance", "differs"]
-LOUDEST = 5  # signals named in the text
+_LOUDEST = 5  # signals named in the text
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,9 @@ class Rerun:
         counts = f"{rows} rows, {len(self.comparison.signals)} signals, {telegrams} telegrams"
         lines = [f"{self.directory}: {self.verdict} ({counts})."]
         failed = self.comparison.failed
-        lines += [f"  {signal.name}: {_worst(signal)}" for signal in failed[:LOUDEST]]
-        lines += [f"  and {len(failed) - LOUDEST} signals more"] if len(failed) > LOUDEST else []
-        lines += [f"  {difference.text}" for difference in self.comparison.event_differences[:LOUDEST]]
+        lines += [f"  {signal.name}: {_worst(signal)}" for signal in failed[:_LOUDEST]]
+        lines += [f"  and {len(failed) - _LOUDEST} signals more"] if len(failed) > _LOUDEST else []
+        lines += [f"  {difference.text}" for difference in self.comparison.event_differences[:_LOUDEST]]
         if self.verdict == "within tolerance":
             largest = max((s.max_error for s in self.comparison.signals if s.status == "within"), default=0.0)
             lines.append(f"  the largest difference is {largest:.3g} in the unit of its signal")
@@ -121,7 +121,7 @@ def rerun(
     edited = manifest.edited()
     if edited and not trust:
         raise ProvenanceError("\n".join([*edited, "Undo that, or say that you trust what is there now (--trust)."]))
-    scenario = stored_scenario(manifest)
+    scenario = _stored_scenario(manifest)
     settings = dict(overrides or {})
     for name, value in settings.items():
         scenario.set(name, value)
@@ -137,7 +137,7 @@ def rerun(
     return Rerun(Path(directory), manifest, outcome, comparison, verdict, tuple(changes), paths, stored.failure)
 
 
-def stored_scenario(manifest: Manifest) -> Scenario:
+def _stored_scenario(manifest: Manifest) -> Scenario:
     """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written
     again.
 

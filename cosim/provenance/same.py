@@ -21,13 +21,13 @@ def same_result(first: Result, second: Result) -> bool:
         first: one of them. second: the other.
     """
     return (
-        same_table(first.table, second.table)
+        _same_table(first.table, second.table)
         and same_events(first.events, second.events)
         and same_events(first.packets, second.packets)
     )
 
 
-def same_table(first: np.ndarray, second: np.ndarray) -> bool:
+def _same_table(first: np.ndarray, second: np.ndarray) -> bool:
     """Whether two tables have the same columns in the same order and the same bits in every row.
 
     Args:

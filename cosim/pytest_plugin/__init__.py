@@ -17,7 +17,7 @@ from cosim.pytest_plugin.records import Records
 
 __all__ = ["FmuRegression", "fmu_regression"]
 
-ERROR_STREAM: pytest.StashKey[int] = pytest.StashKey()
+_ERROR_STREAM: pytest.StashKey[int] = pytest.StashKey()
 """As it was before pytest captured it: what an FMU did that ends the session must be seen."""
 
 
@@ -38,7 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config: of the session.
     """
     markers.register(config)
-    config.stash[ERROR_STREAM] = sentinel.report_to_copy_of_stderr()
+    config.stash[_ERROR_STREAM] = sentinel.report_to_copy_of_stderr()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -105,4 +105,4 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         config: of the session.
     """
     Records.of(config).remove()
-    os.close(config.stash[ERROR_STREAM])
+    os.close(config.stash[_ERROR_STREAM])

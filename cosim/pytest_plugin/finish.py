@@ -16,7 +16,7 @@ from cosim.pytest_plugin.records import Records, RegressionRecord
 TITLE = "fmu baselines"
 LINES = 6
 """Lines of a difference shown at the end; the failure itself tells all."""
-WRITTEN: pytest.StashKey[list[str]] = pytest.StashKey()
+_WRITTEN: pytest.StashKey[list[str]] = pytest.StashKey()
 REFUSED: pytest.StashKey[str] = pytest.StashKey()
 """Why nothing was written, or an empty text."""
 WORDS = {
@@ -47,7 +47,7 @@ def write_baselines(session: pytest.Session, exitstatus: int) -> None:
         return
     from cosim.baselines.baseline_files import write_texts  # noqa: PLC0415 - only where something is written
 
-    faults = config.stash.setdefault(WRITTEN, [])
+    faults = config.stash.setdefault(_WRITTEN, [])
     for record in staged:
         texts = {file.name: file.read_text(encoding="utf-8") for file in Path(record.staged).iterdir()}
         try:
@@ -94,7 +94,7 @@ def _verb(record: RegressionRecord) -> str:
 
 def _tell_update(terminal: pytest.TerminalReporter, records: list[RegressionRecord], config: pytest.Config) -> None:
     staged = [record for record in records if record.staged]
-    for fault in config.stash.get(WRITTEN, []):
+    for fault in config.stash.get(_WRITTEN, []):
         terminal.write_line(f"error: {fault}", red=True)
     if why := config.stash.get(REFUSED, ""):
         advice = "Make them pass" if why == "tests failed" else "Run them to the end"

@@ -21,12 +21,12 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import error_scale
 from cosim.results.result import BaliseRecord, Result
 
-FEWEST_ROWS = 3  # below these there is nothing to enlarge
+_FEWEST_ROWS = 3  # below these there is nothing to enlarge
 MOST = 6  # windows; more would hide what matters
-NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")
+_NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")
 SPIKE = 3.0  # an observer whose error leaves the scale by this factor has diverged: its error is no window
 UNITS: dict[Quantity, str] = {"speed": "m/s", "position": "m"}
-View = Literal["errors", "slip"]
+_View = Literal["errors", "slip"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class ZoomWindow:
     start: float
     end: float
     reasons: tuple[str, ...]
-    view: View = "errors"
+    view: _View = "errors"
     about: str | None = None
 
 
@@ -56,7 +56,7 @@ def notable_windows(result: Result, spec: ReportSpec, most: int = MOST) -> list[
     Returns:
         Windows of which none holds the instant of another; where two would, they are one with both reasons.
     """
-    if len(result.time) < FEWEST_ROWS or not (
+    if len(result.time) < _FEWEST_ROWS or not (
         _all_errors(result, spec, "speed") or _all_errors(result, spec, "position")
     ):
         return []
@@ -85,7 +85,7 @@ class _Scale:
     def bounded(self, length: float) -> float:
         return max(min(length, self.largest), self.least)
 
-    def window(self, time: float, before: float, after: float, reason: str, view: View = "errors") -> ZoomWindow:
+    def window(self, time: float, before: float, after: float, reason: str, view: _View = "errors") -> ZoomWindow:
         return ZoomWindow(time, max(time - before, self.first), min(time + after, self.last), (reason,), view)
 
 
@@ -156,7 +156,7 @@ def _telegrams(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Zoom
     latest = max(told, key=lambda e: e.delivered_at - e.stamp, default=None)
     if latest is not None and latest.delivered_at > latest.stamp:
         yield from _at(scale, [latest], f"A telegram {number(1000 * (latest.delivered_at - latest.stamp))} ms late")
-    refused = (e for e in told if e.kind == "true" and any(outcome in NOT_TAKEN for outcome in e.outcomes.values()))
+    refused = (e for e in told if e.kind == "true" and any(outcome in _NOT_TAKEN for outcome in e.outcomes.values()))
     yield from _at(scale, refused, "A telegram that not every observer took")
     stamps = np.array([*accepted_stamps(result.events), np.inf])
     missed = [e for e in events if e.kind == "missed"]

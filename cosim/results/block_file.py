@@ -21,7 +21,7 @@ BLOCK_FILE = ".block"
 FIRST, COUNT, WIDTH = range(3)
 CELLS = 8
 HEAD = 8 * CELLS
-TRIES = 10
+_TRIES = 10
 
 
 class BlockFile:
@@ -62,7 +62,7 @@ class BlockFile:
 
 
 @dataclass(frozen=True)
-class ReadBlock:
+class _ReadBlock:
     """What a block held when it was read.
 
     Args:
@@ -92,7 +92,7 @@ class ReadBlock:
         return np.ascontiguousarray(converted).view(dtype)[:, 0] if len(converted) else np.empty(0, dtype)
 
 
-def read_block(path: Path) -> ReadBlock:
+def read_block(path: Path) -> _ReadBlock:
     """The block that a process left or is filling.
 
     Args:
@@ -102,7 +102,7 @@ def read_block(path: Path) -> ReadBlock:
         OSError: the file cannot be read. ValueError: it is no block.
     """
     head = b""
-    for _ in range(TRIES):  # it may be emptied into the table, and filled anew, while it is read
+    for _ in range(_TRIES):  # it may be emptied into the table, and filled anew, while it is read
         content = path.read_bytes()
         former, head = head, content[: 8 * (FIRST + 1)]
         if former == head:
@@ -114,4 +114,4 @@ def read_block(path: Path) -> ReadBlock:
     if width < 1 or not 0 <= count <= len(numbers) // width - 2:
         raise ValueError(f"{path} is no block of rows.")
     rows = numbers[2 * width : (2 + count) * width].reshape(count, width)
-    return ReadBlock(first, rows, numbers[:width], numbers[width : 2 * width])
+    return _ReadBlock(first, rows, numbers[:width], numbers[width : 2 * width])

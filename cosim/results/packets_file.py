@@ -33,7 +33,7 @@ def packet_row(packet: PacketRecord) -> dict[str, str]:
     }
 
 
-def packet_from_row(row: Mapping[str, str]) -> PacketRecord:
+def _packet_from_row(row: Mapping[str, str]) -> PacketRecord:
     """The packet of a row.
 
     Args:
@@ -76,4 +76,4 @@ def read_packets(path: str | Path) -> list[PacketRecord]:
         ValueError: the file is not such a table; the message names the line.
         OSError: the file cannot be read.
     """
-    return read_rows(path, COLUMNS, "a table of packets", packet_from_row)
+    return read_rows(path, COLUMNS, "a table of packets", _packet_from_row)

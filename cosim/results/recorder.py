@@ -24,7 +24,7 @@ from cosim.results.table_layout import table_dtype
 
 MEMORY = 256e6  # rows stay in memory up to this size [bytes]
 BLOCK = 4e6  # rows gathered before each writing to the file [bytes]
-FIRST_ROWS = 16
+_FIRST_ROWS = 16
 
 
 class RowStream(Protocol):
@@ -83,7 +83,7 @@ class Recorder:
     ) -> None:
         self._dtype = table_dtype(["time", *(s.name for s in signals)])
         self._width = len(signals) + 1
-        self._limit = max(int(memory // self._dtype.itemsize), FIRST_ROWS)
+        self._limit = max(int(memory // self._dtype.itemsize), _FIRST_ROWS)
         self._folder = folder
         self._file: RowFile | None = None
         self.every = every
@@ -98,13 +98,13 @@ class Recorder:
         # first row and rows of the block, kept where they outlive the process if it is a stream's
         self._filled: Any = [0, 0]
         if stream is None:
-            self._use(np.empty((min(max(expected_rows // every + 1, FIRST_ROWS), self._limit), self._width)))
+            self._use(np.empty((min(max(expected_rows // every + 1, _FIRST_ROWS), self._limit), self._width)))
         else:
             self._use_stream(stream)
 
     def _use_stream(self, stream: RowStream) -> None:
         """Keep rows where they outlive the process."""
-        self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), FIRST_ROWS)
+        self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), _FIRST_ROWS)
         self._file = stream.open(self._dtype, self._limit)
         self._seconds, self._due = stream.seconds, monotonic() + stream.seconds
         self._block = stream.block(self._limit)
@@ -254,7 +254,7 @@ class Recorder:
             more[: self.count] = self._rows
             self._use(more)
             return
-        block = max(int(BLOCK // self._dtype.itemsize), FIRST_ROWS)
+        block = max(int(BLOCK // self._dtype.itemsize), _FIRST_ROWS)
         if self._file is None:
             self._file = RowFile(self._folder, self._dtype.itemsize, len(self._rows) + block)
             self._flush()

@@ -15,9 +15,9 @@ import numpy as np
 
 from cosim.errors import OutputError
 
-UNSUPPORTED = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
-DISK = "/var/tmp"  # where Unix keeps large temporary files
-ZEROS = bytes(1 << 20)
+_UNSUPPORTED = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
+_DISK = "/var/tmp"  # where Unix keeps large temporary files
+_ZEROS = bytes(1 << 20)
 
 
 class RowFile:
@@ -124,7 +124,7 @@ def _new_file(path: Path) -> Any:
 def _folder_for_large_files() -> str:
     """The folder for temporary files that the user chose, else one that is not in memory, as ``/tmp`` often is."""
     chosen = any(os.environ.get(name) for name in ("TMPDIR", "TEMP", "TMP"))
-    return DISK if not chosen and os.access(DISK, os.W_OK | os.X_OK) else tempfile.gettempdir()
+    return _DISK if not chosen and os.access(_DISK, os.W_OK | os.X_OK) else tempfile.gettempdir()
 
 
 def allocate(descriptor: int, start: int, size: int) -> None:
@@ -141,8 +141,8 @@ def allocate(descriptor: int, start: int, size: int) -> None:
         try:
             return os.posix_fallocate(descriptor, start, size)
         except OSError as error:
-            if error.errno not in UNSUPPORTED:
+            if error.errno not in _UNSUPPORTED:
                 raise
     os.lseek(descriptor, start, os.SEEK_SET)
     while size > 0:
-        size -= os.write(descriptor, ZEROS[:size])
+        size -= os.write(descriptor, _ZEROS[:size])

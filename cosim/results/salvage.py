@@ -30,7 +30,7 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     try:
         if not (spare / SUMMARY).exists() or not (spare / usual_file("npy")).exists():
             return "Nothing had been computed yet."
-        close_unfinished(spare, reason)
+        _close_unfinished(spare, reason)
         result = read_results(spare)
         if spare != out:
             write_results(result, out, note["formats"])
@@ -46,7 +46,7 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     return f"What was computed is kept: {len(result.table)} rows in {out}. To see it: cosim report {out}"
 
 
-def close_unfinished(folder: Path, reason: str) -> None:
+def _close_unfinished(folder: Path, reason: str) -> None:
     """Bring the rows of the block into the table of a folder that was streamed to, and say why the run ended.
 
     Args:

@@ -35,7 +35,7 @@ from cosim.results.unfinished import EXPLAINED
 SECONDS = 1.0
 """What was recorded is in the folder after so long at the latest [s]."""
 
-SYNC_SECONDS = 10.0
+_SYNC_SECONDS = 10.0
 """What is in the folder is on the disk itself after so long at the latest [s], should the power fail."""
 
 
@@ -212,7 +212,7 @@ class _StreamFile(RowFile):
         more.
         """
         try:
-            if monotonic() - self._synced > SYNC_SECONDS:
+            if monotonic() - self._synced > _SYNC_SECONDS:
                 os.fsync(self._file.fileno())
                 self._synced = monotonic()
             self._file.seek(0)

@@ -14,7 +14,7 @@ from cosim.results.events_file import COLUMNS, NUMBERS
 from cosim.results.optional import optional_module
 from cosim.results.result_data import ResultData, SignalInfo
 
-EVENT_UNITS = {
+_EVENT_UNITS = {
     "stamp": "s",
     "delivered_at": "s",
     "position": "m",
@@ -86,7 +86,7 @@ def events_to_pandas(result: ResultData) -> Any:
         OutputError: pandas is not installed.
     """
     frame = optional_module("pandas", "frames", "Data frames").DataFrame(_event_columns(result))
-    frame.attrs["units"] = dict(EVENT_UNITS)
+    frame.attrs["units"] = dict(_EVENT_UNITS)
     return frame
 
 
@@ -109,7 +109,7 @@ def to_xarray(result: ResultData, signals: Iterable[str] | None = None) -> Any:
         s.name: ("time", np.array(result[s.name]), _attributes(s)) for s in _chosen(result, signals)
     }
     for name, values in _event_columns(result).items():
-        unit = {"units": EVENT_UNITS[name]} if name in EVENT_UNITS else {}
+        unit = {"units": _EVENT_UNITS[name]} if name in _EVENT_UNITS else {}
         variables[f"balise_{name}"] = ("event", values, unit)
     time = ("time", np.array(result.time), {"units": "s", "long_name": "time"})
     attributes = {} if result.failure is None else {"failure": result.failure}

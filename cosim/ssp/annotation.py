@@ -17,7 +17,7 @@ from lxml import etree
 
 from cosim.ssp.document import NAMESPACES, Node, fail, find_all
 
-TYPE = "fmu-observer.scenario"
+_TYPE = "fmu-observer.scenario"
 NAMESPACE = "urn:fmu-observer:scenario:1"
 DIGEST = "fmu_sha256"
 """Key of a component's annotation: digest of the FMU that it speaks of."""
@@ -33,14 +33,14 @@ def read_extras(node: Node) -> dict[str, Any]:
         ScenarioError: the annotation is not what this package writes.
     """
     for annotation in find_all(node, "ssd:Annotations/ssc:Annotation"):
-        if annotation.get("type") == TYPE:
+        if annotation.get("type") == _TYPE:
             holder = annotation.find(f"{{{NAMESPACE}}}extras")
             try:
                 extras = json.loads("" if holder is None else holder.text or "")
             except json.JSONDecodeError as error:
-                fail(annotation, f"the annotation {TYPE!r} is not JSON: {error}.")
+                fail(annotation, f"the annotation {_TYPE!r} is not JSON: {error}.")
             if not isinstance(extras, dict):
-                fail(annotation, f"the annotation {TYPE!r} is not a table of keys.")
+                fail(annotation, f"the annotation {_TYPE!r} is not a table of keys.")
             return extras
     return {}
 
@@ -52,7 +52,7 @@ def write_extras(extras: Mapping[str, Any]) -> Node:
         extras: what the standard has no place for.
     """
     outer = etree.Element(f"{{{NAMESPACES['ssd']}}}Annotations")
-    annotation = etree.SubElement(outer, f"{{{NAMESPACES['ssc']}}}Annotation", type=TYPE)
+    annotation = etree.SubElement(outer, f"{{{NAMESPACES['ssc']}}}Annotation", type=_TYPE)
     holder = etree.SubElement(annotation, f"{{{NAMESPACE}}}extras", nsmap={None: NAMESPACE})
     holder.text = json.dumps(extras, indent=1)
     return outer

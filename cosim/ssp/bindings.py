@@ -23,7 +23,7 @@ Value = Scalar | list[Scalar]
 """A start value as a scenario writes it."""
 Starts = dict[Path, dict[str, Value]]
 """Start values by path of the component and name of the variable."""
-ACCEPTED: dict[str, set[str]] = {
+_ACCEPTED: dict[str, set[str]] = {
     REAL: {REAL, INTEGER},
     INTEGER: {INTEGER},
     "Boolean": {"Boolean"},
@@ -124,7 +124,7 @@ class _Applying:
         parameter, node = given.parameter, given.node
         interface, name = self.nets.interfaces[point.path], self.variable(point)
         kind, family = interface.variables[name].type, FAMILIES[interface.variables[name].type]
-        if parameter.type.family not in ACCEPTED.get(family, set()):
+        if parameter.type.family not in _ACCEPTED.get(family, set()):
             fail(node, f"parameter {parameter.name!r} is a {parameter.type.name}, {point} is a {kind}.")
         values = [_value(text, parameter, pipe, node) for text in parameter.values]
         if family == "Enumeration":

@@ -19,8 +19,8 @@ FAMILIES: dict[str, str] = {
     **{name: name for name in ("Boolean", "String", "Enumeration", "Binary", "Clock")},
 }
 """What a type of SSP or FMI is, whatever its size."""
-RAD = BASE_SYMBOLS.index("rad")  # the last one
-TRANSFORMATIONS = (
+_RAD = BASE_SYMBOLS.index("rad")  # the last one
+_TRANSFORMATIONS = (
     "LinearTransformation",
     "BooleanMappingTransformation",
     "IntegerMappingTransformation",
@@ -169,7 +169,7 @@ def read_transformation(node: Node) -> Step | None:
         name = short(child.tag)
         if name == "LinearTransformation":
             return Linear(float(child.get("factor", "1")), float(child.get("offset", "0")))
-        if name in TRANSFORMATIONS:
+        if name in _TRANSFORMATIONS:
             return ValueMap(name.removesuffix("MappingTransformation"), _entries(child))
     return None
 
@@ -197,7 +197,7 @@ def _same(one: Unit, other: Unit) -> bool:
         math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-12)
         for a, b in ((one.factor, other.factor), (one.offset, other.offset))
     ]
-    return all(close) and one.exponents[:RAD] == other.exponents[:RAD]  # a radian is a number: written or not
+    return all(close) and one.exponents[:_RAD] == other.exponents[:_RAD]  # a radian is a number: written or not
 
 
 def _formula(unit: Unit) -> str:

@@ -27,7 +27,7 @@ NAMESPACES = {
     "ssb": "http://ssp-standard.org/SSP1/SystemStructureSignalDictionary",
 }
 """By the usual prefix; versions 1.0 and 2.0 share them."""
-ROOTS = {
+_ROOTS = {
     "ssd": "SystemStructureDescription",
     "ssv": "ParameterSet",
     "ssm": "ParameterMapping",
@@ -39,10 +39,10 @@ FILES = {
     "ssm": "SystemStructureParameterMapping",
     "ssb": "SystemStructureSignalDictionary",
 }
-FAULTS_SHOWN = 3
-UNDECLARED = re.compile(r"Namespace prefix (\S+) (?:on|for) .* is not defined")
+_FAULTS_SHOWN = 3
+_UNDECLARED = re.compile(r"Namespace prefix (\S+) (?:on|for) .* is not defined")
 """What libxml2 says of a prefix without declaration."""
-FIRST_ELEMENT = re.compile(rb"<[A-Za-z_][\w:.-]*")
+_FIRST_ELEMENT = re.compile(rb"<[A-Za-z_][\w:.-]*")
 Node = Any
 """An element of lxml; its `base` is the name of the file it stands in."""
 
@@ -67,7 +67,7 @@ def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], No
         prefixes = _undeclared(parser.error_log)
         if prefixes and undeclared is not None:
             for prefix in prefixes:
-                undeclared(prefix, namespace_of(prefix))
+                undeclared(prefix, _namespace_of(prefix))
             return parse(_declared(text, prefixes), file, kind)
         raise ScenarioError(f"{file}, line {error.lineno}: not readable as XML: {error.msg}.") from error
     if root.getroottree().docinfo.doctype:
@@ -86,11 +86,11 @@ def validated(root: Node, file: str, kind: str) -> Node:
     Raises:
         ScenarioError: it is another element, of an unknown version, or not as the schema wants it; with the line.
     """
-    expected = f"{{{NAMESPACES[kind]}}}{ROOTS[kind]}"
+    expected = f"{{{NAMESPACES[kind]}}}{_ROOTS[kind]}"
     if root.tag != expected:
         raise ScenarioError(
             f"{file}, line {root.sourceline}: element {short(root.tag)!r} of namespace {_namespace(root.tag)!r}, "
-            f"expected {ROOTS[kind]!r} of namespace {NAMESPACES[kind]!r}."
+            f"expected {_ROOTS[kind]!r} of namespace {NAMESPACES[kind]!r}."
         )
     version = root.get("version")
     if version not in VERSIONS:
@@ -99,13 +99,13 @@ def validated(root: Node, file: str, kind: str) -> Node:
     schema = _schema(version, kind)
     if not schema.validate(root):
         faults = list(schema.error_log)
-        lines = [f"{file}, line {fault.line}: {_plain(fault.message)}" for fault in faults[:FAULTS_SHOWN]]
-        more = [f"{file}: and {len(faults) - FAULTS_SHOWN} more."] if len(faults) > FAULTS_SHOWN else []
+        lines = [f"{file}, line {fault.line}: {_plain(fault.message)}" for fault in faults[:_FAULTS_SHOWN]]
+        more = [f"{file}: and {len(faults) - _FAULTS_SHOWN} more."] if len(faults) > _FAULTS_SHOWN else []
         raise ScenarioError("\n".join([*lines, *more]))
     return root
 
 
-def namespace_of(prefix: str) -> str:
+def _namespace_of(prefix: str) -> str:
     """The namespace that a prefix usually stands for; one of its own where none is known."""
     return NAMESPACES.get(prefix, f"urn:undeclared:{prefix}")
 
@@ -170,14 +170,14 @@ def _schema(version: str, kind: str) -> Any:
 
 def _undeclared(faults: Iterable[Any]) -> list[str]:
     """The prefixes without declaration, where nothing else is wrong with a text; in the order in which they are met."""
-    found = [UNDECLARED.match(entry.message) for entry in faults]
+    found = [_UNDECLARED.match(entry.message) for entry in faults]
     return list(dict.fromkeys(match[1] for match in found if match)) if all(found) else []
 
 
 def _declared(text: bytes, prefixes: Iterable[str]) -> bytes:
     """The text with declarations of prefixes in its first element."""
-    added = "".join(f' xmlns:{prefix}="{namespace_of(prefix)}"' for prefix in prefixes)
-    return FIRST_ELEMENT.sub(lambda match: match[0] + added.encode(), text, count=1)
+    added = "".join(f' xmlns:{prefix}="{_namespace_of(prefix)}"' for prefix in prefixes)
+    return _FIRST_ELEMENT.sub(lambda match: match[0] + added.encode(), text, count=1)
 
 
 def _namespace(tag: str) -> str:

@@ -36,15 +36,15 @@ from fmus.pack import check_target, pack_fmu
 from plant_models.hybrid.noise import RUN_SEED
 from plant_models.railway.sensors.balise_reader import BaliseReader
 
-ELEMENT_OF_ARRAY = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
-BALISES_FILE = "resources/balises.csv"
-MOST_BALISES = max(BaliseReader.option_choices["balise_capacity"])
+_ELEMENT_OF_ARRAY = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
+_BALISES_FILE = "resources/balises.csv"
+_MOST_BALISES = max(BaliseReader.option_choices["balise_capacity"])
 MADE_FROM = frozenset({"model", "observer", "backend", "preset", "options"})
 LOG = logging.getLogger("cosim")
 
 
 @dataclass(frozen=True)
-class ExportedPart:
+class _ExportedPart:
     """A component on its way into a package.
 
     Args:
@@ -95,7 +95,7 @@ class _Exporter:
         self.table, self.name, self.folder, self.where, self.version = table, name, folder, where, version
         self.files: dict[str, bytes] = {}
         self.definitions = Definitions()
-        self.parts: dict[str, ExportedPart] = {}
+        self.parts: dict[str, _ExportedPart] = {}
         self.seeds: dict[str, dict[str, int]] = {}
 
     def build(self) -> None:
@@ -142,12 +142,12 @@ class _Exporter:
             return None
         layout = make_layout(balises, self.table.start, self.table.stop, self.folder, self.where)
         listed = isinstance(layout, TrackLayout) and (
-            balises.layout == "spacing" or len(layout.positions) <= MOST_BALISES
+            balises.layout == "spacing" or len(layout.positions) <= _MOST_BALISES
         )
         if not isinstance(layout, TrackLayout) or not listed:
             why = f"layout '{balises.layout}' says when balises are passed and not where"
             if isinstance(layout, TrackLayout):
-                why = f"a reader holds at most {MOST_BALISES} balises and there are {len(layout.positions)}"
+                why = f"a reader holds at most {_MOST_BALISES} balises and there are {len(layout.positions)}"
             LOG.warning(
                 "%s: other tools will tell the observers of no balises, for no reader could be added: %s.",
                 self.where,
@@ -166,7 +166,7 @@ class _Exporter:
         )
         return make_reader(balises, layout, interfaces, taken, newest)
 
-    def part(self, name: str, component: ComponentTable) -> ExportedPart:
+    def part(self, name: str, component: ComponentTable) -> _ExportedPart:
         """A component with its FMU, which is built where it is a model of this package."""
         place = f"{self.where}: components.{name}"
         if component.recording is not None:
@@ -198,7 +198,7 @@ class _Exporter:
         member = next((m for m, known in self.files.items() if known == content), f"resources/{name}.fmu")
         self.files[member] = content
         foreign = system is not None and type(system).__module__.partition(".")[0] not in OWN_PACKAGES
-        return ExportedPart(component, fmu, member, interface, MADE_FROM if foreign else frozenset())
+        return _ExportedPart(component, fmu, member, interface, MADE_FROM if foreign else frozenset())
 
     def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
@@ -212,7 +212,7 @@ class _Exporter:
             raise ScenarioError(f"{self.where}: {error}") from error
         return component.description
 
-    def add_component(self, parent: Node, name: str, part: ExportedPart, more: Mapping[str, Any]) -> None:
+    def add_component(self, parent: Node, name: str, part: _ExportedPart, more: Mapping[str, Any]) -> None:
         """A component with its connectors, parameters and origin, and what else its annotation says."""
         node = child(parent, "ssd", "Component", name=name, type="application/x-fmu-sharedlibrary", source=part.member)
         variables = [v for v in part.interface.variables.values() if v.causality in ("input", "output")]
@@ -230,7 +230,7 @@ class _Exporter:
         )
         node.append(write_extras(own | {DIGEST: digest(part.fmu), **more}))
 
-    def parameter_file(self, name: str, part: ExportedPart) -> bytes | None:
+    def parameter_file(self, name: str, part: _ExportedPart) -> bytes | None:
         """The parameter set of a component, or None where it has none."""
         late = {k: getattr(part.table, k) for k in sorted(part.table.model_fields_set & LATE_PARAMETERS)}
         given = {k: v for k, v in late.items() if k in part.interface.variables} | part.table.parameters
@@ -315,7 +315,7 @@ class _Exporter:
             )
         variables = self.parts[component].interface.variables
         known = [v for v, variable in variables.items() if variable.causality == causality]
-        found = ELEMENT_OF_ARRAY.fullmatch(signal)
+        found = _ELEMENT_OF_ARRAY.fullmatch(signal)
         if signal in known:
             return [("Element", component), ("Connector", signal)]
         if found is None or found[1] not in known:
@@ -364,10 +364,10 @@ class _Exporter:
         balises = self.table.balises
         if balises is not None and balises.file is not None:
             try:
-                self.files[BALISES_FILE] = (self.folder / balises.file).read_bytes()
+                self.files[_BALISES_FILE] = (self.folder / balises.file).read_bytes()
             except OSError as error:
                 raise ScenarioError(
                     f"{self.where}: balises.file: {balises.file} cannot be read: {error.strerror}."
                 ) from error
-            own["balises"] = own["balises"] | {"file": BALISES_FILE}
+            own["balises"] = own["balises"] | {"file": _BALISES_FILE}
         return own

@@ -24,7 +24,7 @@ from cosim.ssp.system_structure import read_structure
 
 ORIGIN = ("model", "observer", "as", "preset", "options", "late_policy", "replay_horizon")
 """Keys of a component that say where its FMU came from and how it treats late events."""
-DEFAULT_STEPS = 1000
+_DEFAULT_STEPS = 1000
 """Communication steps of a run where nothing says how long one should be."""
 
 
@@ -162,7 +162,7 @@ def _experiment(structure: SsdStructure, nets: Nets, tables: Mapping[str, Any]) 
         return known
     if stop is None or not stop > start or not math.isfinite(stop):
         return known | ({} if structure.step is None else {"step": structure.step})
-    wanted = structure.step or min((s for s in times["stepSize"] if s > 0.0), default=(stop - start) / DEFAULT_STEPS)
+    wanted = structure.step or min((s for s in times["stepSize"] if s > 0.0), default=(stop - start) / _DEFAULT_STEPS)
     return known | {"step": (stop - start) / max(1, math.ceil((stop - start) / wanted - 1e-9))}
 
 

@@ -27,7 +27,7 @@ from cosim.ssp.package_data import (
 Path = tuple[str, ...]
 """Names of the elements from the root system downwards; the root itself is the empty path."""
 
-TO_ELEMENT: dict[str, set[str]] = {
+_TO_ELEMENT: dict[str, set[str]] = {
     "constant": {"structuralParameter", "parameter", "input", "inout"},
     "structuralParameter": {"structuralParameter", "parameter", "input", "inout"},
     "calculatedParameter": {"parameter", "input", "inout"},
@@ -37,7 +37,7 @@ TO_ELEMENT: dict[str, set[str]] = {
     "local": {"input", "inout"},
     "inout": {"input"},
 }
-TO_SYSTEM: dict[str, set[str]] = {
+_TO_SYSTEM: dict[str, set[str]] = {
     "constant": {"constant", "calculatedParameter", "output", "local"},
     "structuralParameter": {"calculatedParameter", "output", "local"},
     "calculatedParameter": {"calculatedParameter", "output", "local"},
@@ -52,7 +52,7 @@ SOURCES = {
     "element": {"constant", "calculatedParameter", "output", "local", "inout"},
 }
 """Kinds of connectors that can drive others, of the enclosing system and of its elements."""
-SINKS = ("input", "inout", "parameter", "structuralParameter")
+_SINKS = ("input", "inout", "parameter", "structuralParameter")
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Hop:
+class _Hop:
     """A connection in the direction of its data."""
 
     source: Point
@@ -101,14 +101,14 @@ class Chain:
     """
 
     root: Point
-    hops: tuple[Hop, ...]
+    hops: tuple[_Hop, ...]
 
     @property
     def sink(self) -> Point:
         """The input at its end."""
         return self.hops[-1].target
 
-    def after(self, point: Point) -> tuple[Hop, ...] | None:
+    def after(self, point: Point) -> tuple[_Hop, ...] | None:
         """The hops behind a point on the way, or None where the way does not lead through it."""
         for number, hop in enumerate(self.hops):
             if hop.source.whole == point:
@@ -138,7 +138,7 @@ class Nets:
             for connector in self.elements[path].connectors.values():
                 interface.check(connector)
         self.dictionaries = self._dictionaries()
-        self.incoming: dict[Point, Hop] = {}
+        self.incoming: dict[Point, _Hop] = {}
         for path, element in self.elements.items():
             if isinstance(element, SystemElement):
                 for wire in element.wires:
@@ -199,7 +199,7 @@ class Nets:
         assert isinstance(element, SystemElement), "only systems hold elements"
         return element
 
-    def _directed(self, path: Path, system: SystemElement, wire: SsdConnection) -> Hop:
+    def _directed(self, path: Path, system: SystemElement, wire: SsdConnection) -> _Hop:
         start, end = (self._point(path, system, side, wire.node) for side in (wire.start, wire.end))
         forward, backward = self._allowed(path, start, end), self._allowed(path, end, start)
         if forward == backward:
@@ -207,7 +207,7 @@ class Nets:
             kinds = f"kinds {self.kind(start)!r} and {self.kind(end)!r}"
             fail(wire.node, f"the connection between {start} and {end} {problem} ({kinds}): one must drive the other.")
         source, target = (start, end) if forward else (end, start)
-        return Hop(source, target, wire.suppress, wire.step, wire.node)
+        return _Hop(source, target, wire.suppress, wire.step, wire.node)
 
     def _point(self, path: Path, system: SystemElement, end: End, node: Node) -> Point:
         owner: SsdElement = system
@@ -224,20 +224,20 @@ class Nets:
     def _allowed(self, path: Path, source: Point, target: Point) -> bool:
         sides = ["system" if point.path == path else "element" for point in (source, target)]
         kinds = [self.kind(point) for point in (source, target)]
-        table = TO_SYSTEM if sides[1] == "system" else TO_ELEMENT
+        table = _TO_SYSTEM if sides[1] == "system" else _TO_ELEMENT
         possible = SOURCES[sides[0]] if kinds[0] == "unspecified" else SOURCES[sides[0]] & {kinds[0]}
         return any(kinds[1] in table[kind] or kinds[1] == "unspecified" for kind in possible)
 
-    def _add(self, hop: Hop) -> None:
+    def _add(self, hop: _Hop) -> None:
         other = self.incoming.setdefault(hop.target, hop)
         if other is not hop:
             fail(hop.node, f"{hop.target} has two sources, {other.source} and {hop.source}; remove one connection.")
 
     def _is_sink(self, point: Point) -> bool:
-        return point.path in self.interfaces and self.kind(point) in SINKS
+        return point.path in self.interfaces and self.kind(point) in _SINKS
 
     def _chain(self, sink: Point) -> Chain:
-        hops: list[Hop] = []
+        hops: list[_Hop] = []
         point, seen = sink, {sink}
         while (hop := self._driver(point)) is not None:
             hops.insert(0, hop)
@@ -249,7 +249,7 @@ class Nets:
                 break
         return Chain(point, tuple(hops))
 
-    def _driver(self, point: Point) -> Hop | None:
+    def _driver(self, point: Point) -> _Hop | None:
         """The connection into a point: its own, that of the whole array, or that of the dictionary entry it stands
         for.
         """
@@ -259,7 +259,7 @@ class Nets:
             hop = self.incoming[point.whole]
             if hop.source.indices:
                 fail(hop.node, f"{point.whole} is driven by one element of an array only; {point} is none of it.")
-            return Hop(Point(hop.source.path, hop.source.name, point.indices), point, hop.suppress, hop.step, hop.node)
+            return _Hop(Point(hop.source.path, hop.source.name, point.indices), point, hop.suppress, hop.step, hop.node)
         for (_, dictionary, _), members in self.dictionaries.items():
             if point.whole in members:
                 drivers = [m for m in members if m in self.incoming]
@@ -269,7 +269,7 @@ class Nets:
                         self.connector(point).node,
                         f"the signal {point.name!r} of {dictionary!r} has two sources, at {names}.",
                     )
-                return Hop(drivers[0], point, False, None, self.connector(point).node) if drivers else None
+                return _Hop(drivers[0], point, False, None, self.connector(point).node) if drivers else None
         return None
 
 

@@ -23,7 +23,7 @@ from cosim.ssp.lapses import Lapses
 from fmus.fmi.archive import MAX_UNPACKED_BYTES, NotAnFmuError, demand_harmless
 
 DEFAULT_VARIANT = "SystemStructure.ssd"
-MAX_XML_BYTES = 64 * 1024**2
+_MAX_XML_BYTES = 64 * 1024**2
 
 
 class Unpacked:
@@ -91,7 +91,7 @@ class Package:
         Raises:
             ScenarioError: it is too large or damaged.
         """
-        if self.sizes[name] > MAX_XML_BYTES:
+        if self.sizes[name] > _MAX_XML_BYTES:
             raise ScenarioError(
                 f"{self.title}: {name} has {self.sizes[name] / 1e6:.0f} MB; XML of at most 64 MB is read."
             )

@@ -23,7 +23,7 @@ READS_BALISES = "reads_balises"
 """Key of the annotation of the reader: it was added for other tools, and goes when the system is read back."""
 TOLD = ("count", "time", "position")
 PAGE = 16
-PARALLEL = 0
+_PARALLEL = 0
 """Tools that read SSP step all components with the outputs of the step before (OMSimulator, libcosim)."""
 
 
@@ -64,7 +64,7 @@ def make_reader(
     links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in told for field in TOLD]
     options, parameters = _track(table, [float(position) for position in layout.positions])
     component: dict[str, Any] = {"model": "balise_reader", "as": f"fmu{version}", "options": options}
-    component["parameters"] = {"input_instant": PARALLEL, **parameters}
+    component["parameters"] = {"input_instant": _PARALLEL, **parameters}
     return Reader(name, ComponentTable.model_validate(component), links)
 
 

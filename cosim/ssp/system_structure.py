@@ -27,9 +27,9 @@ from cosim.ssp.parameter_values import read_mapping, read_parameter_set
 from cosim.ssp.step_annotations import read_step
 
 FMU = "application/x-fmu-sharedlibrary"
-DEFINITION, PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
-IMPLEMENTATIONS = ("any", "CoSimulation")
-DEEPEST = 64
+_DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
+_IMPLEMENTATIONS = ("any", "CoSimulation")
+_DEEPEST = 64
 Kind = TypeVar("Kind")
 
 
@@ -94,7 +94,7 @@ class _Reader:
     def component(self, node: Node) -> SsdElement:
         """A component: an FMU, or a structure of its own."""
         kind, source = node.get("type", FMU).partition(";")[0].strip(), node.get("source")
-        if kind not in (FMU, DEFINITION, PACKAGE):
+        if kind not in (FMU, _DEFINITION, _PACKAGE):
             fail(
                 node,
                 f"component {node.get('name')!r} is of type {kind!r}; FMUs ({FMU}) and nested structures can be run.",
@@ -104,7 +104,7 @@ class _Reader:
         if kind != FMU:
             return self._nested(node, kind, source)
         implementation = node.get("implementation", "any")
-        if implementation not in IMPLEMENTATIONS:
+        if implementation not in _IMPLEMENTATIONS:
             fail(
                 node,
                 f"component {node.get('name')!r} asks for {implementation}; this master steps co-simulation FMUs only.",
@@ -213,8 +213,8 @@ class _Reader:
 
     def _nested(self, node: Node, kind: str, source: str) -> SystemElement:
         """A component that is a structure of its own: its system takes its place, its bindings come last."""
-        if len(self.outer) >= DEEPEST:
-            fail(node, f"systems are nested more than {DEEPEST} deep.")
+        if len(self.outer) >= _DEEPEST:
+            fail(node, f"systems are nested more than {_DEEPEST} deep.")
         inner = self._referenced(node, kind, source)
         inner.name = node.get("name")
         inner.bindings = [*inner.bindings, *self.bindings(node)]
@@ -226,7 +226,7 @@ class _Reader:
             return self._same_document(node, fragment)
         member = self.package.member(node, path, self.member)
         package = self.package
-        if kind == PACKAGE:
+        if kind == _PACKAGE:
             package = Package(
                 self.package.file(member), _title(self.package, member), self.package.unpacked, self.package.lapses
             )

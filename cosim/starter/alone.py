@@ -15,7 +15,7 @@ from cosim.starter.toml_lines import LISTED, entry, one_line
 from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES
 
 STOP, STEP, STEPS = 10.0, 0.01, 1000
-COLUMNS_NAMED = 6
+_COLUMNS_NAMED = 6
 
 
 def alone(look: Look) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def alone(look: Look) -> dict[str, Any]:
         "source": source,
         "has_inputs": bool(inputs),
         "inputs": [_input(look, v) for v in inputs[:LISTED] if v.valueReference not in hidden],
-        "columns": ["time", *map(one_line, names[:COLUMNS_NAMED]), *(["..."] if len(names) > COLUMNS_NAMED else [])],
+        "columns": ["time", *map(one_line, names[:_COLUMNS_NAMED]), *(["..."] if len(names) > _COLUMNS_NAMED else [])],
         "first": names[0] if names else "NAME",
     }
 

@@ -12,7 +12,7 @@ from cosim.starter.words import BRAKING, DRIVING, FOREIGN, LETTERS, WORDS, words
 from plant_models.hybrid.units import Unit, UnitError, conversion, parse_unit
 
 Quantity = Literal["position", "speed", "wheel_speed", "effort", "slip", "adhesion_force", "mass"]
-Sureness = Literal["sure", "likely", "a guess"]
+_Sureness = Literal["sure", "likely", "a guess"]
 
 UNITS: dict[Quantity, tuple[str, ...]] = {
     "position": ("m",),
@@ -23,18 +23,18 @@ UNITS: dict[Quantity, tuple[str, ...]] = {
     "adhesion_force": ("N",),
     "mass": ("kg",),
 }
-BY_NAME_ONLY: frozenset[Quantity] = frozenset(("wheel_speed", "slip", "adhesion_force", "mass"))
+_BY_NAME_ONLY: frozenset[Quantity] = frozenset(("wheel_speed", "slip", "adhesion_force", "mass"))
 """Quantities for which a fitting unit says too little."""
 SENSORS = frozenset({"odometer", "odo", "tacho", "tachometer", "encoder"})
 TURNING = frozenset({"omega", "w", "rpm", "drehzahl"})
-NOT_THIS: Mapping[Quantity, Set[str]] = {
+_NOT_THIS: Mapping[Quantity, Set[str]] = {
     "position": WORDS["wheel"] | {"rel", "relative", "nominal"},
     "speed": WORDS["wheel"] | {"rel", "relative", "nominal"},
     "effort": WORDS["adhesion"] | WORDS["slip"],
 }
 """Words that speak of another quantity of the same unit."""
-STRONG, WEAK, SAID, MEASURED, DENIED = 4, 3, 2, 3, -99
-SURE, LIKELY = 7, 4
+STRONG, WEAK, _SAID, MEASURED, _DENIED = 4, 3, 2, 3, -99
+_SURE, _LIKELY = 7, 4
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Guess:
     """
 
     signal: GuessedSignal
-    sureness: Sureness
+    sureness: _Sureness
     reason: str
     others: Sequence[str] = ()
 
@@ -96,7 +96,7 @@ def guess(
     (score, reason), best = fitting[0]
     rivals = [s.name for (other, _), s in fitting[1:4]]
     tied = len(fitting) > 1 and fitting[1][0][0] == score
-    sureness: Sureness = "sure" if score >= SURE and not tied else "likely" if score >= LIKELY else "a guess"
+    sureness: _Sureness = "sure" if score >= _SURE and not tied else "likely" if score >= _LIKELY else "a guess"
     return Guess(best, sureness, reason + (", as others are" if tied else ""), rivals)
 
 
@@ -123,7 +123,7 @@ def _rate(quantity: Quantity, signal: GuessedSignal) -> tuple[int, str]:
     if signal.meaning is not None and not has_unit:
         return 0, ""
     named, said = _named(quantity, signal.name, has_unit), _described(quantity, signal.description)
-    if not named and not said and (not has_unit or quantity in BY_NAME_ONLY):
+    if not named and not said and (not has_unit or quantity in _BY_NAME_ONLY):
         return 0, ""
     if signal.meaning is None and not named:
         return 0, ""  # a sentence alone is too little
@@ -155,20 +155,20 @@ def _named(quantity: Quantity, name: str, has_unit: bool) -> int:
 def _described(quantity: Quantity, description: str) -> int:
     words = set(words_of(description))
     if quantity == "wheel_speed":
-        return SAID if words & WORDS["wheel"] and words & WORDS["speed"] else 0
+        return _SAID if words & WORDS["wheel"] and words & WORDS["speed"] else 0
     if quantity in ("speed", "position") and words & WORDS["wheel"]:
         return 0
-    return SAID if words & WORDS[_key(quantity)] else 0
+    return _SAID if words & WORDS[_key(quantity)] else 0
 
 
 def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
     """What speaks against it: it is named as a reference, a limit, an error, or as another force."""
     name = set(words_of(signal.name))
-    against = (FOREIGN | NOT_THIS.get(quantity, frozenset())) - WORDS[_key(quantity)]
+    against = (FOREIGN | _NOT_THIS.get(quantity, frozenset())) - WORDS[_key(quantity)]
     if quantity == "effort" and name & DRIVING:
         against -= BRAKING  # one signal for both
     if name & against:
-        return DENIED
+        return _DENIED
     if WORDS[_key(quantity)] & name or quantity == "effort":
         return 0  # what is named plainly may be described beside other things
-    return DENIED if set(words_of(signal.description)) & against else 0
+    return _DENIED if set(words_of(signal.description)) & against else 0

@@ -21,7 +21,7 @@ from fmus.fmi.types import NUMERIC_TYPES
 from plant_models.hybrid.units import UnitError
 
 NAME = "fmu"
-LARGEST_ARRAY = 16
+_LARGEST_ARRAY = 16
 """Elements of longer arrays are not looked at one by one."""
 
 
@@ -93,7 +93,7 @@ def _signals(component: Component, variable: ModelVariable) -> list[GuessedSigna
     if variable.type not in NUMERIC_TYPES:
         return []
     elements = elements_of(variable) if variable.shape else [None]
-    if len(elements) > LARGEST_ARRAY:
+    if len(elements) > _LARGEST_ARRAY:
         return []
     unit = component.unit_name(variable.name)
     try:

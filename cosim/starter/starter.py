@@ -19,7 +19,7 @@ from cosim.starter.train_starter import DEFAULT_OBSERVER, declared_observer, tra
 from fmu_observer import OBSERVERS
 from plant_models.user_file import names_code
 
-WANTED = frozenset({"effort", "odometer"})
+_WANTED = frozenset({"effort", "odometer"})
 """Inputs of the observers that a starter can connect."""
 
 
@@ -121,7 +121,7 @@ def _check_observer(observer: str | None) -> None:
     if observer is None:
         return
     known = names_code(observer) or observer in OBSERVERS
-    if not (known and {s.name for s in declared_observer(observer).inputs} >= WANTED):
+    if not (known and {s.name for s in declared_observer(observer).inputs} >= _WANTED):
         able = [name for name in OBSERVERS if _listens(name)]
         raise ScenarioError(
             f"No observer {observer!r} that listens to an effort and an odometer; {nearest(observer, able)}"
@@ -130,7 +130,7 @@ def _check_observer(observer: str | None) -> None:
 
 def _listens(name: str) -> bool:
     try:
-        return {s.name for s in declared_observer(name).inputs} >= WANTED
+        return {s.name for s in declared_observer(name).inputs} >= _WANTED
     except ScenarioError:  # of an installed package that is wrong
         return False
 

@@ -16,7 +16,7 @@ from cosim.starter.guess import Guess, GuessedSignal
 from fmus.text_table import text_table
 
 WIDTH = 118
-PLAIN_NAME = re.compile(r"[A-Za-z_][\w.]*(\[\d+(,\d+)*\])?", re.ASCII)
+_PLAIN_NAME = re.compile(r"[A-Za-z_][\w.]*(\[\d+(,\d+)*\])?", re.ASCII)
 LISTED = 40
 """Variables of a kind that are listed; `cosim info` shows all."""
 
@@ -105,7 +105,7 @@ class GuessedLink:
     def lines(self) -> list[str]:
         """Lines within the list of connections."""
         names = (self.source, *self.targets)
-        if self.factor is None and all(PLAIN_NAME.fullmatch(name.partition(".")[2]) for name in names):
+        if self.factor is None and all(_PLAIN_NAME.fullmatch(name.partition(".")[2]) for name in names):
             text = f"{self.source} -> {', '.join(self.targets)}"
             return [f"{inline(text)},{self.remark}"]
         changed = {} if self.factor is None else {"factor": self.factor, "units": "ignore"}

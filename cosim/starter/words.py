@@ -76,7 +76,7 @@ DRIVING = _words("traction tractive trac zug zugkraft antrieb trazione traccion 
 PARTS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
 
 
-def plain_letters(text: str) -> str:
+def _plain_letters(text: str) -> str:
     """The text without accents: ``Ä`` becomes ``A``, ``ß`` becomes ``ss``.
 
     Args:
@@ -91,4 +91,4 @@ def words_of(text: str) -> list[str]:
     Args:
         text: the text.
     """
-    return [part.lower() for part in PARTS.findall(plain_letters(text))]
+    return [part.lower() for part in PARTS.findall(_plain_letters(text))]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cosim.coupling.plan import Plan
     from cosim.coupling.planned import PlannedComponent
 
-PLAUSIBLE = {
+_PLAUSIBLE = {
     parse_unit(unit).exponents: limit
     for unit, limit in (("m", 1e7), ("m/s", 1e3), ("m/s2", 1e4), ("N", 1e9), ("W", 1e11), ("rad/s", 1e5))
 }
@@ -68,7 +68,7 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
         error: that ended the run. plan: that was run. table: rows by ``component.signal``, in the components' own
             units.
     """
-    found = first_departure(plan, table) if isinstance(error, RunError) else None
+    found = _first_departure(plan, table) if isinstance(error, RunError) else None
     if found is None:
         return str(error)
     cause = f"{found.text} {_fed(plan, table, found)}"
@@ -79,7 +79,7 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
     return f"{cause} In the end: {error}"
 
 
-def first_departure(plan: Plan, table: Any) -> Departure | None:
+def _first_departure(plan: Plan, table: Any) -> Departure | None:
     """The signal that left its declared or plausible range first and did not come back; None where none did.
 
     Args:
@@ -135,7 +135,7 @@ def _ranges(step: PlannedComponent, signal: str, values: np.ndarray) -> Iterator
         unit = step.component.unit(signal)
     except UnitError:
         unit = None
-    largest = None if unit is None else PLAUSIBLE.get(unit.exponents)
+    largest = None if unit is None else _PLAUSIBLE.get(unit.exponents)
     if unit is not None and largest is not None:
         limit = largest / abs(unit.factor)
         yield _Range(-limit, limit, f"grew beyond anything plausible ({limit:g})", 0.0)

@@ -17,7 +17,7 @@ from cosim.coupling.instants import followed, held_signals
 from cosim.master.algorithms.choose import AlgorithmChoice
 from cosim.structure.structure_data import Link, Part, Port, Signal
 
-ABILITIES = {
+_ABILITIES = {
     "canHandleVariableCommunicationStepSize": "variable step",
     "canGetAndSetFMUState": "saves state",
     "canInterpolateInputs": "input derivatives",
@@ -115,7 +115,7 @@ def _connected(
 
 def abilities(component: Component) -> tuple[str, ...]:
     """Capabilities that the component declares and a master can use, in words."""
-    return tuple(text for flag, text in ABILITIES.items() if getattr(component.capabilities, flag))
+    return tuple(text for flag, text in _ABILITIES.items() if getattr(component.capabilities, flag))
 
 
 def rate_text(every: int, substeps: int) -> str:

@@ -18,11 +18,11 @@ from cosim.structure.shapes import Box, Edge, Frame, Layout, Size, Wire
 if TYPE_CHECKING:
     from cosim.structure.structure_data import StructureData
 
-BOX_GAP, BAND_GAP, PASS = 0.28, 0.34, 0.16  # between boxes and bands; height left free for a wire that passes
+_BOX_GAP, _BAND_GAP, PASS = 0.28, 0.34, 0.16  # between boxes and bands; height left free for a wire that passes
 # of group frames, and the room of a wire that runs back
-FRAME, FRAME_TITLE, LANE, TRACK, TIP = 0.16, 0.26, 0.14, 0.12, 0.08
-CURVE = 0.62  # room for a wire to swing from one height to another
-PER_WIRE, MOST_WIRES = 0.06, 15
+_FRAME, _FRAME_TITLE, _LANE, TRACK, _TIP = 0.16, 0.26, 0.14, 0.12, 0.08
+_CURVE = 0.62  # room for a wire to swing from one height to another
+_PER_WIRE, _MOST_WIRES = 0.06, 15
 SWEEPS = 6
 EVENT_PORT = "(balises)"
 Node = TypeVar("Node", bound=Hashable)
@@ -59,12 +59,12 @@ class _Band:
 
     @property
     def height(self) -> float:
-        extra = FRAME_TITLE + FRAME if self.framed else 0.0
+        extra = _FRAME_TITLE + _FRAME if self.framed else 0.0
         return self.body + extra + self.lane_room
 
     @property
     def lane_room(self) -> float:
-        return LANE * (len(self.lanes) + 1) if self.lanes else 0.0
+        return _LANE * (len(self.lanes) + 1) if self.lanes else 0.0
 
 
 def lay_out(structure: StructureData, sizes: Mapping[str, Size], edges: Sequence[Edge]) -> Layout:
@@ -147,17 +147,17 @@ class _Placing:
             for band in layer:
                 band.y = y
                 self._stack_band(band)
-                y += band.height + BAND_GAP
+                y += band.height + _BAND_GAP
 
     def _stack_band(self, band: _Band) -> None:
-        top = band.y + (FRAME_TITLE if band.framed else 0.0)
+        top = band.y + (_FRAME_TITLE if band.framed else 0.0)
         for items in band.columns.values():
             y = top + (band.body - _stack(items)) / 2
             for item in items:
                 item.y = y
                 if not item.key[1]:
                     self.boxes[item.key[0]].y = y
-                y += item.height + BOX_GAP
+                y += item.height + _BOX_GAP
 
     def _ends(self, edge: Edge) -> tuple[float, float]:
         source, target = self.boxes[edge.source[0]], self.boxes[edge.target[0]]
@@ -237,10 +237,10 @@ class _Placing:
         ends = {max(self.boxes[n].column for n in b.names) for layer in self.bands for b in layer if b.framed}
         left_edges, x = [], 0.0
         for c in range(count):
-            x += (FRAME if c in begins else 0.0) + _tracks(len(lefts[c]))
+            x += (_FRAME if c in begins else 0.0) + _tracks(len(lefts[c]))
             left_edges.append(x)
-            x += widths[c] + TRACK * (len(rights[c]) + bool(rights[c])) + (FRAME if c in ends else 0.0)
-            x += CURVE + PER_WIRE * self._swinging(c) if c < count - 1 else 0.0
+            x += widths[c] + TRACK * (len(rights[c]) + bool(rights[c])) + (_FRAME if c in ends else 0.0)
+            x += _CURVE + _PER_WIRE * self._swinging(c) if c < count - 1 else 0.0
         for box in self.boxes.values():
             box.x, box.size = left_edges[box.column], replace(box.size, width=widths[box.column])
         spans = [(a, a + w) for a, w in zip(left_edges, widths, strict=True)]
@@ -254,7 +254,7 @@ class _Placing:
     def _swinging(self, column: int) -> int:
         """How many forward wires swing in the gap after a column, beyond the few that fit anyway."""
         places = [(self.boxes[e.source[0]].column, self.boxes[e.target[0]].column) for e in self.edges]
-        return max(min(sum(a <= column < b for a, b in places), MOST_WIRES) - 3, 0)
+        return max(min(sum(a <= column < b for a, b in places), _MOST_WIRES) - 3, 0)
 
     def _column(self, end: tuple[str, str]) -> int:
         return self.boxes[end[0]].column
@@ -280,9 +280,9 @@ class _Placing:
         source, target = self.boxes[edge.source[0]], self.boxes[edge.target[0]]
         band = self.band_of[source.name]
         start, end = self._ends(edge)
-        lane = band.y + (FRAME_TITLE if band.framed else 0.0) + band.body + LANE * (band.lanes[edge.source] + 1)
+        lane = band.y + (_FRAME_TITLE if band.framed else 0.0) + band.body + _LANE * (band.lanes[edge.source] + 1)
         out = spans[source.column][1] + TRACK * (rights[source.column].index(edge.source) + 1)
-        back = spans[target.column][0] - TIP - TRACK * (lefts[target.column].index(edge.source) + 1)
+        back = spans[target.column][0] - _TIP - TRACK * (lefts[target.column].index(edge.source) + 1)
         return Wire(
             edge, ((source.right, start), (out, start), (out, lane), (back, lane), (back, end), (target.x, end)), True
         )
@@ -296,8 +296,8 @@ class _Placing:
     ) -> Frame:
         columns = [self.boxes[n].column for n in band.names]
         first, last = min(columns), max(columns)
-        x = spans[first][0] - _tracks(len(lefts[first])) - FRAME / 2
-        right = spans[last][1] + TRACK * (len(rights[last]) + bool(rights[last])) + FRAME / 2
+        x = spans[first][0] - _tracks(len(lefts[first])) - _FRAME / 2
+        right = spans[last][1] + TRACK * (len(rights[last]) + bool(rights[last])) + _FRAME / 2
         return Frame(band.names, x, band.y, right - x, band.height)
 
 
@@ -337,15 +337,15 @@ def _depths(nodes: Sequence[Node], edges: set[tuple[Node, Node]]) -> dict[Node, 
 
 def _tracks(count: int) -> float:
     """Room for wires that come back to the left of a column, and for their tips."""
-    return TIP + TRACK * (count + 1) if count else 0.0
+    return _TIP + TRACK * (count + 1) if count else 0.0
 
 
 def _stack(items: Sequence[_Item]) -> float:
-    return sum(item.height for item in items) + BOX_GAP * max(len(items) - 1, 0)
+    return sum(item.height for item in items) + _BOX_GAP * max(len(items) - 1, 0)
 
 
 def _height(layer: Sequence[_Band]) -> float:
-    return sum(band.height for band in layer) + BAND_GAP * max(len(layer) - 1, 0)
+    return sum(band.height for band in layer) + _BAND_GAP * max(len(layer) - 1, 0)
 
 
 def _mean(values: Iterable[float]) -> float:

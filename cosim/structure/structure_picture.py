@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from cosim.structure.structure_data import Link, Part, StructureData
 
 COLOURS = {"fresh": SLATE, "held": VERMILION, "iterated": VIOLET, "loop": ALARM, "event": GREEN}
-MEANINGS = {
+_MEANINGS = {
     "fresh": "fresh, value of the end of the step",
     "held": "held, value of the start of the step",
     "iterated": "iterated until it settles",
@@ -55,14 +55,14 @@ MEANINGS = {
     "event": "balise telegrams and clocks, at their own instants",
 }
 ALGORITHMS = {"gauss-seidel": "Gauss-Seidel", "jacobi": "Jacobi", "iterate": "Gauss-Seidel with iterated loops"}
-FILLS = {"FMU": PALE_BLUE, "block": PALE_YELLOW}
-NAME, SMALL, PORT = 9.5, 7.3, 8.0  # font sizes [pt]
-MARGIN, HEAD, KEY_ROW, KEY_LINE = 0.22, 0.62, 0.22, 0.42  # [inch]
-SIDE, MIDDLE, BADGE, ARROW = 0.12, 0.34, 0.105, 0.075  # within a box [inch]
+_FILLS = {"FMU": PALE_BLUE, "block": PALE_YELLOW}
+NAME, SMALL, _PORT = 9.5, 7.3, 8.0  # font sizes [pt]
+MARGIN, HEAD, _KEY_ROW, _KEY_LINE = 0.22, 0.62, 0.22, 0.42  # [inch]
+_SIDE, MIDDLE, _BADGE, _ARROW = 0.12, 0.34, 0.105, 0.075  # within a box [inch]
 FORMATS = ("png", "svg", "pdf")
-PNG_DPI = 160
+_PNG_DPI = 160
 MAX_PIXELS = 12000
-LEAST_DPI = 15  # below it nothing can be read
+_LEAST_DPI = 15  # below it nothing can be read
 
 
 def draw_structure(structure: StructureData, path: str | Path) -> Path:
@@ -82,8 +82,8 @@ def draw_structure(structure: StructureData, path: str | Path) -> Path:
     if kind not in FORMATS:
         raise OutputError(f"Cannot draw to {path}: choose a file that ends in {', '.join(f'.{f}' for f in FORMATS)}.")
     figure = structure_figure(structure)
-    dpi = min(PNG_DPI, MAX_PIXELS / max(figure.get_size_inches()))
-    if kind == "png" and dpi < LEAST_DPI:
+    dpi = min(_PNG_DPI, MAX_PIXELS / max(figure.get_size_inches()))
+    if kind == "png" and dpi < _LEAST_DPI:
         count = len(structure.parts)
         raise OutputError(
             f"A picture of {count} components is too large for {path}: choose a file that ends in .svg or .pdf."
@@ -106,12 +106,12 @@ def structure_figure(structure: StructureData) -> Figure:
     """
     edges = wires_of(structure)
     layout = lay_out(structure, {part.name: box_size(part, edges) for part in structure.parts}, edges)
-    kinds = [kind for kind in MEANINGS if any(edge.kind == kind for edge in edges)]
+    kinds = [kind for kind in _MEANINGS if any(edge.kind == kind for edge in edges)]
     subtitle = _subtitle(structure)
     headline = max(text_width(structure.title, HEADLINE, bold=True), text_width(subtitle, SMALL))
     width = max(layout.width, headline) + 2 * MARGIN
     rows = _key_rows(kinds, width - 2 * MARGIN)
-    height = HEAD + layout.height + MARGIN + KEY_ROW * len(rows) + MARGIN
+    height = HEAD + layout.height + MARGIN + _KEY_ROW * len(rows) + MARGIN
     figure = new_figure((width, height))
     figure.set_layout_engine("none")
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -124,7 +124,7 @@ def structure_figure(structure: StructureData) -> Figure:
     ax.text(left, -HEAD + 0.43, subtitle, fontsize=SMALL, color=QUIET, va="baseline")
     _draw_layout(ax, structure, layout)
     for number, row in enumerate(rows):
-        _draw_key(ax, row, left, layout.height + MARGIN + KEY_ROW * (number + 0.5))
+        _draw_key(ax, row, left, layout.height + MARGIN + _KEY_ROW * (number + 0.5))
     return figure
 
 
@@ -156,20 +156,20 @@ def box_size(part: Part, edges: Sequence[Edge]) -> Size:
     """
     inputs = tuple(dict.fromkeys(e.target[1] for e in edges if e.target[0] == part.name))
     outputs = tuple(dict.fromkeys(e.source[1] for e in edges if e.source[0] == part.name))
-    left, right = (max((text_width(name, PORT) for name in names), default=0.0) for names in (inputs, outputs))
+    left, right = (max((text_width(name, _PORT) for name in names), default=0.0) for names in (inputs, outputs))
     gap = MIDDLE if inputs and outputs else 0.0
-    foot = foot_text(part)
+    foot = _foot_text(part)
     width = max(
         left + gap + right,
-        text_width(part.name, NAME, bold=True) + 3.2 * BADGE,
-        text_width(kind_text(part), SMALL),
+        text_width(part.name, NAME, bold=True) + 3.2 * _BADGE,
+        text_width(_kind_text(part), SMALL),
         text_width(foot, SMALL),
         0.8,
     )
-    return Size(width + 2 * SIDE, inputs, outputs, bool(foot))
+    return Size(width + 2 * _SIDE, inputs, outputs, bool(foot))
 
 
-def kind_text(part: Part) -> str:
+def _kind_text(part: Part) -> str:
     """What stands below the name of a component.
 
     Args:
@@ -179,7 +179,7 @@ def kind_text(part: Part) -> str:
     return f"{what}, {part.rate}" if part.rate else what
 
 
-def foot_text(part: Part) -> str:
+def _foot_text(part: Part) -> str:
     """How many ports are not drawn, since nothing is connected there.
 
     Args:
@@ -216,7 +216,7 @@ def _draw_layout(ax: Axes, structure: StructureData, layout: Layout) -> None:
     for frame in layout.frames:
         _draw_frame(ax, frame, bool(loops & set(frame.names)))
     drawn: set[object] = set()
-    for wire in sorted(layout.wires, key=lambda w: list(MEANINGS).index(w.edge.kind)):
+    for wire in sorted(layout.wires, key=lambda w: list(_MEANINGS).index(w.edge.kind)):
         _draw_wire(ax, wire, drawn)
     for number, part in enumerate(structure.parts, start=1):
         _draw_box(ax, structure, part, layout.boxes[part.name], number)
@@ -241,7 +241,7 @@ def _draw_frame(ax: Axes, frame: Frame, loop: bool) -> None:
 
 
 def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: int) -> None:
-    fill = FILLS.get(part.kind, FILLS["FMU"])
+    fill = _FILLS.get(part.kind, _FILLS["FMU"])
     shape = FancyBboxPatch(
         (box.x + 0.05, box.y + 0.05),
         box.size.width - 0.1,
@@ -254,9 +254,9 @@ def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: 
     )
     ax.add_patch(shape)
     middle = box.y + 0.17
-    ax.add_patch(Circle((box.x + SIDE + BADGE, middle), BADGE, facecolor=INK, edgecolor="none", zorder=3))
+    ax.add_patch(Circle((box.x + _SIDE + _BADGE, middle), _BADGE, facecolor=INK, edgecolor="none", zorder=3))
     ax.text(
-        box.x + SIDE + BADGE,
+        box.x + _SIDE + _BADGE,
         middle + 0.004,
         str(number),
         fontsize=6.8,
@@ -265,19 +265,19 @@ def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: 
         va="center_baseline",
         zorder=4,
     )
-    name_at = box.x + SIDE + 2.7 * BADGE
+    name_at = box.x + _SIDE + 2.7 * _BADGE
     words = {"va": "baseline", "zorder": 3}
     ax.text(name_at, middle + 0.05, _plain(part.name), fontsize=NAME, fontweight="bold", color=INK, **words)
-    ax.text(box.x + SIDE, box.y + 0.385, kind_text(part), fontsize=SMALL, color=QUIET, **words)
+    ax.text(box.x + _SIDE, box.y + 0.385, _kind_text(part), fontsize=SMALL, color=QUIET, **words)
     _draw_ports(ax, box)
     if box.size.foot:
         at = box.bottom - PAD - FOOT + 0.13
-        ax.text(box.x + SIDE, at, foot_text(part), fontsize=SMALL, color=QUIET, **words)
+        ax.text(box.x + _SIDE, at, _foot_text(part), fontsize=SMALL, color=QUIET, **words)
     _draw_feedthrough(ax, structure, part, box)
 
 
 def _draw_ports(ax: Axes, box: Box) -> None:
-    for names, x, side in ((box.size.inputs, box.x + SIDE, "left"), (box.size.outputs, box.right - SIDE, "right")):
+    for names, x, side in ((box.size.inputs, box.x + _SIDE, "left"), (box.size.outputs, box.right - _SIDE, "right")):
         for name in names:
             event = name == EVENT_PORT
             shown = name.strip("()") if event else _plain(name)
@@ -285,7 +285,7 @@ def _draw_ports(ax: Axes, box: Box) -> None:
                 x,
                 box.row(names, name) + 0.035,
                 shown,
-                fontsize=PORT,
+                fontsize=_PORT,
                 ha=side,
                 va="baseline",
                 zorder=3,
@@ -298,8 +298,8 @@ def _draw_feedthrough(ax: Axes, structure: StructureData, part: Part, box: Box) 
     """Thin lines inside a box from inputs to the outputs that they act on directly, between the names."""
     if not box.size.inputs or not box.size.outputs:
         return
-    left = box.x + SIDE + max(text_width(n, PORT) for n in box.size.inputs) + 0.04
-    right = box.right - SIDE - max(text_width(n, PORT) for n in box.size.outputs) - 0.04
+    left = box.x + _SIDE + max(text_width(n, _PORT) for n in box.size.inputs) + 0.04
+    right = box.right - _SIDE - max(text_width(n, _PORT) for n in box.size.outputs) - 0.04
     knots = {pair for loop in structure.loops for pair in pairwise(loop)}
     for port in part.outputs:
         for name in set(port.depends_on or ()) & set(box.size.inputs):
@@ -326,7 +326,7 @@ def _draw_wire(ax: Axes, wire: Wire, drawn: set[object]) -> None:
                 )
             )
     x, y = wire.points[-1]
-    tip = [(x, y), (x - ARROW * 1.5, y - ARROW / 1.6), (x - ARROW * 1.5, y + ARROW / 1.6)]
+    tip = [(x, y), (x - _ARROW * 1.5, y - _ARROW / 1.6), (x - _ARROW * 1.5, y + _ARROW / 1.6)]
     ax.add_patch(Polygon(tip, closed=True, facecolor=COLOURS[kind], edgecolor="none", zorder=1.6))
 
 
@@ -354,17 +354,17 @@ def _key_rows(kinds: Sequence[str], width: float) -> list[list[str]]:
 
 
 def _key_width(kind: str) -> float:
-    return KEY_LINE + 0.07 + text_width(MEANINGS[kind], SMALL) + 0.3
+    return _KEY_LINE + 0.07 + text_width(_MEANINGS[kind], SMALL) + 0.3
 
 
 def _draw_key(ax: Axes, kinds: Sequence[str], x: float, y: float) -> None:
     for kind in kinds:
         _draw_wire(
             ax,
-            Wire(Edge(("", ""), ("", ""), kind), ((x, y), (x, y), (x + KEY_LINE, y), (x + KEY_LINE, y)), False),
+            Wire(Edge(("", ""), ("", ""), kind), ((x, y), (x, y), (x + _KEY_LINE, y), (x + _KEY_LINE, y)), False),
             set(),
         )
-        ax.text(x + KEY_LINE + 0.07, y + 0.035, MEANINGS[kind], fontsize=SMALL, color=INK, va="baseline")
+        ax.text(x + _KEY_LINE + 0.07, y + 0.035, _MEANINGS[kind], fontsize=SMALL, color=INK, va="baseline")
         x += _key_width(kind)
 
 

@@ -24,10 +24,10 @@ SHARES: Mapping[str, tuple[str, str]] = {
 """Measures that are shares of counted things: name to those of the count and of the number in all."""
 RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "judged_time")}
 """Measures that are counts in an hour: name to those of the count and of the time [s]."""
-ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
-GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
-CONSISTENCY = ("nis", "nees", "nis_inside", "nees_inside")
-DETECTION_UNITS = {
+_ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
+_GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
+_CONSISTENCY = ("nis", "nees", "nis_inside", "nees_inside")
+_DETECTION_UNITS = {
     "faults": "1",
     "missed_faults": "1",
     "detections": "1",
@@ -65,7 +65,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
     whole = Phase("whole run", float(result.time[0]), float(result.time[-1]))
     rows = within(result.time, whole, spec.evaluate_after)
     for observer in spec.observers:
-        for quantity in ERROR_UNITS:
+        for quantity in _ERROR_UNITS:
             error = estimation_error(result, spec, observer, quantity)
             if error is None:
                 continue
@@ -73,10 +73,10 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
-    return measures | detection_measures(outcome) | _gap_measures(outcome) | consistency_measures(outcome)
+    return measures | detection_measures(outcome) | _gap_measures(outcome) | _consistency_measures(outcome)
 
 
-def consistency_measures(outcome: Outcome) -> dict[str, float]:
+def _consistency_measures(outcome: Outcome) -> dict[str, float]:
     """How well the covariances of filters fit their errors.
 
     Args:
@@ -141,7 +141,7 @@ def _gap_measures(outcome: Outcome) -> dict[str, float]:
     for name, errors in found.errors.items():
         component = str(spec.odometer).rpartition(".")[0] if name == PLAIN_ODOMETER else name
         times = found.running_time(name)
-        for key, values in zip(GAP_UNITS, (errors, times[~np.isnan(times)]), strict=True):
+        for key, values in zip(_GAP_UNITS, (errors, times[~np.isnan(times)]), strict=True):
             measures[f"{component}.{key}"] = nan if outcome.failure is not None else largest(values)
     return measures
 
@@ -193,9 +193,9 @@ def measure_unit(name: str) -> str | None:
     Args:
         name: of the measure.
     """
-    for quantity, unit in ERROR_UNITS.items():
+    for quantity, unit in _ERROR_UNITS.items():
         if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
             return unit
-    if name.endswith(CONSISTENCY):
+    if name.endswith(_CONSISTENCY):
         return "1"
-    return (GAP_UNITS | DETECTION_UNITS).get(name.rpartition(".")[2])
+    return (_GAP_UNITS | _DETECTION_UNITS).get(name.rpartition(".")[2])

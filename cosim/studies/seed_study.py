@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.simulation.scenario import Scenario
 
-QUARTILES = (25.0, 50.0, 75.0)
+_QUARTILES = (25.0, 50.0, 75.0)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class SeedStudy:
         Args:
             observer: name of the component. phase: name of the phase.
         """
-        low, middle, high = np.percentile(self.errors[observer, phase], QUARTILES)
+        low, middle, high = np.percentile(self.errors[observer, phase], _QUARTILES)
         return float(low), float(middle), float(high)
 
     def rows(self) -> list[dict[str, Any]]:

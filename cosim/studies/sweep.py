@@ -179,12 +179,12 @@ def make_sweep(
                 _check_parameters(varied, [*names, *sweep.names])
             cases.add(settings.get(CASE))
         except CosimError as error:
-            error.args = (f"vary: run {number} ({settings_text(settings)}): {error}", *error.args[1:])
+            error.args = (f"vary: run {number} ({_settings_text(settings)}): {error}", *error.args[1:])
             raise
     return sweep
 
 
-def settings_text(settings: Mapping[str, Any]) -> str:
+def _settings_text(settings: Mapping[str, Any]) -> str:
     """Settings in one line.
 
     Args:

@@ -18,7 +18,7 @@ from plant_models.hybrid.units import UnitError
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-SETTING_UNITS = {
+_SETTING_UNITS = {
     "start": "s",
     "stop": "s",
     "step": "s",
@@ -35,7 +35,7 @@ SETTING_UNITS = {
     "balises.track_end": "m",
     "report.evaluate_after": "s",
 }
-LINES_NAMED = 8
+_LINES_NAMED = 8
 """More lines than these are drawn, but not named in a legend."""
 
 
@@ -67,16 +67,16 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
     if ticks is not None:
         ax.set_xticks(range(len(ticks)), ticks)
-    ax.set_xlabel(with_unit(against, setting_unit(result, against)))
+    ax.set_xlabel(with_unit(against, _setting_unit(result, against)))
     ax.set_ylabel(with_unit(measure, result.unit(measure)))
     if result.failed:
         ax.set_title(f"{len(result.failed)} of {len(result.runs)} runs failed", fontsize="medium", loc="left")
-    if 1 < len(groups) <= LINES_NAMED:
+    if 1 < len(groups) <= _LINES_NAMED:
         ax.legend()
     return ax
 
 
-def setting_unit(result: SweepRuns, name: str) -> str | None:
+def _setting_unit(result: SweepRuns, name: str) -> str | None:
     """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none.
 
     Args:
@@ -86,7 +86,7 @@ def setting_unit(result: SweepRuns, name: str) -> str | None:
     component, _, variable = name.partition(".")
     table = result.scenario.table().components.get(component)
     if table is None:
-        return SETTING_UNITS.get(name)
+        return _SETTING_UNITS.get(name)
     try:
         described: DescribedComponent = describe_component(
             component, table, result.scenario.folder, result.scenario.where

@@ -14,7 +14,7 @@ from cosim.results.summary_file import jsonable
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-INDEX_CSV, INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
+_INDEX_CSV, _INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
 
 
 def run_folder(number: int) -> str:
@@ -69,7 +69,7 @@ def write_index(result: SweepRuns, directory: Path) -> dict[str, Path]:
     Raises:
         OutputError: the folder cannot be written.
     """
-    paths = {"csv": directory / INDEX_CSV, "json": directory / INDEX_JSON}
+    paths = {"csv": directory / _INDEX_CSV, "json": directory / _INDEX_JSON}
     rows = [row | {"folder": _folder(run, directory)} for row, run in zip(result.table(), result.runs, strict=True)]
     try:
         directory.mkdir(parents=True, exist_ok=True)

@@ -48,7 +48,7 @@ class SweepRun:
 
 
 @dataclass(frozen=True)
-class SweepColumn:
+class _SweepColumn:
     """A column of a printed table.
 
     Args:
@@ -90,7 +90,7 @@ class SweepRuns:
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
 
     @property
-    def columns(self) -> list[SweepColumn]:
+    def columns(self) -> list[_SweepColumn]:
         """The measures that printed tables show: those the scenario chooses under ``report.measures``, or all.
 
         Raises:
@@ -98,12 +98,12 @@ class SweepRuns:
         """
         chosen = self.scenario.table().report.measures
         if not chosen or not self.measures:
-            return [SweepColumn(name, with_unit(name, self.unit(name))) for name in self.measures]
+            return [_SweepColumn(name, with_unit(name, self.unit(name))) for name in self.measures]
         unknown = [column.measure for column in chosen if column.measure not in self.measures]
         if unknown:
             raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
         return [
-            SweepColumn(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor)
+            _SweepColumn(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor)
             for c in chosen
         ]
 

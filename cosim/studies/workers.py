@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from cosim.process.last_call import LAST_CALL, make_page
 
-STOP_SECONDS = 5.0
+_STOP_SECONDS = 5.0
 
 
 class Died(NamedTuple):
@@ -143,7 +143,7 @@ class _Worker:
         try:
             return self.pipe.recv()
         except (EOFError, ConnectionResetError):
-            self.process.join(STOP_SECONDS)
+            self.process.join(_STOP_SECONDS)
             return Died(
                 self._last.noted or ": ".join(filter(None, (self._last.words(), _how_it_ended(self.process.exitcode))))
             )
@@ -151,7 +151,7 @@ class _Worker:
     def stop(self) -> None:
         """Let it end; it has nothing to do."""
         self.pipe.close()
-        self.process.join(STOP_SECONDS)
+        self.process.join(_STOP_SECONDS)
         self.kill()
 
     def kill(self) -> None:

@@ -78,7 +78,7 @@ def tunable(scenario: Scenario, component: str | None, bounds: Mapping[str, Boun
         raise ScenarioError("Nothing is tuned: give parameters with bounds, such as {'observer.gain': (0.1, 10.0)}.")
     parameters, start, vectors, entries, diagonals = [], {}, {}, {}, []
     for given, limits in bounds.items():
-        name = given if component is None or _head(given) in scenario_names(scenario) else f"{component}.{given}"
+        name = given if component is None or _head(given) in _scenario_names(scenario) else f"{component}.{given}"
         parameters.append(_bounded(name, limits))
         match = ENTRY.fullmatch(name)
         found = _present(scenario, match[1] if match else name, given)
@@ -98,7 +98,7 @@ def tunable(scenario: Scenario, component: str | None, bounds: Mapping[str, Boun
     return Tunable(SearchSpace(parameters), start, vectors, entries, [note for note in notes if note])
 
 
-def scenario_names(scenario: Scenario) -> list[str]:
+def _scenario_names(scenario: Scenario) -> list[str]:
     """What the name of a setting may begin with: components and tables.
 
     Args:
@@ -171,7 +171,7 @@ def _present(scenario: Scenario, name: str, given: str) -> Any:
 
 def _of_table(scenario: Scenario, head: str, rest: str, given: str) -> float:
     if head not in TABLES or not rest:
-        raise ScenarioError(f"cannot tune {given!r}: no component {head!r}; {nearest(head, scenario_names(scenario))}")
+        raise ScenarioError(f"cannot tune {given!r}: no component {head!r}; {nearest(head, _scenario_names(scenario))}")
     value = getattr(getattr(scenario.table(), head, None), rest, None)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ScenarioError(f"cannot tune {given!r}: the scenario has no number there.")

@@ -21,9 +21,9 @@ from fmu_observer.design.optimisers.optimiser import Optimiser
 from fmu_observer.design.optimisers.search_space import SearchSpace
 
 ITERATIONS = "iterations.jsonl"
-NEAR_BOUND = 1e-3
+_NEAR_BOUND = 1e-3
 """Share of the range of a parameter within which a value counts as standing at its end."""
-NOTHING_BETTER = "No candidate is better with the training seeds than the scenario as it is; its values are kept."
+_NOTHING_BETTER = "No candidate is better with the training seeds than the scenario as it is; its values are kept."
 
 
 class Study:
@@ -58,7 +58,7 @@ class Study:
         self.options = {name: value for name, value in options.items() if name != "gradients"}  # found out here
         self.done: list[Searched] = []
         self._bar = Bar(progress)
-        make_optimiser(method, asked.space, 0, options)  # refused before anything is run
+        _make_optimiser(method, asked.space, 0, options)  # refused before anything is run
 
     def run(self, searches: int, how: str) -> Tuning:
         """Search, and judge the best of all searches.
@@ -81,7 +81,7 @@ class Study:
         better = dict(winner.best) if winner.costs[-1] < before.mean() else None
         judged = self._judged(better, before.tolist(), () if interrupted else self.judging)
         at_best = None if interrupted or better is None else self._directions(better)
-        remarks = [NOTHING_BETTER] if better is None else at_bounds(self.asked.space, better, why)
+        remarks = [_NOTHING_BETTER] if better is None else at_bounds(self.asked.space, better, why)
         return Tuning(
             scenario=self._tuned(better),
             method=self.method,
@@ -133,7 +133,7 @@ class Study:
     def _search(self, seed: int, space: SearchSpace, fixed: Mapping[str, float]) -> None:
         """One search, from this seed of the optimiser; what is found is kept iteration by iteration."""
         exact = {} if self._slopes is None else {"gradients": True}
-        optimiser = make_optimiser(self.method, space, seed, self.options | exact)
+        optimiser = _make_optimiser(self.method, space, seed, self.options | exact)
         costs: list[float] = []
         counts: list[int] = []
         self._bar.text = f"search {seed}"
@@ -223,7 +223,7 @@ def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, 
     told = []
     point = space.coordinates([best[name] for name in space.names])
     for p, value, low, high in zip(space.parameters, point, space.lower, space.upper, strict=True):
-        near = NEAR_BOUND * (high - low)
+        near = _NEAR_BOUND * (high - low)
         if p.name not in held and (value - low <= near or high - value <= near):
             end = "lower" if value - low <= near else "upper"
             told.append(
@@ -233,7 +233,7 @@ def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, 
     return told
 
 
-def make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[str, Any]) -> Optimiser:
+def _make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[str, Any]) -> Optimiser:
     """An optimiser of a search space.
 
     Args:

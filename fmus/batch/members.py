@@ -17,7 +17,7 @@ from fmus.build import plan_fmu
 from fmus.recipes import recipe
 from plant_models.hybrid import HybridSystem
 
-MEMBERS_AT_A_TIME = 256
+_MEMBERS_AT_A_TIME = 256
 """Between so many members of a run, an interruption is felt and progress told."""
 
 
@@ -179,8 +179,8 @@ class Batch:
         taken = np.empty((self.members, len(times), len(results)))
         sources = Columns.of([self._scalar(name) for name in inputs or {}], given)
         targets = Columns.of([self._scalar(name) for name in results], taken)
-        for first in range(0, self.members, MEMBERS_AT_A_TIME):
-            last = min(first + MEMBERS_AT_A_TIME, self.members)
+        for first in range(0, self.members, _MEMBERS_AT_A_TIME):
+            last = min(first + _MEMBERS_AT_A_TIME, self.members)
             self._library.batch_run(self._batch, first, last, times.ctypes.data, len(times), sources, targets)
             if progress is not None:
                 progress(last, self.members)

@@ -22,18 +22,18 @@ UNEVEN = 0.3137
 MICRO = 1e-4
 """A step of this share of the whole one must move the outputs, and by about that share of the change."""
 
-MICRO_EXCESS = 20.0
+_MICRO_EXCESS = 20.0
 """By how much more a tiny step may move an output than its share: an output may start to move faster than on
 average.
 """
 
-ENOUGH = 0.5
+_ENOUGH = 0.5
 """Share of the moving outputs that must behave; a sampled one among them need not move in a tiny step."""
 
 RESOLUTION = 1e-9
 """An output that changes by less than this share of itself over a step does not move."""
 
-DIVISIONS = ((0.5, 0.5), (UNEVEN, 1.0 - UNEVEN))
+_DIVISIONS = ((0.5, 0.5), (UNEVEN, 1.0 - UNEVEN))
 
 
 def repeatable(bench: Bench) -> str:
@@ -59,7 +59,7 @@ def divided_steps(bench: Bench, scale: float = 1.0) -> str:
     start, whole, *all_divided = ends_of_divided_steps(bench, h)
     change = np.abs(whole - start)
     moving = change > RESOLUTION * np.abs(whole)
-    for parts, divided in zip(DIVISIONS, all_divided, strict=True):
+    for parts, divided in zip(_DIVISIONS, all_divided, strict=True):
         same = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
         if not _enough(same, moving):
             shares = " and ".join(f"{part:g}" for part in parts)
@@ -69,7 +69,7 @@ def divided_steps(bench: Bench, scale: float = 1.0) -> str:
 
 
 def ends_of_divided_steps(bench: Bench, h: float) -> list[np.ndarray]:
-    """Outputs before a step of `h` [s], after it, and after it in the parts of `DIVISIONS`, each of shape (q,).
+    """Outputs before a step of `h` [s], after it, and after it in the parts of `_DIVISIONS`, each of shape (q,).
 
     Args:
         bench: the instance under test.
@@ -77,7 +77,7 @@ def ends_of_divided_steps(bench: Bench, h: float) -> list[np.ndarray]:
     warm_up = (bench.h,) * WARM_UP_STEPS
     bench.begin()
     rows = bench.steps((*warm_up, h))[-2:]
-    for parts in DIVISIONS:
+    for parts in _DIVISIONS:
         bench.begin()
         rows.append(bench.steps((*warm_up, *(h * part for part in parts)))[-1])
     return rows
@@ -97,7 +97,7 @@ def short_step(bench: Bench) -> str:
     bench.begin()
     at = np.array(bench.steps((*warm_up, h * UNEVEN, h * MICRO, h * MICRO))[-3:])
     moved = np.abs(np.diff(at, axis=0))
-    small = np.all((moved > 0.0) & (moved <= MICRO_EXCESS * MICRO * change), axis=0)
+    small = np.all((moved > 0.0) & (moved <= _MICRO_EXCESS * MICRO * change), axis=0)
     if not moving.any() or _enough(small, moving):
         return ""
     still = bool(np.all(moved[:, moving & ~small] == 0.0))
@@ -171,4 +171,4 @@ def worst(bench: Bench, a: np.ndarray, b: np.ndarray) -> str:
 
 def _enough(good: np.ndarray, moving: np.ndarray) -> bool:
     """Whether most of the moving outputs are good; of outputs that do not move, all must be."""
-    return bool(np.mean(good[moving]) >= ENOUGH) if moving.any() else bool(np.all(good))
+    return bool(np.mean(good[moving]) >= _ENOUGH) if moving.any() else bool(np.all(good))

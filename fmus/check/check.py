@@ -18,7 +18,9 @@ NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
 
 REPEATED = "repeated run"
 ONE_INSTANCE = "have one instance of it in a process, a fresh process for each run"
-NO_PROBE = "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
+_NO_PROBE = (
+    "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
+)
 SLOW = "it hangs or is slow there: a longer --timeout tells which"
 MISSING = "do not use the capabilities whose functions are missing"
 NO_REDOING = "do not redo steps: the master finds crossings by shorter steps or interpolation, and iterates nothing"
@@ -72,5 +74,5 @@ class Check(ABC):
             crashed: whether it ended by itself, and not by the time limit.
         """
         verdict = LIMIT if crashed and cls.failing is NOTE else cls.failing
-        advice = f"{cls.advice}; {NO_PROBE}" if crashed and cls.advice else cls.advice if crashed else SLOW
+        advice = f"{cls.advice}; {_NO_PROBE}" if crashed and cls.advice else cls.advice if crashed else SLOW
         return Finding(cls.name, verdict, detail, advice)

@@ -19,8 +19,8 @@ from fmus.fmi.types import NUMERIC_TYPES
 from fmus.plain import one_line
 
 LOADING = "loading the library"
-MESSAGES_KEPT = 20
-OWN_MISTAKES = (
+_MESSAGES_KEPT = 20
+_OWN_MISTAKES = (
     TypeError,
     AttributeError,
     LookupError,
@@ -49,12 +49,12 @@ class FmuInstance(Instance):
         SlaveError: the library cannot be loaded.
     """
 
-    mistakes = (SlaveError, *OWN_MISTAKES)
+    mistakes = (SlaveError, *_OWN_MISTAKES)
 
     def __init__(
         self, folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
     ) -> None:
-        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
+        self.messages: deque[str] = deque(maxlen=_MESSAGES_KEPT)
         slave = self.guard(LOADING, lambda: load(folder, description, self.interface, name))
         super().__init__(name, slave, description)
         self.logging = logging

@@ -26,7 +26,7 @@ rounding.
 """
 
 
-SCATTERED = 0.5 + np.sqrt(np.arange(2.0, 10.0)) % 1.0
+_SCATTERED = 0.5 + np.sqrt(np.arange(2.0, 10.0)) % 1.0
 """Steps, as multiples of that of the differences, at which the rounding of a column is looked at: unevenly spaced, for
 steps that fall on the grid of what is rounded show nothing.
 """
@@ -76,7 +76,7 @@ def _wrong(
     slack += NOTHING / nominal
     bad = ~((said >= low - slack) & (said <= high + slack))
     if bad.any() and np.isfinite(size).all():
-        slack = slack + 2.0 * _scatter([evaluate(value + share * delta) for share in SCATTERED]) / delta
+        slack = slack + 2.0 * _scatter([evaluate(value + share * delta) for share in _SCATTERED]) / delta
         bad = ~((said >= low - slack) & (said <= high + slack))
     if not bad.any():
         return None
@@ -85,9 +85,9 @@ def _wrong(
 
 
 def _scatter(values: Sequence[np.ndarray]) -> np.ndarray:
-    """Largest distance of values at `SCATTERED` from a line through them, by unknown."""
+    """Largest distance of values at `_SCATTERED` from a line through them, by unknown."""
     seen = np.array(values)
     if not np.isfinite(seen).all():
         return np.zeros(seen.shape[1])
-    line = np.polynomial.polynomial.polyfit(SCATTERED, seen, 1)
-    return np.asarray(np.max(np.abs(seen - np.polynomial.polynomial.polyval(SCATTERED, line).T), axis=0))
+    line = np.polynomial.polynomial.polyfit(_SCATTERED, seen, 1)
+    return np.asarray(np.max(np.abs(seen - np.polynomial.polynomial.polyval(_SCATTERED, line).T), axis=0))

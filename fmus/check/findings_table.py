@@ -9,7 +9,7 @@ from fmus.check.run import CheckReport
 from fmus.fmi.archive import INTERFACES
 from fmus.plain import plain
 
-BULLET = "  - "
+_BULLET = "  - "
 
 
 def table(report: CheckReport) -> str:
@@ -18,8 +18,8 @@ def table(report: CheckReport) -> str:
     lines = [_heading(report), ""]
     lines += [f"{f.check:{width}}  {f.verdict:8}  {f.detail}".rstrip() for f in report.findings]
     lines += ["", f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"]
-    lines += [f"{BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
-    return plain("\n".join([*lines, "", "What to trust:", *(f"{BULLET}{sentence}" for sentence in report.trust)]))
+    lines += [f"{_BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
+    return plain("\n".join([*lines, "", "What to trust:", *(f"{_BULLET}{sentence}" for sentence in report.trust)]))
 
 
 def as_data(report: CheckReport) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from fmus.check.job import Job
 from fmus.check.known_checks import CHECKS
 from fmus.check.worker import unrun
 
-START_LIMIT = 60.0
+_START_LIMIT = 60.0
 """Time a child may take to start before its first check [s]; a loaded machine takes seconds."""
 
 GRACE = 10.0
@@ -39,9 +39,9 @@ MEMORY = 4 * 1024**3
 """Memory that an FMU, its processes and Python may take together [bytes]."""
 
 LEFT = "processes"
-CONSOLE = "console output"
+_CONSOLE = "console output"
 SHOWN = 80
-PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+_PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass
@@ -102,7 +102,7 @@ def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) ->
         with suppress(OSError):  # a child that died at once is seen below
             process.stdin.write((job.to_json() + "\n").encode())
             process.stdin.close()
-        limit = START_LIMIT
+        limit = _START_LIMIT
         while True:
             try:
                 line = lines.get(timeout=limit)
@@ -118,7 +118,7 @@ def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) ->
                 progress(seen.current)
             elif "finding" in message:
                 seen.findings.append(Finding.from_dict(message["finding"]))
-                seen.current, limit = "", START_LIMIT
+                seen.current, limit = "", _START_LIMIT
     return seen
 
 
@@ -126,7 +126,7 @@ def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) ->
 def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     """A child in a folder and a session of its own; it and what it started are ended here."""
     with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as folder:
-        paths = [str(PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+        paths = [str(_PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         process = subprocess.Popen(
             [sys.executable, "-P", "-m", "fmus.check.watchdog", str(PROCESSES), str(MEMORY)],
             stdin=subprocess.PIPE,
@@ -213,5 +213,5 @@ def _console(console: IO[bytes]) -> Finding:
     console.seek(0)
     first = console.readline().decode("utf-8", "replace").strip()[:SHOWN]
     if not size:
-        return Finding(CONSOLE, Verdict.PASS, "nothing is printed past the logger")
-    return Finding(CONSOLE, Verdict.NOTE, f"{size} bytes were printed past the logger, beginning with: {first!r}")
+        return Finding(_CONSOLE, Verdict.PASS, "nothing is printed past the logger")
+    return Finding(_CONSOLE, Verdict.NOTE, f"{size} bytes were printed past the logger, beginning with: {first!r}")

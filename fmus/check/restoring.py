@@ -19,7 +19,7 @@ from fmus.check.runner import WARM_UP_STEPS, Bench
 from fmus.fmi.instance import FAILURES
 
 Restores = Literal["exact", "within_tolerance", "no"]
-Trip = tuple[list[np.ndarray], np.ndarray]
+_Trip = tuple[list[np.ndarray], np.ndarray]
 
 USUAL_TOLERANCE = 1e-4
 """Relative tolerance of a solver that says nothing of its own: what most tools export with."""
@@ -27,7 +27,7 @@ USUAL_TOLERANCE = 1e-4
 SOLVER_FACTOR = 10.0
 """Restarts and the steps that are compared may each err by the tolerance."""
 
-REMAINDER = 0.1
+_REMAINDER = 0.1
 """A restored state must undo at least all but this share of what the excursion had changed, whatever the tolerance."""
 
 FAR = 1e3
@@ -83,7 +83,7 @@ def restoring(bench: Bench) -> Restoring:
     return _judged(np.array(first), trips, solver_tolerance(bench), f"after a restored state {problem}")
 
 
-def _trip(bench: Bench, state: Any, saved_at: float, path: Sequence[float], distance: float = 1.0) -> Trip:
+def _trip(bench: Bench, state: Any, saved_at: float, path: Sequence[float], distance: float = 1.0) -> _Trip:
     """The outputs after an excursion, shape (q,), and the rows that follow once the state is restored, shape (k, q)."""
     go_elsewhere(bench, distance)
     away = bench.outputs()
@@ -100,7 +100,7 @@ def solver_tolerance(bench: Bench) -> float:
     return max(bench.component.tolerance or 0.0, USUAL_TOLERANCE)
 
 
-def _judged(first: np.ndarray, trips: Sequence[Trip], tolerance: float, problem: str) -> Restoring:
+def _judged(first: np.ndarray, trips: Sequence[_Trip], tolerance: float, problem: str) -> Restoring:
     """Compare the rows after saving, shape (k, q), with those after each excursion; `tolerance` is the solver's,
     relative.
     """
@@ -111,7 +111,7 @@ def _judged(first: np.ndarray, trips: Sequence[Trip], tolerance: float, problem:
     for rows, away in trips:
         apart, moved = largest(first, np.array(rows)), np.abs(away - first[0])
         rounding = apart <= ROUNDING * np.maximum(size, 1.0)
-        solver = (apart <= SOLVER_FACTOR * tolerance * scale) & (apart <= REMAINDER * moved)
+        solver = (apart <= SOLVER_FACTOR * tolerance * scale) & (apart <= _REMAINDER * moved)
         if not np.all(rounding | solver):
             verdict = "no"
         shares = apart / np.maximum(scale, np.finfo(float).tiny)

@@ -24,19 +24,19 @@ from fmus.fmi.instance import INSTANTIATING
 from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION
 from fmus.fmi.types import NUMERIC_TYPES
 
-TIMEOUT = 30.0
-DEFAULT_STEP = 0.01
-STEPS_TO_STOP = 1000
+_TIMEOUT = 30.0
+_DEFAULT_STEP = 0.01
+_STEPS_TO_STOP = 1000
 STEPS = 50
 """Of the longest run, where nothing else is asked for."""
 
 WHOLE = 1e-6
 """Share of a step by which an end may miss a whole number of steps."""
 
-UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
-NO_SLAVE = "there is no co-simulation: this package's master cannot step it"
-UNSETTABLE = frozenset({"output", "independent", "calculatedParameter"})
-STATIC = {"validation": validation, "platforms": platforms}
+_UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
+_NO_SLAVE = "there is no co-simulation: this package's master cannot step it"
+_UNSETTABLE = frozenset({"output", "independent", "calculatedParameter"})
+_STATIC = {"validation": validation, "platforms": platforms}
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def check_fmu(
     *,
     step: float | None = None,
     starts: Mapping[str, float] | None = None,
-    timeout: float = TIMEOUT,
+    timeout: float = _TIMEOUT,
     steps: int | None = None,
     until: float | None = None,
     progress: Callable[[str], None] = lambda _: None,
@@ -114,7 +114,7 @@ def check_fmu(
     archive = open_archive(Path(path))
     archive.demand_this_platform()
     description = archive.description
-    size = default_step(description) if step is None else step
+    size = _default_step(description) if step is None else step
     if not 0.0 < size < math.inf or not 0.0 < timeout < math.inf:
         raise ValueError(
             f"The communication step ({size:g} s) and the time limit ({timeout:g} s) must be positive and finite."
@@ -129,7 +129,7 @@ def check_fmu(
 
 def _static_findings(archive: Archive, progress: Callable[[str], None]) -> Iterator[Finding]:
     """Of checks that run nothing of the FMU."""
-    for name, static in STATIC.items():
+    for name, static in _STATIC.items():
         progress(name)
         outcome = static(archive)
         yield Finding(name, outcome.verdict or Verdict.NOTE, outcome.detail)
@@ -155,7 +155,7 @@ def _run_findings(archive: Archive, job: Job, progress: Callable[[str], None]) -
     _demand_runnable(archive, findings)
     findings += [Finding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
     if CO_SIMULATION not in archive.interfaces:
-        findings.append(Finding("interface", Verdict.LIMIT, NO_SLAVE, "integrate it with a solver of your own"))
+        findings.append(Finding("interface", Verdict.LIMIT, _NO_SLAVE, "integrate it with a solver of your own"))
     return findings
 
 
@@ -165,10 +165,10 @@ def check_count(archive: Archive) -> int:
     Args:
         archive: the FMU file.
     """
-    return len(STATIC) + sum(len(checks_of(interface)) for interface in archive.interfaces)
+    return len(_STATIC) + sum(len(checks_of(interface)) for interface in archive.interfaces)
 
 
-def default_step(description: ModelDescription) -> float:
+def _default_step(description: ModelDescription) -> float:
     """The communication step to check with [s].
 
     Args:
@@ -176,11 +176,11 @@ def default_step(description: ModelDescription) -> float:
     """
     experiment = description.defaultExperiment
     if experiment is None:
-        return DEFAULT_STEP
+        return _DEFAULT_STEP
     if experiment.stepSize:
         return float(experiment.stepSize)
     length = float(experiment.stopTime or 0.0) - float(experiment.startTime or 0.0)
-    return length / STEPS_TO_STOP if length > 0.0 else DEFAULT_STEP
+    return length / _STEPS_TO_STOP if length > 0.0 else _DEFAULT_STEP
 
 
 def _start_time(description: ModelDescription) -> float:
@@ -224,7 +224,7 @@ def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
     """
     prefix = "" if CO_SIMULATION in archive.interfaces else "model exchange: "
     for finding in findings:
-        if finding.check in (f"{prefix}loading", f"{prefix}initialise") and finding.detail.startswith(UNRUNNABLE):
+        if finding.check in (f"{prefix}loading", f"{prefix}initialise") and finding.detail.startswith(_UNRUNNABLE):
             where = f"{archive.path} cannot be run on this machine (is a library or a licence missing?)"
             raise NotAnFmuError(f"{where}: {finding.detail}")
 
@@ -237,7 +237,7 @@ def _demand_settable(description: ModelDescription, starts: Mapping[str, float])
             near = get_close_matches(name, list(variables), 3, 0.5)
             hint = f"; did you mean {', '.join(map(repr, near))}?" if near else ""
             raise ValueError(f"There is no variable {name!r} to set{hint}")
-        if found.causality in UNSETTABLE or found.variability == "constant":
+        if found.causality in _UNSETTABLE or found.variability == "constant":
             raise ValueError(f"{name} cannot be set: it is '{found.causality}' and '{found.variability}'.")
         if found.type not in NUMERIC_TYPES or found.shape:
             raise ValueError(

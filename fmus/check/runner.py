@@ -14,13 +14,13 @@ from fmus.fmi.slave import Slave
 
 WARM_UP_STEPS = 5
 SLOW_STEPS = 25  # a quarter of a second at the usual step: what is sampled at 10 Hz moves in it
-EXCITATIONS = (0.0, 1.0, 1e3, 1e5)
-SPREADS = (0.0, 0.1)
+_EXCITATIONS = (0.0, 1.0, 1e3, 1e5)
+_SPREADS = (0.0, 0.1)
 MOVING = (None, "continuous", "discrete")
 END = 1e6
 """Stop time that is announced where the FMU has no default experiment, seconds after the start [s]."""
 
-LOOKED_AT = 200
+_LOOKED_AT = 200
 """Local variables that are looked at where there is no output."""
 
 
@@ -82,7 +82,7 @@ class Bench:
     @property
     def output_names(self) -> list[str]:
         """Names of the outputs, elements of arrays included; where there are none, of the first local variables."""
-        locals_ = self.component.names("local")[:LOOKED_AT]
+        locals_ = self.component.names("local")[:_LOOKED_AT]
         return self.component.names("output") or [
             n for n in locals_ if self.component.variables[n].variability in MOVING
         ]
@@ -104,7 +104,7 @@ class Bench:
         """
         if self.excited is None:
             since = perf_counter()
-            tries = [(amplitude, spread) for spread in SPREADS for amplitude in EXCITATIONS]
+            tries = [(amplitude, spread) for spread in _SPREADS for amplitude in _EXCITATIONS]
             self.excited = any(
                 self._moves(*one, change=change, steps=steps)
                 for change, steps in ((False, WARM_UP_STEPS), (True, WARM_UP_STEPS), (False, SLOW_STEPS))

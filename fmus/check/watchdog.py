@@ -26,8 +26,8 @@ PERIOD = 0.05
 LAST = 5.0
 """Time for ending all descendants [s]."""
 
-PR_SET_CHILD_SUBREAPER = 36
-PROC = Path("/proc")
+_PR_SET_CHILD_SUBREAPER = 36
+_PROC = Path("/proc")
 
 
 def main() -> None:
@@ -69,7 +69,7 @@ def _watch(child: int, parent: int, processes: int, memory: int) -> None:
 
 def _adopt_orphans() -> None:
     with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def _reaped(child: int | None = None) -> int | None:
@@ -115,7 +115,7 @@ def _descendants(number: int) -> Iterator[int]:
     """All descendants of a process, where the system tells."""
     children: list[int] = []
     with suppress(OSError):
-        for tasks in (PROC / str(number) / "task").iterdir():
+        for tasks in (_PROC / str(number) / "task").iterdir():
             children += map(int, (tasks / "children").read_text(encoding="ascii").split())
     for child in children:
         yield child
@@ -125,7 +125,7 @@ def _descendants(number: int) -> Iterator[int]:
 def _resident(number: int) -> int:
     """Memory of a process in main memory [bytes]."""
     with suppress(OSError, ValueError):
-        return int((PROC / str(number) / "statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        return int((_PROC / str(number) / "statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     return 0
 
 

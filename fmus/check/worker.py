@@ -26,7 +26,7 @@ from plant_models.user_file import UserFileError, load_class
 
 BY_HAND = "check this by hand"
 DIFFERS = "not run, because equal runs differ"
-MAX_FILE_BYTES = 256 * 1024**2
+_MAX_FILE_BYTES = 256 * 1024**2
 """A file that the FMU writes, its console output included, may not grow beyond this."""
 
 
@@ -124,4 +124,4 @@ def _limit() -> None:
         import resource  # noqa: PLC0415 - exists on POSIX systems only
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (MAX_FILE_BYTES, MAX_FILE_BYTES))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (_MAX_FILE_BYTES, _MAX_FILE_BYTES))

@@ -14,7 +14,7 @@ from fmus.cli.failures import EXPECTED, in_words
 from fmus.cli.signals import BROKEN_PIPE, forget_output, interruptible
 from fmus.plain import plain
 
-FAILED = 2
+_FAILED = 2
 COMMANDS = (
     Command("list", "fmus.cli.fmu_list_command", "models that can be exported, with their presets and options"),
     Command("build", "fmus.cli.build_command", "export models as native FMUs"),
@@ -44,8 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except EXPECTED as error:
         print(f"fmus: {plain(in_words(error, options))}", file=sys.stderr)
-        return FAILED
+        return _FAILED
     except KeyboardInterrupt:
         print("fmus: interrupted.", file=sys.stderr)
-        return FAILED
+        return _FAILED
     return code

@@ -36,7 +36,7 @@ examples:
 
 
 @dataclass(frozen=True)
-class BuildJob:
+class _BuildJob:
     """One FMU to build: what, for which version of FMI, and where to."""
 
     system: Any
@@ -96,14 +96,14 @@ def execute(options: argparse.Namespace) -> int:
     return 0
 
 
-def _build(jobs: Sequence[BuildJob], protocol: EventProtocol, options: argparse.Namespace) -> None:
+def _build(jobs: Sequence[_BuildJob], protocol: EventProtocol, options: argparse.Namespace) -> None:
     """Build one after the other, with a bar over the libraries of all."""
     libraries = len(choose_targets(options.platform)) * len(jobs)
     number = count(1)
     with ProgressBar("library", silent=libraries < 2) as bar:
         for job in jobs:
 
-            def progress(platform: str, job: BuildJob = job) -> None:
+            def progress(platform: str, job: _BuildJob = job) -> None:
                 bar(next(number), libraries, f"{job.system.name} {platform}")
 
             settings: dict[str, Any] = {"platforms": options.platform, "protocol": protocol, "progress": progress}
@@ -132,7 +132,7 @@ def _run_hosted(options: argparse.Namespace) -> int:
     return 0
 
 
-def _summary(job: BuildJob, path: Path) -> str:
+def _summary(job: _BuildJob, path: Path) -> str:
     platforms = platforms_of(path)
     return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
 
@@ -141,7 +141,7 @@ def _summary(job: BuildJob, path: Path) -> str:
 # ------------------------------------------------------------------------------------------------------
 
 
-def _jobs(options: argparse.Namespace) -> list[BuildJob]:
+def _jobs(options: argparse.Namespace) -> list[_BuildJob]:
     names, versions = _names(options), VERSIONS[options.fmi]
     if len(names) > 1 and (options.preset or options.option):
         raise ValueError("--preset and --option belong to one model; build the models one by one.")
@@ -155,7 +155,7 @@ def _jobs(options: argparse.Namespace) -> list[BuildJob]:
     folders = {
         version: options.output / f"fmi{version}" if len(versions) > 1 else options.output for version in versions
     }
-    return [BuildJob(system, version, folders[version]) for version in versions for system in systems]
+    return [_BuildJob(system, version, folders[version]) for version in versions for system in systems]
 
 
 def _names(options: argparse.Namespace) -> list[str]:

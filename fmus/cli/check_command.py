@@ -21,8 +21,8 @@ from fmus.cli.commands import argument, one_of
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
 
-CLEAN, PROBLEMS, UNCHECKED = 0, 1, 2
-TRUTH = {"true": 1.0, "false": 0.0}
+CLEAN, PROBLEMS, _UNCHECKED = 0, 1, 2
+_TRUTH = {"true": 1.0, "false": 0.0}
 
 PARSER: dict[str, Any] = {}
 ARGUMENTS = (
@@ -63,7 +63,7 @@ def _exit_code(report: CheckReport, strict: bool) -> int:
     if report.verdict is Class.DISTRUST:
         return PROBLEMS
     if any(finding.verdict is Verdict.ERROR for finding in report.findings):
-        return UNCHECKED
+        return _UNCHECKED
     return PROBLEMS if strict and not report.clean else CLEAN
 
 
@@ -89,7 +89,7 @@ def _starts(words: Sequence[str]) -> dict[str, float]:
         try:
             if not equals or not name:
                 raise ValueError
-            starts[name] = TRUTH[value.lower()] if value.lower() in TRUTH else float(value)
+            starts[name] = _TRUTH[value.lower()] if value.lower() in _TRUTH else float(value)
         except ValueError:
             raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.") from None
     return starts

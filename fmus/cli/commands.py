@@ -62,7 +62,7 @@ class Group:
             added = parser.add_mutually_exclusive_group()
         else:
             added = parser.add_argument_group(self.title, self.description)
-        add_arguments(added, self.arguments)
+        _add_arguments(added, self.arguments)
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def one_of(*arguments: Argument) -> Group:
     return Group(arguments)
 
 
-def add_arguments(parser: Any, arguments: Sequence[Argument | Group | Actions]) -> None:
+def _add_arguments(parser: Any, arguments: Sequence[Argument | Group | Actions]) -> None:
     """Add arguments to a parser or to a group of one.
 
     Args:
@@ -134,7 +134,7 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
 
 
 def _fill(parser: Any, arguments: Sequence[Argument | Group | Actions], execute: Execute | None) -> None:
-    add_arguments(parser, arguments)
+    _add_arguments(parser, arguments)
     if execute is not None:
         parser.set_defaults(execute=execute)
 

@@ -12,11 +12,11 @@ FUNCTION = re.compile(
     r"\{(?:.*\}|[\s\S]*?^\})\n\n?",
     re.MULTILINE,
 )
-SPARSITY = re.compile(
+_SPARSITY = re.compile(
     r"^(?:#define (?P<macro>casadi_s\d+) |static const casadi_int (?P<array>casadi_s\d+)\[).*\n", re.MULTILINE
 )
 
-INLINE = {
+_INLINE = {
     "return fmax(x, y);": "return y != y ? x : x > y ? x : y;",
     "return fmin(x, y);": "return y != y ? x : x < y ? x : y;",
     "for (i=0; i<n; ++i) *y++ = *x++;": "if (n < 8) for (i=0; i<n; ++i) *y++ = *x++;\n"
@@ -38,10 +38,10 @@ def private_source(source: str, called: Collection[str]) -> str:
     Returns:
         The source with only those functions and what they need, all of them static.
     """
-    for call, inline in INLINE.items():
+    for call, inline in _INLINE.items():
         source = source.replace(call, inline)
     kept = FUNCTION.sub(lambda match: _kept(match, called), source)
-    return SPARSITY.sub(lambda match: match[0] if _is_used(match["macro"] or match["array"], kept) else "", kept)
+    return _SPARSITY.sub(lambda match: match[0] if _is_used(match["macro"] or match["array"], kept) else "", kept)
 
 
 def _kept(match: re.Match[str], called: Collection[str]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """All but `Char` of XML 1.0, section 2.2."""
 
 DIGITS = 12
@@ -25,7 +25,7 @@ def check_text(text: str, whose: str) -> None:
     Raises:
         TextRefusedError: there is such a character.
     """
-    found = FORBIDDEN.search(text)
+    found = _FORBIDDEN.search(text)
     if found:
         what = f"the character U+{ord(found[0]):04X} at position {found.start() + 1}"
         raise TextRefusedError(f"{whose} holds {what}, which XML 1.0 forbids; remove it.")

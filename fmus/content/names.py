@@ -10,11 +10,11 @@ from pathlib import Path
 
 from plant_models.hybrid import HybridSystem
 
-LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 LONGEST = 63
 """Significant characters of a name in C11, 5.2.4.1."""
 
-C_KEYWORDS = frozenset(
+_C_KEYWORDS = frozenset(
     {
         "auto",
         "break",
@@ -66,13 +66,13 @@ def check_names(system: HybridSystem) -> None:
     """
     where = f"{type(system).__name__} ({system.name!r})"
     for what, name in _names(system):
-        if not LEGAL.fullmatch(name):
+        if not _LEGAL.fullmatch(name):
             raise NameRefusedError(
                 f"{where}: the name {name!r} of {what} is not legal in C and FMI; use a-z, A-Z, 0-9, '_'."
             )
         if len(name) > LONGEST:
             raise NameRefusedError(f"{where}: the name {name!r} of {what} is too long; {LONGEST} characters are legal.")
-    if system.name in C_KEYWORDS | _runtime_words():
+    if system.name in _C_KEYWORDS | _runtime_words():
         raise NameRefusedError(
             f"{where}: the name {system.name!r} is a word of C or of the runtime; choose another one."
         )

@@ -17,7 +17,7 @@ FEWEST = 8  # repetitions worth a loop
 LONGEST = 6  # statements that repeat together: what CasADi makes of one selection, and some more
 PLACE = re.compile(r"\ba(\d+)\b|\[(\d+)\]")
 DECLARED = re.compile(r"^  casadi_real ((?:a\d+, )*a\d+);\n", re.MULTILINE)
-PER_LINE = 12
+_PER_LINE = 12
 
 
 class _Line(NamedTuple):
@@ -58,7 +58,7 @@ def _rolled(function: str) -> str:
     digits = len(DECLARED.search(function)[1].split(", ")[0]) - 1  # type: ignore[index]
     rest = [f"a{number:0{digits}}" for number in declared if number not in in_loops]
     head = [f"  casadi_real a[{max(in_loops) + 1}];"] if in_loops else []
-    head += [f"  casadi_real {', '.join(rest[i : i + PER_LINE])};" for i in range(0, len(rest), PER_LINE)]
+    head += [f"  casadi_real {', '.join(rest[i : i + _PER_LINE])};" for i in range(0, len(rest), _PER_LINE)]
     written, done = [lines[0], *head], 1
     for run in (*runs, _Run(len(lines), 0, 0, ())):
         written += [_as_elements(line, in_loops) for line in lines[done : run.first]]

@@ -10,7 +10,7 @@ from plant_models.hybrid import HybridSystem
 OWN_PACKAGES = {"plant_models", "fmu_observer", "fmus", "cosim"}
 
 
-def is_ours(system: HybridSystem) -> bool:
+def _is_ours(system: HybridSystem) -> bool:
     """Whether a system ships with this package; any other is its author's.
 
     Args:
@@ -42,7 +42,7 @@ def model_terms(system: HybridSystem) -> str:
     Args:
         system: the system in the FMU.
     """
-    if is_ours(system):
+    if _is_ours(system):
         return f"The model {system.name} is part of fmu-observer: BSD-3-Clause, see fmu-observer.txt."
     return f"The model {system.name} is not part of fmu-observer: its terms are its author's to state."
 

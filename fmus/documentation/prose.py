@@ -11,7 +11,7 @@ from typing import Literal
 Block = tuple[Literal["p", "ul", "ol", "options"], list[str]]
 """What it is, a paragraph, one of two lists, or the options of the model as ``name: meaning``; and its texts."""
 
-PYTHON_ONLY = ("Raises:", "Returns:", "Yields:", "Example:")
+_PYTHON_ONLY = ("Raises:", "Returns:", "Yields:", "Example:")
 """Sections that say nothing to the user of an FMU."""
 CODE = re.compile(r"``(.+?)``|`([^`]+?)`")
 
@@ -25,7 +25,7 @@ def blocks(docstring: str) -> list[Block]:
     Returns:
         The blocks in their order.
     """
-    return [_block(lines) for lines in _paragraphs(docstring) if lines[0].strip() not in PYTHON_ONLY]
+    return [_block(lines) for lines in _paragraphs(docstring) if lines[0].strip() not in _PYTHON_ONLY]
 
 
 def pieces(text: str) -> list[tuple[str, bool]]:

@@ -11,11 +11,11 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from plant_models.hybrid import HybridSystem
 
-UNITS_OF_TYPES = {"Clock": "clock", "Integer": "whole number", "Int32": "whole number", "Enumeration": "choice"}
+_UNITS_OF_TYPES = {"Clock": "clock", "Integer": "whole number", "Int32": "whole number", "Enumeration": "choice"}
 
 
 @dataclass(frozen=True, slots=True)
-class VariableRow:
+class _VariableRow:
     """A variable in words.
 
     Args:
@@ -36,7 +36,7 @@ class VariableRow:
 
 
 @dataclass(frozen=True, slots=True)
-class CertificateRow:
+class _CertificateRow:
     """What the stability check says of a preset.
 
     Args:
@@ -54,10 +54,10 @@ class CertificateRow:
     event: str
 
 
-_known: WeakKeyDictionary[HybridSystem, list[CertificateRow]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[HybridSystem, list[_CertificateRow]] = WeakKeyDictionary()
 
 
-def variable_rows(description: ModelDescription, causality: str) -> list[VariableRow]:
+def variable_rows(description: ModelDescription, causality: str) -> list[_VariableRow]:
     """The variables of one causality.
 
     Args:
@@ -67,11 +67,11 @@ def variable_rows(description: ModelDescription, causality: str) -> list[Variabl
     return [_variable(v) for v in description.modelVariables if v.causality == causality]
 
 
-def _variable(variable: ModelVariable) -> VariableRow:
-    unit = variable.unit or UNITS_OF_TYPES.get(str(variable.type), "1")
+def _variable(variable: ModelVariable) -> _VariableRow:
+    unit = variable.unit or _UNITS_OF_TYPES.get(str(variable.type), "1")
     shown = f"{unit} ({variable.displayUnit})" if variable.displayUnit else unit
     has_start = variable.start is not None
-    return VariableRow(variable.name, shown, _start(variable), _range(variable), variable.description or "", has_start)
+    return _VariableRow(variable.name, shown, _start(variable), _range(variable), variable.description or "", has_start)
 
 
 def _start(variable: ModelVariable) -> str:
@@ -110,7 +110,7 @@ def preset_rows(system: HybridSystem) -> list[list[str]]:
     ]
 
 
-def certificate_rows(system: HybridSystem) -> list[CertificateRow] | None:
+def certificate_rows(system: HybridSystem) -> list[_CertificateRow] | None:
     """What the stability check says of each preset; None where the system has none.
 
     A certificate is found with the values of the preset; whoever changes a gain in the FMU asks again.
@@ -125,15 +125,15 @@ def certificate_rows(system: HybridSystem) -> list[CertificateRow] | None:
     return _known[system]
 
 
-def _certificate(system: Any, preset: str | None) -> CertificateRow:
+def _certificate(system: Any, preset: str | None) -> _CertificateRow:
     name = preset or "declared starts"
     try:
         certificate = system.certify(0.1, preset=preset)  # the limits do not depend on the gap asked for
         limits = (_limit(certificate.aperiodic_limit, certificate), _limit(certificate.constant_limit, certificate))
         notes = f" Also checked: {'; '.join(certificate.notes)}." if certificate.notes else ""
-        return CertificateRow(name, *limits, f"Checked on the {certificate.error_model}.{notes}", certificate.event)
+        return _CertificateRow(name, *limits, f"Checked on the {certificate.error_model}.{notes}", certificate.event)
     except Exception as error:  # a user's own check may fail in any way; the FMU is none the worse
-        return CertificateRow(name, "unknown", "unknown", f"The check failed: {error}", "")
+        return _CertificateRow(name, "unknown", "unknown", f"The check failed: {error}", "")
 
 
 def _limit(limit: float, certificate: Any) -> str:

@@ -22,10 +22,10 @@ from fmu_observer.block import make_block
 from plant_models.hybrid import HybridSystem
 
 OWN_VERSION = "0.1.0"
-MODEL_FOLDER = "model"
+_MODEL_FOLDER = "model"
 """Folder of the user's own files in ``resources/``."""
 
-BLOCK_FOLDER = Path(fmu_observer.__file__).parent
+_BLOCK_FOLDER = Path(fmu_observer.__file__).parent
 
 CALLS = (
     "instantiate",
@@ -38,7 +38,7 @@ CALLS = (
     "getReal",
     "setReal",
 )
-STATE_CALLS = ("getFMUstate", "setFMUstate", "serializeFMUstate", "deSerializeFMUstate")
+_STATE_CALLS = ("getFMUstate", "setFMUstate", "serializeFMUstate", "deSerializeFMUstate")
 
 
 class HostError(ValueError):
@@ -79,7 +79,7 @@ class Host:
         """Function, line and file of the last frame that is the model's, or at least not ours."""
         frames = traceback.extract_tb(error.__traceback__)
         own = [f for f in frames if Path(f.filename).is_relative_to(self.folder)]
-        own = own or [f for f in frames[-1:] if not Path(f.filename).is_relative_to(BLOCK_FOLDER)]
+        own = own or [f for f in frames[-1:] if not Path(f.filename).is_relative_to(_BLOCK_FOLDER)]
         return f"in {own[-1].name}, line {own[-1].lineno} of {Path(own[-1].filename).name}" if own else ""
 
 
@@ -121,7 +121,7 @@ def make_hosted_block(recipe: Mapping[str, Any], resources: Path, instance_name:
     Raises:
         HostError: there is no such class, or it makes neither.
     """
-    made = load_factory(recipe, resources)(**recipe["options"])
+    made = _load_factory(recipe, resources)(**recipe["options"])
     if isinstance(made, HybridSystem):
         return make_block(made, 2, preset=recipe["preset"], instance_name=instance_name, **recipe["arguments"])
     what = f"{recipe['class']} makes a {type(made).__name__}, which is no HybridSystem"
@@ -131,7 +131,7 @@ def make_hosted_block(recipe: Mapping[str, Any], resources: Path, instance_name:
         raise HostError(f"{what} and no block either: it lacks {', '.join(missing) or 'model_description'}.")
     if not str(description.fmiVersion).startswith("2"):
         raise HostError(f"{what}; its model_description is for FMI {description.fmiVersion}, expected 2.0.")
-    unable = [name for name in STATE_CALLS if not callable(getattr(made, name, None))]
+    unable = [name for name in _STATE_CALLS if not callable(getattr(made, name, None))]
     if description.coSimulation is None or (description.coSimulation.canGetAndSetFMUstate and unable):
         raise HostError(
             f"{what}; its model_description promises canGetAndSetFMUstate, but it lacks {', '.join(unable)}."
@@ -139,7 +139,7 @@ def make_hosted_block(recipe: Mapping[str, Any], resources: Path, instance_name:
     return made
 
 
-def load_factory(recipe: Mapping[str, Any], resources: Path) -> Any:
+def _load_factory(recipe: Mapping[str, Any], resources: Path) -> Any:
     """The class or function of a recipe.
 
     Args:
@@ -170,7 +170,7 @@ def _load_module(recipe: Mapping[str, Any], resources: Path) -> ModuleType:
     name = recipe["module"]
     if name in sys.modules:
         return sys.modules[name]
-    folder = resources / MODEL_FOLDER
+    folder = resources / _MODEL_FOLDER
     spec = importlib.util.spec_from_file_location(name, folder / recipe["file"])
     assert spec is not None
     assert spec.loader is not None

@@ -32,7 +32,7 @@ from fmus.toolchain.platforms import Platform, host_platform
 
 __all__ = ["HostedExportError", "build_hosted_fmu"]
 
-OLDEST_PYTHON = (3, 11)
+_OLDEST_PYTHON = (3, 11)
 LIBRARIES = {"x86_64-linux": "linux64/libpythonfmu-export.so"}
 """Of pythonfmu's libraries, those that the front has been tried with, by platform tuple."""
 
@@ -48,7 +48,7 @@ sys.path.insert(0, resources)
 slave = importlib.import_module(module).Hosted(instance_name="check", resources=resources, visible=0)
 print("\\n" + json.dumps([message.msg for message in slave.log_queue]))
 """
-CHECK_SECONDS = 120.0
+_CHECK_SECONDS = 120.0
 
 
 def build_hosted_fmu(
@@ -123,7 +123,7 @@ def _recipe(source: Source, preset: str | None, block_arguments: Mapping[str, An
         "options": dict(source.options),
         "preset": preset,
         "arguments": dict(block_arguments),
-        "python": list(OLDEST_PYTHON),
+        "python": list(_OLDEST_PYTHON),
         "package": package_version(),
     }
     try:
@@ -156,18 +156,18 @@ def _front(description: ModelDescription) -> dict[str, bytes]:
         "HOSTED_GUID": json.dumps(description.instantiationToken),
         "HOSTED_LIBRARY": json.dumps(_library_file()),
         "HOSTED_BUILT_MINOR": str(sys.version_info[1]),
-        "HOSTED_OLDEST_MINOR": str(OLDEST_PYTHON[1]),
+        "HOSTED_OLDEST_MINOR": str(_OLDEST_PYTHON[1]),
     }
     name = library_name(identifier)
     with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as place:
         folder = Path(place)
-        _write(front_sources(), folder)
+        _write(_front_sources(), folder)
         (folder / "hosted_model.h").write_text("".join(f"#define {key} {value}\n" for key, value in header.items()))
         binary = compile_library(find_compiler(), folder, [MAIN_SOURCE], name).read_bytes()
     return {f"binaries/{host_platform().fmi2_folder}/{name}": binary}
 
 
-def front_sources() -> dict[str, bytes]:
+def _front_sources() -> dict[str, bytes]:
     """The C files of the front, by name."""
     return {entry.name: entry.read_bytes() for entry in (files("fmus.hosted") / "front").iterdir()}
 
@@ -178,7 +178,7 @@ def _papers(description: ModelDescription, source: Source) -> dict[str, bytes]:
         if source.file
         else f"imported from the installed module {source.module}"
     )
-    html = page(description, f"{source.name}, {text}", package_version(), OLDEST_PYTHON, sys.version_info[1])
+    html = page(description, f"{source.name}, {text}", package_version(), _OLDEST_PYTHON, sys.version_info[1])
     return {
         "modelDescription.xml": _xml(description).encode(),
         "documentation/index.html": html.encode(),
@@ -226,7 +226,7 @@ def _describe(recipe: Mapping[str, Any], resources: Path, digest: str) -> ModelD
     own = hashlib.sha256(f"{description.instantiationToken}{digest}".encode()).hexdigest()
     description.instantiationToken = f"{{{own[:8]}-{own[8:12]}-{own[12:16]}-{own[16:20]}-{own[20:32]}}}"
     text = description_text(
-        description.description or "", package_version(), OLDEST_PYTHON, host_platform().fmi2_folder
+        description.description or "", package_version(), _OLDEST_PYTHON, host_platform().fmi2_folder
     )
     description.description, description.modelExchange = text, None
     description.coSimulation = _interface(description.coSimulation)
@@ -263,11 +263,11 @@ def _try_alone(resources: Path, slave: str) -> None:
     command = [sys.executable, "-c", CHECK, str(resources), slave]
     try:
         done = subprocess.run(
-            command, cwd=resources, capture_output=True, text=True, check=False, timeout=CHECK_SECONDS
+            command, cwd=resources, capture_output=True, text=True, check=False, timeout=_CHECK_SECONDS
         )
     except subprocess.TimeoutExpired as error:
         raise HostedExportError(
-            f"making the model in a process of its own took more than {CHECK_SECONDS:g} s."
+            f"making the model in a process of its own took more than {_CHECK_SECONDS:g} s."
         ) from error
     if done.returncode != 0:
         raise HostedExportError(f"the model does not run in a process of its own: {done.stderr.strip()[-2000:]}")

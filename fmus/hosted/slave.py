@@ -55,7 +55,7 @@ class Hosted(Fmi2Slave):
 
     def _open(self, resources: Path) -> None:
         recipe = json.loads((resources / "hosted.json").read_text(encoding="utf-8"))
-        check_python(recipe)
+        _check_python(recipe)
         from fmus.hosted.host import Host  # noqa: PLC0415 - only now is it known to be there
 
         self.host = type(self).host_of_class = Host(recipe, resources, self.instance_name)
@@ -239,7 +239,7 @@ class Missing(RuntimeError):  # noqa: N818 - says what is the matter better than
     """The Python in this process lacks something; the message says what, and how to get it."""
 
 
-def check_python(recipe: dict[str, Any]) -> None:
+def _check_python(recipe: dict[str, Any]) -> None:
     """Refuse a Python that is too old or lacks `fmu-observer`.
 
     Args:

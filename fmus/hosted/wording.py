@@ -6,7 +6,7 @@ from fmpy.model_description import ModelDescription
 
 from fmus.documentation.page import render
 
-OVERHEAD = (
+_OVERHEAD = (
     "a step costs about 10 us more than the block's own Python, which takes 10 us to more than 100 us where "
     "native C takes 1 us"
 )
@@ -34,9 +34,8 @@ def description_text(own: str, package: str, oldest: tuple[int, int], platform: 
     """
     return (
         f"NEEDS PYTHON: this FMU runs Python code and needs {needs(package, oldest)} on the machine that runs it. "
-        f"Slow ({OVERHEAD}); not for real-time targets. Only for {platform}; loads into Python processes such as fmpy, "
-        f"and into "
-        f"other programs if they find Python's library (see documentation/index.html). {own}"
+        f"Slow ({_OVERHEAD}); not for real-time targets. Only for {platform}; loads into Python processes such as "
+        f"fmpy, and into other programs if they find Python's library (see documentation/index.html). {own}"
     ).strip()
 
 
@@ -58,6 +57,6 @@ def page(description: ModelDescription, source: str, package: str, oldest: tuple
         description,
         needs=needs(package, oldest),
         source=source,
-        overhead=OVERHEAD,
+        overhead=_OVERHEAD,
         built_minor=built_minor,
     )

@@ -26,7 +26,7 @@ from fmus.toolchain.cross import (
 )
 from fmus.toolchain.platforms import Platform, host_platform
 
-CANDIDATES = ("cc", "gcc", "clang")
+_CANDIDATES = ("cc", "gcc", "clang")
 
 FLAGS = (
     "-std=c11",
@@ -86,13 +86,13 @@ def find_compiler() -> Compiler:
                 f"The environment variable CC names the compiler {wanted!r}, which does not exist. {_advice()}"
             )
         return _identified(command, own)
-    for candidate in CANDIDATES:
+    for candidate in _CANDIDATES:
         found = shutil.which(candidate)
         if found is not None:
             return _identified((found,), own)
     if zig_is_installed() and host_platform().target is not None:
         return cross_compiler(host_platform())
-    raise CompilerMissing(f"No C compiler was found (looked for {', '.join(CANDIDATES)}). {_advice()}")
+    raise CompilerMissing(f"No C compiler was found (looked for {', '.join(_CANDIDATES)}). {_advice()}")
 
 
 def cross_compiler(platform: Platform) -> Compiler:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-FAT_MAGIC = 0xCAFEBABE
-MACH_O_64 = 0xFEEDFACF
-ALIGNMENT = 14
+_FAT_MAGIC = 0xCAFEBABE
+_MACH_O_64 = 0xFEEDFACF
+_ALIGNMENT = 14
 """Of each slice, as a power of two: the page size of macOS on aarch64, and enough for x86-64."""
 
 
@@ -26,21 +26,21 @@ def fat_binary(slices: Sequence[bytes]) -> bytes:
     processors = [_processor(piece) for piece in slices]
     if len(set(processors)) != len(processors):
         raise ValueError("Two slices of a fat Mach-O file are for the same processor.")
-    header = struct.pack(">II", FAT_MAGIC, len(slices))
+    header = struct.pack(">II", _FAT_MAGIC, len(slices))
     offset, body, start = 0, b"", len(header) + 20 * len(slices)
     for piece, (kind, subtype) in zip(slices, processors, strict=True):
         offset = _aligned(start + len(body))
         body += b"\0" * (offset - start - len(body)) + piece
-        header += struct.pack(">IIIII", kind, subtype, offset, len(piece), ALIGNMENT)
+        header += struct.pack(">IIIII", kind, subtype, offset, len(piece), _ALIGNMENT)
     return header + body
 
 
 def _processor(library: bytes) -> tuple[int, int]:
     magic, kind, subtype = struct.unpack_from("<III", library) if len(library) >= 12 else (0, 0, 0)
-    if magic != MACH_O_64:
+    if magic != _MACH_O_64:
         raise ValueError("A slice of a fat Mach-O file is not a 64-bit Mach-O library.")
     return kind, subtype
 
 
 def _aligned(position: int) -> int:
-    return -(-position >> ALIGNMENT) << ALIGNMENT
+    return -(-position >> _ALIGNMENT) << _ALIGNMENT

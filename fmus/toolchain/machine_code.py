@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import struct
 
-ELF_MACHINES = {3: "x86-linux", 62: "x86_64-linux", 183: "aarch64-linux", 40: "aarch32-linux", 243: "riscv64-linux"}
-PE_MACHINES = {0x14C: "x86-windows", 0x8664: "x86_64-windows", 0xAA64: "aarch64-windows"}
-MACH_O_MACHINES = {7: "x86-darwin", 0x01000007: "x86_64-darwin", 0x0100000C: "aarch64-darwin"}
+_ELF_MACHINES = {3: "x86-linux", 62: "x86_64-linux", 183: "aarch64-linux", 40: "aarch32-linux", 243: "riscv64-linux"}
+_PE_MACHINES = {0x14C: "x86-windows", 0x8664: "x86_64-windows", 0xAA64: "aarch64-windows"}
+_MACH_O_MACHINES = {7: "x86-darwin", 0x01000007: "x86_64-darwin", 0x0100000C: "aarch64-darwin"}
 UNKNOWN = "unknown"
 
 
@@ -26,11 +26,11 @@ def _platforms(library: bytes) -> tuple[str, ...]:
     magic = library[:4]
     if magic == b"\x7fELF":
         order = ">" if library[5:6] == b"\x02" else "<"
-        return (ELF_MACHINES.get(struct.unpack_from(f"{order}H", library, 18)[0], UNKNOWN),)
+        return (_ELF_MACHINES.get(struct.unpack_from(f"{order}H", library, 18)[0], UNKNOWN),)
     if magic[:2] == b"MZ":
         (header,) = struct.unpack_from("<I", library, 0x3C)
         signature, machine = struct.unpack_from("<4sH", library, header)
-        return (PE_MACHINES.get(machine, UNKNOWN) if signature == b"PE\0\0" else UNKNOWN,)
+        return (_PE_MACHINES.get(machine, UNKNOWN) if signature == b"PE\0\0" else UNKNOWN,)
     if magic in (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe"):
         return (_mach_o(struct.unpack_from("<I", library, 4)[0]),)
     if magic == b"\xca\xfe\xba\xbe":
@@ -40,4 +40,4 @@ def _platforms(library: bytes) -> tuple[str, ...]:
 
 
 def _mach_o(processor: int) -> str:
-    return MACH_O_MACHINES.get(processor, UNKNOWN)
+    return _MACH_O_MACHINES.get(processor, UNKNOWN)

@@ -54,7 +54,7 @@ PLATFORMS: dict[str, Platform] = {
 }
 """All that can be built on any machine with the extra ``cross``, by platform tuple."""
 
-ALIASES = {
+_ALIASES = {
     "linux64": ("x86_64-linux",),
     "win64": ("x86_64-windows",),
     "darwin64": ("x86_64-darwin", "aarch64-darwin"),
@@ -84,9 +84,9 @@ def platform_names(wanted: str | Sequence[str]) -> tuple[str, ...]:
     words = [word.strip() for word in (wanted.split(",") if isinstance(wanted, str) else wanted)]
     names: list[str] = []
     for word in filter(None, words):
-        if word not in (HOST, *ALIASES, *PLATFORMS):
+        if word not in (HOST, *_ALIASES, *PLATFORMS):
             raise PlatformError(f"Platform {word!r} is unknown{_nearest(word)}; use {_all_names()}.")
-        names += ALIASES.get(word, (word,))
+        names += _ALIASES.get(word, (word,))
     if not names:
         raise PlatformError(f"No platform was given; use {_all_names()}.")
     return tuple(dict.fromkeys(names))
@@ -127,9 +127,9 @@ def _for_any_processor(here: Sequence[Platform], libraries: Mapping[Platform, by
 
 
 def _all_names() -> str:
-    return f"{HOST}, {', '.join([*PLATFORMS, *ALIASES])}"
+    return f"{HOST}, {', '.join([*PLATFORMS, *_ALIASES])}"
 
 
 def _nearest(name: str) -> str:
-    matches = get_close_matches(name, [HOST, *ALIASES, *PLATFORMS], n=1, cutoff=0.5)
+    matches = get_close_matches(name, [HOST, *_ALIASES, *PLATFORMS], n=1, cutoff=0.5)
     return f" (did you mean {matches[0]!r}?)" if matches else ""

@@ -22,14 +22,14 @@ from cosim.report.figures.scales import bounded, value_limits
 
 WIDTH, HEIGHT = 7.2, 6.6  # inches, of the whole picture
 REFERENCE = {"color": BLACK, "linestyle": "-", "linewidth": 1.0}
-RESULT = {"color": BLUE, "linestyle": (0, (6, 1.5)), "linewidth": 1.3}
-DOTTED = 60  # rows at most that are drawn as dots as well
+_RESULT = {"color": BLUE, "linestyle": (0, (6, 1.5)), "linewidth": 1.3}
+_DOTTED = 60  # rows at most that are drawn as dots as well
 ROOM = 1.25  # of an axis above what it must show
 SPIKE = 50.0  # an error so many times as large as the band hides the band; the axis then is that of the error
 SHARE = 0.02  # of the run that a zoom shows at least
 ROWS = 12.0  # of the reference that a zoom shows at least on either side
-SHIFTS = 4.0  # allowed times that a zoom shows at least on either side
-LARGEST_SHARE = 0.3  # of the run that a zoom shows at most
+_SHIFTS = 4.0  # allowed times that a zoom shows at least on either side
+_LARGEST_SHARE = 0.3  # of the run that a zoom shows at most
 
 
 @styled
@@ -54,10 +54,10 @@ def comparison_figure(
     _draw_tube(ax, curves, begin, end, limits, 1.6 if window is None else 0.3)
     for name, line, time, values in (
         ("reference", REFERENCE, curves.reference_time, curves.reference),
-        ("result", RESULT, curves.result_time, curves.result),
+        ("result", _RESULT, curves.result_time, curves.result),
     ):
         rows = _around(time, begin, end)
-        few = window is not None and np.count_nonzero(rows) <= DOTTED
+        few = window is not None and np.count_nonzero(rows) <= _DOTTED
         dots = {"marker": ".", "markersize": 4} if few else {}
         curve(ax, time[rows], bounded(values[rows]), limits, label=name, **line, **dots)
     _mark_findings(ax, signal, begin, end)
@@ -130,15 +130,15 @@ def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
     if curves is None or not len(curves.reference_time):
         return None
     begin, end = _span(curves)
-    finding = worst_finding(signal)
+    finding = _worst_finding(signal)
     centre, width = (signal.max_error_at, 0.0) if finding is None else _centre(finding)
     if not np.isfinite(centre) or not end > begin:
         return None
     steps = np.diff(np.unique(curves.reference_time))
     step = float(np.median(steps)) if len(steps) else 0.0
     allowed = signal.allowed_time if np.isfinite(signal.allowed_time) else 0.0
-    half = max(0.5 * SHARE * (end - begin), ROWS * step, SHIFTS * allowed)
-    half = min(half, 0.5 * LARGEST_SHARE * (end - begin)) if len(steps) > 2 * ROWS else 0.5 * (end - begin)
+    half = max(0.5 * SHARE * (end - begin), ROWS * step, _SHIFTS * allowed)
+    half = min(half, 0.5 * _LARGEST_SHARE * (end - begin)) if len(steps) > 2 * ROWS else 0.5 * (end - begin)
     return max(begin, centre - half), min(end, centre + min(width, half) + half)
 
 
@@ -151,7 +151,7 @@ def _centre(finding: ComparisonFinding) -> tuple[float, float]:
     return finding.worst, finding.size if finding.kind == "jump_time" else 0.0
 
 
-def worst_finding(signal: SignalComparison) -> ComparisonFinding | None:
+def _worst_finding(signal: SignalComparison) -> ComparisonFinding | None:
     """The first finding that has an instant.
 
     Args:

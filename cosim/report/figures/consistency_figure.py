@@ -16,7 +16,7 @@ from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 from fmu_observer.formulas.filtering.covariance_consistency import chi_square_band
 
-AVERAGED = 50  # samples in the drawn mean, at most a quarter of all
+_AVERAGED = 50  # samples in the drawn mean, at most a quarter of all
 SMALLEST, LARGEST = 1e-2, 1e3  # of a drawn share; beyond it is cut
 
 
@@ -50,7 +50,7 @@ def nees_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axe
 def _figure(result: Result, spec: ReportSpec, ax: Axes, kinds: Sequence[Kind]) -> Axes:
     entries = _chosen(result, spec, kinds)
     shortest = min((len(e.squares) for e in entries), default=0)
-    count = max(min(AVERAGED, shortest // 4), 1) if kinds == ("NIS",) else 1  # errors of samples that follow are alike
+    count = max(min(_AVERAGED, shortest // 4), 1) if kinds == ("NIS",) else 1  # errors of samples that follow are alike
     for degrees in sorted({float(e.degrees.mean()) for e in entries}):
         band = chi_square_band(degrees, float(count))
         text = f"95 % band, {degrees:g} degree{'s' if degrees != 1.0 else ''} of freedom"

@@ -17,13 +17,13 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import curve_size
 from cosim.results.result import Result
 
-BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes
-MARGINS = 1.0  # width of a figure beside its axes [inch]
-LETTER_WIDTH, HANDLE_WIDTH = 0.069, 0.66  # of a letter and of a line with the space around it in a legend [inch]
+_BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes
+_MARGINS = 1.0  # width of a figure beside its axes [inch]
+_LETTER_WIDTH, _HANDLE_WIDTH = 0.069, 0.66  # of a letter and of a line with the space around it in a legend [inch]
 FAR = 50.0  # values are cut this many axis heights away, so that a line to 1e300 can still be drawn
 
 
-def thin(time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS) -> tuple[np.ndarray, np.ndarray]:
+def thin(time: np.ndarray, values: np.ndarray, buckets: int = _BUCKETS) -> tuple[np.ndarray, np.ndarray]:
     """Fewer points that draw the same picture: the first, lowest, highest and last of each bucket of rows.
 
     Args:
@@ -159,7 +159,7 @@ def legend_above(ax: Axes, leave_out: Sequence[str] = ()) -> None:
     if legend is not None:
         legend.remove()
     if entries and figure is not None:
-        width = figure.get_figwidth() - MARGINS
+        width = figure.get_figwidth() - _MARGINS
         legend = ax.legend(
             *zip(*entries, strict=True),
             loc="lower left",
@@ -178,6 +178,6 @@ def _columns(labels: Sequence[str], width: float) -> int:
     """Most columns of a legend that fit into `width` [inch]; matplotlib fills it column by column."""
     for count in range(len(labels), 1, -1):
         columns = np.array_split(np.array([len(text) for text in labels]), count)
-        if sum(HANDLE_WIDTH + LETTER_WIDTH * max(c, default=0) for c in columns) <= width:
+        if sum(_HANDLE_WIDTH + _LETTER_WIDTH * max(c, default=0) for c in columns) <= width:
             return count
     return 1

@@ -45,7 +45,7 @@ def speed_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None)
 
 
 @styled
-def position_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+def _position_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
     """Estimated minus true position in m, against time, with low-adhesion zones and balises.
 
     Args:
@@ -167,7 +167,7 @@ class PositionErrorPanel(Panel):
 
     @staticmethod
     def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return position_error_figure(result, spec, ax)
+        return _position_error_figure(result, spec, ax)
 
     @staticmethod
     def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel

@@ -17,7 +17,7 @@ from cosim.results.result import Result
 BOUND = "error_bound"
 ROW, REST = 0.38, 0.9  # height of the row of an observer, and of all that is not a row [inch]
 DECADES = 1e3  # from the bottom of the axis to the bound
-FILLED = 0.7  # share of a row that its bar fills
+_FILLED = 0.7  # share of a row that its bar fills
 
 
 @styled
@@ -37,7 +37,7 @@ def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
     ax = axes_or_new(ax, (8.2, REST + ROW * len(rows)))
     for place, (_, colour, values) in enumerate(rows):
         bars = [(start, end - start) for start, end in intervals(result.time, values)]
-        ax.broken_barh(bars, (place - FILLED / 2, FILLED), facecolor=colour, edgecolor=colour, linewidth=0.6)
+        ax.broken_barh(bars, (place - _FILLED / 2, _FILLED), facecolor=colour, edgecolor=colour, linewidth=0.6)
     ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
     ax.set_ylim(max(len(rows), 1) - 0.5, -0.5)  # the first row on top
     time_axis(ax, result)
@@ -45,7 +45,7 @@ def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
 
 
 @styled
-def bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+def _bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
     """Magnitude of the speed error as a share of the bound that its observer tells at the same instant, the largest in
     each window of time, on a logarithmic axis; above 1 the bound is broken.
 
@@ -104,7 +104,7 @@ class BoundsPanel(Panel):
 
     @staticmethod
     def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return bound_figure(result, spec, ax)
+        return _bound_figure(result, spec, ax)
 
     @staticmethod
     def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel

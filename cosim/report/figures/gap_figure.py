@@ -23,8 +23,8 @@ from cosim.results.result import Result
 
 SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
 MARKERS = "os^Dv<>p"
-MARK_STYLE = {"linestyle": "none", "markersize": 4.5, "markeredgewidth": 1.0, "alpha": 0.75}
-GRANTED = "SUBSET-041 (5 m + 5 %)"
+_MARK_STYLE = {"linestyle": "none", "markersize": 4.5, "markeredgewidth": 1.0, "alpha": 0.75}
+_GRANTED = "SUBSET-041 (5 m + 5 %)"
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
 
 
@@ -115,10 +115,10 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
         colour = BLACK if plain else observer_line(spec.observers, name)["color"]
         marker = "x" if plain else MARKERS[i % len(MARKERS)]
         sizes = np.clip(np.abs(errors), SMALLEST, LARGEST)
-        ax.plot(lengths, sizes, marker=marker, color=colour, label=found.labels[name], **MARK_STYLE)
+        ax.plot(lengths, sizes, marker=marker, color=colour, label=found.labels[name], **_MARK_STYLE)
     # from zero on, so that balises at one distance are a column of marks on a scale that can be read
     way = np.linspace(0.0, max(1.05 * float(np.max(lengths, initial=0.0, where=np.isfinite(lengths))), 1.0), 50)
-    ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=GRANTED)
+    ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=_GRANTED)
     ax.set_xlim(way[0], way[-1])
     logarithmic(ax)
     ax.set_xlabel("Way since the last balise [m]")

@@ -10,7 +10,7 @@ from cosim.report.figures.drawing import legend_above
 from cosim.report.figures.panels import panels as all_panels
 from cosim.results.result import Result
 
-MAIN_PANELS = ("speed", "speed_error", "slip", "gaps")
+_MAIN_PANELS = ("speed", "speed_error", "slip", "gaps")
 WIDTH, HEIGHT = 8.4, 2.55  # inches; the height of one panel
 
 
@@ -24,7 +24,7 @@ def main_picture(result: Result, spec: ReportSpec) -> Figure:
     Returns:
         The figure; save it with ``figure.savefig(path)``.
     """
-    panels = [p for p in all_panels() if p.name in MAIN_PANELS and p.available(result, spec)]
+    panels = [p for p in all_panels() if p.name in _MAIN_PANELS and p.available(result, spec)]
     figure = new_figure((WIDTH, HEIGHT * max(len(panels), 1)))
     headline(figure, spec.title)
     if not panels:

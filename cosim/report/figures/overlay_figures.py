@@ -18,7 +18,7 @@ from cosim.report.figures.scales import bounded, value_limits
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
 from cosim.results.result import Result
 
-WIDTH, FIRST_PANEL, NEXT_PANEL = 8.2, 3.3, 2.2  # inches
+WIDTH, _FIRST_PANEL, _NEXT_PANEL = 8.2, 3.3, 2.2  # inches
 KMH = 3.6  # km/h in a m/s
 Panel = tuple[str, dict[int, str]]
 """Title of a panel, and the observer of each run in it by index of the run."""
@@ -199,7 +199,7 @@ def _error_curve(run: OverlayRun, index: int, observer: str, quantity: Quantity)
 
 def _axes(runs: Sequence[OverlayRun], panels: Sequence[Panel]) -> list[Axes]:
     """Panels below each other over one time axis that holds all runs."""
-    figure = new_figure((WIDTH, FIRST_PANEL + NEXT_PANEL * (len(panels) - 1)))
+    figure = new_figure((WIDTH, _FIRST_PANEL + _NEXT_PANEL * (len(panels) - 1)))
     axes: list[Axes] = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
     start, end = min(float(r.result.time[0]) for r in runs), max(float(r.result.time[-1]) for r in runs)
     for ax, (title, _) in zip(axes, panels, strict=True):

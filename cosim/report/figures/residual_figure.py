@@ -20,7 +20,7 @@ RATIO = "ratio_"
 FLOOR = 0.1  # smallest ratio that is drawn
 
 
-def ratio_signals(result: Result, spec: ReportSpec) -> dict[str, np.ndarray]:
+def _ratio_signals(result: Result, spec: ReportSpec) -> dict[str, np.ndarray]:
     """Residuals over their thresholds by signal name, each shape (rows,).
 
     Args:
@@ -46,7 +46,7 @@ def residual_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) ->
     for start, end in intervals(result.time, true) if true is not None else []:
         ax.axvspan(start, end, color=PALE_RED, zorder=0.5)
     several, coloured = len(spec.observers) > 1, 0
-    for name, ratio in ratio_signals(result, spec).items():
+    for name, ratio in _ratio_signals(result, spec).items():
         time, values = thin(result.time, np.maximum(np.nan_to_num(ratio, posinf=1e6), FLOOR))
         if np.max(values) <= 1.0:
             ax.plot(time, values, color=MARK, linewidth=0.5, alpha=0.5)
@@ -78,4 +78,4 @@ class ResidualsPanel(Panel):
 
     @staticmethod
     def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return bool(ratio_signals(result, spec))
+        return bool(_ratio_signals(result, spec))

@@ -32,9 +32,9 @@ from cosim.report.figures.scales import bounded, slip_in_percent, value_limits
 from cosim.results.result import Result
 
 KMH = 3.6  # km/h in a m/s
-OTHER_LINE: dict[str, Any] = {"color": BLACK, "linewidth": 1.2}
-DASHES: tuple[Any, ...] = ("--", "-.", (0, (6, 2)), (0, (3, 1, 1, 1, 1, 1)))  # of other trains
-STRIP = 0.055  # height of an indicator's strip as a share of the axes
+_OTHER_LINE: dict[str, Any] = {"color": BLACK, "linewidth": 1.2}
+_DASHES: tuple[Any, ...] = ("--", "-.", (0, (6, 2)), (0, (3, 1, 1, 1, 1, 1)))  # of other trains
+_STRIP = 0.055  # height of an indicator's strip as a share of the axes
 
 
 def _estimates(result: Result, spec: ReportSpec, signal: str, factor: float) -> dict[str, np.ndarray]:
@@ -61,7 +61,7 @@ def _draw_estimates(
 
 
 @styled
-def speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+def _speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
     """True speed, odometer, reference, other trains and estimates in km/h, against time.
 
     Args:
@@ -83,7 +83,7 @@ def speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
     for values in reference:
         curve(ax, result.time, values, limits, label="reference", **REFERENCE_LINE)
     for i, (train, found) in enumerate(others.items()):
-        line = OTHER_LINE | {"linestyle": DASHES[i % len(DASHES)], "label": label(spec, train)}
+        line = _OTHER_LINE | {"linestyle": _DASHES[i % len(_DASHES)], "label": label(spec, train)}
         for values in found:
             curve(ax, result.time, values, limits, **line)
     _draw_estimates(ax, result, spec, estimates, limits)
@@ -154,12 +154,12 @@ def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[
     """
     low, high = limits or (0.0, 1.0)
     found = [(o, v) for o in spec.observers if (v := estimate(result, o, "slip_indicator")) is not None]
-    share = STRIP * len(found)
+    share = _STRIP * len(found)
     if found:
         ax.add_patch(Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color=PALE, linewidth=0, zorder=3.0))
     for i, (observer, values) in enumerate(found):
         bars = [(a, b - a) for a, b in on_intervals(result.time, values)]
-        place = (share - (i + 0.9) * STRIP, 0.8 * STRIP)
+        place = (share - (i + 0.9) * _STRIP, 0.8 * _STRIP)
         colour = observer_line(spec.observers, observer)["color"]
         text = "indicator on" if i == 0 else None
         ax.broken_barh(bars, place, transform=ax.get_xaxis_transform(), facecolor=colour, label=text, zorder=3.1)
@@ -177,7 +177,7 @@ class SpeedPanel(Panel):
 
     @staticmethod
     def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return speed_figure(result, spec, ax)
+        return _speed_figure(result, spec, ax)
 
     @staticmethod
     def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-OFF_SCALE_RATIO = 100.0  # a curve this much larger than the next smaller one is left off the scale
-LOG_RATIO = 8.0  # sizes that differ by more than this need a logarithmic axis
+_OFF_SCALE_RATIO = 100.0  # a curve this much larger than the next smaller one is left off the scale
+_LOG_RATIO = 8.0  # sizes that differ by more than this need a logarithmic axis
 ROOM = 1.3
-PERCENTILE = 99.0
-SMALLEST_SPAN = 1e-3  # of an axis, by the size of its values: what rounding changes is no curve
+_PERCENTILE = 99.0
+_SMALLEST_SPAN = 1e-3  # of an axis, by the size of its values: what rounding changes is no curve
 WINDOWS = 180  # of the logarithmic figure in a run
 BOUND = 1e150  # what is larger is drawn as this, so that nothing overflows on the way to a picture
 
@@ -58,7 +58,7 @@ def curve_size(values: np.ndarray) -> float:
     finite = np.abs(bounded(values[np.isfinite(values)]))
     if not len(finite) or len(finite) * 2 < len(values):
         return float("inf")
-    return float(np.percentile(finite, PERCENTILE))
+    return float(np.percentile(finite, _PERCENTILE))
 
 
 def error_scale(curves: Sequence[np.ndarray]) -> ErrorScale:
@@ -76,12 +76,12 @@ def error_scale(curves: Sequence[np.ndarray]) -> ErrorScale:
         return ErrorScale(1.0)
     kept = positive[:1]
     for size in positive[1:]:
-        if size > OFF_SCALE_RATIO * kept[-1]:
+        if size > _OFF_SCALE_RATIO * kept[-1]:
             break
         kept.append(size)
     largest = max(_peak(curve) for curve in curves if curve_size(curve) <= kept[-1])
     limit = ROOM * min(largest, 3 * kept[-1])  # a single spike does not set the scale
-    if kept[-1] <= LOG_RATIO * kept[0]:
+    if kept[-1] <= _LOG_RATIO * kept[0]:
         return ErrorScale(limit)
     return ErrorScale(limit, max(0.1 * kept[0], 1e-8 * limit))
 
@@ -131,7 +131,7 @@ def value_limits(anchors: Sequence[np.ndarray], others: Sequence[np.ndarray]) ->
     low, high = _range(anchors, 0.0) or _range(others, 1.0) or (np.nan, np.nan)
     if not np.isfinite(low):
         return None
-    span = max(high - low, SMALLEST_SPAN * max(abs(low), abs(high)), 1e-12)
+    span = max(high - low, _SMALLEST_SPAN * max(abs(low), abs(high)), 1e-12)
     wanted = [r for r in (_range([curve], 1.0) for curve in others) if r and r[0] >= low - span and r[1] <= high + span]
     low, high = min([low, *(r[0] for r in wanted)]), max([high, *(r[1] for r in wanted)])
     room = 0.06 * max(high - low, span)

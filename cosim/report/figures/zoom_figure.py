@@ -18,12 +18,12 @@ from cosim.report.figures.scales import BOUND, bounded, error_scale, slip_in_per
 from cosim.report.zoom_windows import ZoomWindow
 from cosim.results.result import BaliseRecord, Result
 
-SIZE, ONE_PANEL = (5.6, 4.3), (5.6, 2.8)  # inches
+SIZE, _ONE_PANEL = (5.6, 4.3), (5.6, 2.8)  # inches
 TRUE: dict[str, Any] = {"color": BAND, "linewidth": 4.0, "zorder": 1.5}  # a band, on which the estimates lie
 STAMP: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "zorder": 1.4}
-DELIVERY: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.4}
+_DELIVERY: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.4}
 MISSED: dict[str, Any] = {"color": MARK, "linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 1.4}
-MOST_TELEGRAMS = 60  # in a window; more would be a hatching
+_MOST_TELEGRAMS = 60  # in a window; more would be a hatching
 
 
 Curves = dict[str, np.ndarray]
@@ -41,7 +41,7 @@ def zoom_figure(result: Result, spec: ReportSpec, window: ZoomWindow) -> Figure:
         The figure. Rows before and after an event are joined upright, with a hollow and a filled mark.
     """
     panels = [panel for panel in _panels(result, spec, window) if panel[1]]
-    figure = new_figure(SIZE if len(panels) > 1 else ONE_PANEL)
+    figure = new_figure(SIZE if len(panels) > 1 else _ONE_PANEL)
     if not panels:
         return figure
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
@@ -141,7 +141,7 @@ def _background(ax: Axes, result: Result, spec: ReportSpec, window: ZoomWindow) 
 
 def _in_window(result: Result, window: ZoomWindow) -> list[BaliseRecord]:
     near = [e for e in result.events if e.stamp <= window.end and max(e.stamp, e.delivered_at) >= window.start]
-    return sorted(near, key=lambda e: abs(e.stamp - window.time))[:MOST_TELEGRAMS]
+    return sorted(near, key=lambda e: abs(e.stamp - window.time))[:_MOST_TELEGRAMS]
 
 
 def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:
@@ -154,5 +154,5 @@ def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:
         return [(event.stamp, kind, STAMP | false)]
     return [
         (event.stamp, f"{kind}, passed", STAMP | false),
-        (event.delivered_at, f"{kind}, delivered", DELIVERY | false),
+        (event.delivered_at, f"{kind}, delivered", _DELIVERY | false),
     ]

@@ -13,7 +13,7 @@ from cosim.results.result import Result
 
 ZOOM_KEYS = tuple(f"zoom_{i}" for i in range(1, MOST + 1))
 """Stems of the file names, in order of time."""
-VIEWS = {"errors": "Speed error and position error", "slip": "Speed error and slip"}
+_VIEWS = {"errors": "Speed error and position error", "slip": "Speed error and slip"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,5 +46,5 @@ def draw_zooms(result: Result, spec: ReportSpec) -> list[Zoom]:
 
 
 def _caption(window: ZoomWindow) -> str:
-    span = f"{VIEWS[window.view]}, {number(window.start, 4)} s to {number(window.end, 4)} s."
+    span = f"{_VIEWS[window.view]}, {number(window.start, 4)} s to {number(window.end, 4)} s."
     return " ".join([span, *(f"{reason}." for reason in window.reasons[1:])])

@@ -13,7 +13,13 @@ from cosim.evaluation.roles import phases
 from cosim.report.overlay.overlaid_runs import OverlayRun
 from cosim.results.result import BaliseRecord, Result
 
-COMPONENT_ENTRIES = {"kind": "kind", "fmi_version": "FMI version", "model": "model", "preset": "preset", "guid": "GUID"}
+_COMPONENT_ENTRIES = {
+    "kind": "kind",
+    "fmi_version": "FMI version",
+    "model": "model",
+    "preset": "preset",
+    "guid": "GUID",
+}
 SETTINGS = ("scenario", "start", "stop", "step")
 VERSION = "version of "  # these stand last
 PLACE = 1e-6  # balises this close together are one [m]
@@ -88,7 +94,7 @@ def _master(result: Result) -> dict[str, str]:
 def _component(entry: Mapping[str, Any]) -> dict[str, str]:
     name = str(entry.get("name"))
     found = {
-        f"{name}: {text}": _text(entry[key]) for key, text in COMPONENT_ENTRIES.items() if entry.get(key) is not None
+        f"{name}: {text}": _text(entry[key]) for key, text in _COMPONENT_ENTRIES.items() if entry.get(key) is not None
     }
     for group in ("options", "parameters"):
         values = entry.get(group)

@@ -23,7 +23,7 @@ from cosim.report.page.run_statements import Fact
 from cosim.results.summary_file import jsonable
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
-MOST_PICTURES = 12  # on a page: the worst signals tell the story
+_MOST_PICTURES = 12  # on a page: the worst signals tell the story
 FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
 HEADINGS = (
@@ -48,7 +48,7 @@ VERDICTS = {
 
 
 def write_comparison(
-    comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES
+    comparison: Comparison, directory: str | Path, most_pictures: int = _MOST_PICTURES
 ) -> dict[str, Path]:
     """Write a comparison to a folder: page, data, and one picture for each of the worst signals.
 
@@ -70,12 +70,12 @@ def write_comparison(
         _remove_pictures(folder / PICTURES)
         drawn = _write_pictures(pictures, folder / PICTURES)
         write_file(folder / PAGE, page_bytes(comparison_page(comparison, pictures)))
-        write_file(folder / DATA, page_bytes(comparison_json(comparison)))
+        write_file(folder / DATA, page_bytes(_comparison_json(comparison)))
     paths = {"html": folder / PAGE, "json": folder / DATA}
     return paths | ({"png": next(iter(drawn.values())), "pictures": folder / PICTURES} if drawn else {})
 
 
-def write_page(comparison: Comparison, path: str | Path, most_pictures: int = MOST_PICTURES) -> Path:
+def write_page(comparison: Comparison, path: str | Path, most_pictures: int = _MOST_PICTURES) -> Path:
     """Write the page alone, with the pictures inside.
 
     Args:
@@ -97,7 +97,7 @@ def write_page(comparison: Comparison, path: str | Path, most_pictures: int = MO
 
 
 def write_pictures(
-    comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES
+    comparison: Comparison, directory: str | Path, most_pictures: int = _MOST_PICTURES
 ) -> dict[str, Path]:
     """Write the pictures alone.
 
@@ -117,7 +117,7 @@ def write_pictures(
         return _write_pictures(pictures, Path(directory))
 
 
-def draw_pictures(comparison: Comparison, most: int = MOST_PICTURES) -> dict[str, bytes]:
+def draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[str, bytes]:
     """Pictures of the worst signals that can be drawn.
 
     Args:
@@ -131,7 +131,7 @@ def draw_pictures(comparison: Comparison, most: int = MOST_PICTURES) -> dict[str
     return {s.name: png(comparison_picture(s).figure) for s in drawable[:most]}
 
 
-def comparison_json(comparison: Comparison) -> str:
+def _comparison_json(comparison: Comparison) -> str:
     """The comparison as JSON, without curves.
 
     Args:
@@ -155,7 +155,7 @@ def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         f"{comparison.result} against {comparison.reference}",
         comparison=comparison,
         facts=_facts(comparison),
-        verdict=verdict_text(comparison),
+        verdict=_verdict_text(comparison),
         worst=_cut(
             [f"{s.name}: {_in_words(s)}" for s in comparison.failed], FINDINGS_SHOWN, "... and {} more, listed below"
         ),
@@ -200,7 +200,7 @@ def _mood(good: bool) -> str:
     return "good" if good else "bad"
 
 
-def verdict_text(comparison: Comparison) -> str:
+def _verdict_text(comparison: Comparison) -> str:
     """The outcome in a sentence or two.
 
     Args:

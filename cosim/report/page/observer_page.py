@@ -43,13 +43,13 @@ def write_benchmark(benchmark: BenchmarkScores, directory: str | Path) -> dict[s
     folder = Path(directory)
     picture = png(observers_picture(benchmark.scores))
     data = json.dumps(jsonable(benchmark.to_data()), indent=2) + "\n"
-    contents = {PAGE: benchmark_page(benchmark, picture).encode("utf-8"), PICTURE: picture, DATA: data.encode("utf-8")}
+    contents = {PAGE: _benchmark_page(benchmark, picture).encode("utf-8"), PICTURE: picture, DATA: data.encode("utf-8")}
     with explained(f"The comparison cannot be written to {folder}", "Choose another output folder."):
         write_files(folder, contents)
     return {"page": folder / PAGE, "picture": folder / PICTURE, "data": folder / DATA}
 
 
-def benchmark_page(benchmark: BenchmarkScores, picture: bytes) -> str:
+def _benchmark_page(benchmark: BenchmarkScores, picture: bytes) -> str:
     """The page as text.
 
     Args:
@@ -98,7 +98,7 @@ def _certificates(benchmark: BenchmarkScores) -> PageTable:
 
 def _over_time(benchmark: BenchmarkScores) -> bytes | None:
     """The speed errors of all observers as PNG; None where nothing can be drawn."""
-    result = merged_result(benchmark)
+    result = _merged_result(benchmark)
     if result is None or benchmark.spec.true_speed is None:
         return None
     names = {signal.name.partition(".")[0] for signal in result.signals}
@@ -107,7 +107,7 @@ def _over_time(benchmark: BenchmarkScores) -> bytes | None:
     return png(speed_error_figure(result, shown).figure)
 
 
-def merged_result(benchmark: BenchmarkScores) -> Result | None:
+def _merged_result(benchmark: BenchmarkScores) -> Result | None:
     """One result with the columns of all observers whose rows are at the same times as those of the first one.
 
     Args:

@@ -31,8 +31,8 @@ from cosim.results.result import Result
 
 PAGE, FIGURES = "overlay.html", "figures"
 SIGNALS_SHOWN = 8  # where no signal has a role
-DIFFERENCES_SHOWN = 25  # the rest unfolds
-RMS_SPEED = 1  # column of the rms speed error
+_DIFFERENCES_SHOWN = 25  # the rest unfolds
+_RMS_SPEED = 1  # column of the rms speed error
 
 
 def write_overlay(
@@ -130,7 +130,7 @@ def _title(runs: Sequence[OverlayRun]) -> str:
 
 def _cut(rows: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
     """The rows that are shown, and those that unfold."""
-    return rows[:DIFFERENCES_SHOWN], rows[DIFFERENCES_SHOWN:]
+    return rows[:_DIFFERENCES_SHOWN], rows[_DIFFERENCES_SHOWN:]
 
 
 def _facts(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: int) -> list[Fact]:
@@ -144,9 +144,9 @@ def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> 
     """Where the rms speed error rose most and fell most, relative to the first run."""
     changes = []
     for row in errors:
-        first = row.values.get(runs[0].label, (None,) * len(ERROR_HEADINGS))[RMS_SPEED]
+        first = row.values.get(runs[0].label, (None,) * len(ERROR_HEADINGS))[_RMS_SPEED]
         for run in runs[1:]:
-            now = row.values.get(run.label, (None,) * len(ERROR_HEADINGS))[RMS_SPEED]
+            now = row.values.get(run.label, (None,) * len(ERROR_HEADINGS))[_RMS_SPEED]
             if first and now is not None and isfinite(first):
                 changes.append((now / first - 1, now, f"{row.observer}, {row.phase}, {run.label}"))
     found: list[Fact] = []

@@ -12,7 +12,7 @@ from jinja2 import Environment
 from cosim.evaluation.numbers import number
 from fmus.templates import environment
 
-SENTENCE_END = re.compile(r"(?<=[.]) (?=[A-Z])|(?<=;) ")
+_SENTENCE_END = re.compile(r"(?<=[.]) (?=[A-Z])|(?<=;) ")
 LONGEST = 220  # characters; of a longer text the first sentence is shown and the rest unfolds
 
 
@@ -52,7 +52,7 @@ def first_sentence(text: object) -> tuple[str, str]:
         What is shown, and what unfolds; the second is empty for a text that is seen whole.
     """
     whole = str(text)
-    first, *rest = SENTENCE_END.split(whole, 1) if len(whole) > LONGEST else [whole]
+    first, *rest = _SENTENCE_END.split(whole, 1) if len(whole) > LONGEST else [whole]
     return (first.removesuffix(";"), rest[0]) if rest else (whole, "")
 
 

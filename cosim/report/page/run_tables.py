@@ -23,15 +23,15 @@ from cosim.report.page.page_table import PageTable, simple_table
 from cosim.results.result import Result
 
 LIMITS = ("aperiodic_limit", "constant_limit")
-CERTIFICATE_COLUMNS = {
+_CERTIFICATE_COLUMNS = {
     "aperiodic_limit": "Limit, varying gaps [s]",
     "constant_limit": "Limit, constant gap [s]",
     "max_gap": "Largest gap expected [s]",
     "largest_gap_seen": "Largest gap seen [s]",
 }
 HOLDS = {"True": "holds", "False": "does not hold"}
-SEED_COLUMNS = ("lower quartile", "median", "upper quartile", "published", "independent")
-COMPONENT_COLUMNS = {"name": "Name", "kind": "Kind", "fmi_version": "FMI", "model": "Model", "source": "Source"}
+_SEED_COLUMNS = ("lower quartile", "median", "upper quartile", "published", "independent")
+_COMPONENT_COLUMNS = {"name": "Name", "kind": "Kind", "fmi_version": "FMI", "model": "Model", "source": "Source"}
 MESSAGES_SHOWN = 100
 
 
@@ -52,11 +52,11 @@ def seeds_table(result: Result) -> PageTable:
         result: the run.
     """
     rows = [
-        [str(row.get("observer")), str(row.get("phase")), *(number(row.get(column)) for column in SEED_COLUMNS)]
+        [str(row.get("observer")), str(row.get("phase")), *(number(row.get(column)) for column in _SEED_COLUMNS)]
         for row in mapping_entry(result, "seed_study").get("rows", [])
         if isinstance(row, Mapping)
     ]
-    headings = ["Observer", "Phase", *(f"{column} [m/s]" for column in SEED_COLUMNS)]
+    headings = ["Observer", "Phase", *(f"{column} [m/s]" for column in _SEED_COLUMNS)]
     return simple_table(headings, rows, range(2, len(headings)))
 
 
@@ -74,12 +74,12 @@ def certificates(result: Result, spec: ReportSpec) -> tuple[PageTable, dict[str,
     order = dict.fromkeys([*(o for o in spec.observers if o in known), *known])
     entries = {label(spec, o): entry for o in order if isinstance(entry := known[o], Mapping)}
     rows = [
-        [name, *(_limit(entry, key) for key in CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")), DASH)]
+        [name, *(_limit(entry, key) for key in _CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")), DASH)]
         for name, entry in entries.items()
     ]
-    headings = ["Observer", *CERTIFICATE_COLUMNS.values(), "Certificate"]
+    headings = ["Observer", *_CERTIFICATE_COLUMNS.values(), "Certificate"]
     explained = {name: str(entry.get("explanation") or "") for name, entry in entries.items()}
-    return simple_table(headings, rows, range(1, len(CERTIFICATE_COLUMNS) + 1)), explained
+    return simple_table(headings, rows, range(1, len(_CERTIFICATE_COLUMNS) + 1)), explained
 
 
 def _limit(entry: Mapping[str, Any], key: str) -> str:
@@ -105,7 +105,7 @@ def telegrams_table(
     return simple_table([heading, *chosen.values()], rows, range(1, len(chosen) + 1))
 
 
-PACKET_COLUMNS = {
+_PACKET_COLUMNS = {
     "sent": "Sent",
     "lost": "Lost",
     "duplicates": "Duplicates",
@@ -125,10 +125,10 @@ def packets_table(result: Result) -> PageTable:
     entry = mapping_entry(result, "network")
     nodes = entry.get("nodes", {})
     rows = [
-        [name, ", ".join(nodes.get(name, ())), *(number(found.get(key)) for key in PACKET_COLUMNS)]
+        [name, ", ".join(nodes.get(name, ())), *(number(found.get(key)) for key in _PACKET_COLUMNS)]
         for name, found in entry.get("packets", {}).items()
     ]
-    headings = ["Node", "Signals", *PACKET_COLUMNS.values()]
+    headings = ["Node", "Signals", *_PACKET_COLUMNS.values()]
     return simple_table(headings, rows, range(2, len(headings)))
 
 
@@ -183,8 +183,8 @@ def components_table(result: Result) -> PageTable:
         result: the run.
     """
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping)]
-    rows = [[_shown(entry.get(key)) for key in COMPONENT_COLUMNS] for entry in entries]
-    return simple_table(list(COMPONENT_COLUMNS.values()), rows)
+    rows = [[_shown(entry.get(key)) for key in _COMPONENT_COLUMNS] for entry in entries]
+    return simple_table(list(_COMPONENT_COLUMNS.values()), rows)
 
 
 def calls_table(result: Result) -> PageTable:

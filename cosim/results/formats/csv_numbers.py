@@ -19,7 +19,7 @@ from plant_models.disk_cache.folder import cache_folder
 SOURCE = "shortest.c"
 POWERS = range(-292, 325)
 """Powers of ten that the digits of a double are found with."""
-BITS = 128
+_BITS = 128
 ROOM = 25
 """Bytes of the longest number, ``-2.2250738585072014e-308``, and what is behind it."""
 
@@ -57,5 +57,5 @@ def powers_of_ten() -> np.ndarray:
 def _upper_bits(power: int, *, inverse: bool) -> int:
     length = power.bit_length()
     if inverse:
-        return -(-(1 << (length + BITS - 1)) // power)
-    return power << (BITS - length) if length <= BITS else -(-power >> (length - BITS))
+        return -(-(1 << (length + _BITS - 1)) // power)
+    return power << (_BITS - length) if length <= _BITS else -(-power >> (length - _BITS))

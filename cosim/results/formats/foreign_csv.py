@@ -20,7 +20,7 @@ from cosim.results.result_data import ResultData
 
 WORDS = {"true": 1.0, "false": 0.0} | dict.fromkeys(("", "na", "n/a", "#n/a", "null", "none"), float("nan"))
 _OF_WINDOWS = re.compile(r"(?P<sign>[+-]?)1[.,]#(?P<what>inf|ind|q?nan|snan)\d*", re.IGNORECASE)
-TIME_UNITS = ("s", "ms", "min", "h")
+_TIME_UNITS = ("s", "ms", "min", "h")
 
 
 def read_foreign_csv(path: Path) -> ResultData:
@@ -53,7 +53,7 @@ def _units_line(dialect: Dialect, headings: list[str]) -> tuple[Dialect, dict[st
     """Some tools write a second line of units: the dialect without it, and the units by heading."""
     number, line = next(dialect.numbered_rows(), (0, ""))
     cells = [cell.strip("[]() ") for cell in dialect.cells(line)]
-    if not cells or cells[0] not in TIME_UNITS or any(_is_number(cell) for cell in cells if cell != "1"):
+    if not cells or cells[0] not in _TIME_UNITS or any(_is_number(cell) for cell in cells if cell != "1"):
         return dialect, {}
     units = {heading: unit if unit not in ("", "-") else "1" for heading, unit in zip(headings, cells, strict=False)}
     return Dialect(dialect.path, dialect.encoding, dialect.separator, dialect.headings, number), units

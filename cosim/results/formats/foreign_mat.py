@@ -52,7 +52,7 @@ def read_foreign_mat(path: Path) -> ResultData:
     return _vectors(str(path), content)
 
 
-def read_modelica(path: str | Path) -> ResultData:
+def _read_modelica(path: str | Path) -> ResultData:
     """Read a Modelica trajectory; see `read_foreign_mat`.
 
     Args:
@@ -194,4 +194,4 @@ class ModelicaFormat(Format):
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return read_modelica(path)
+        return _read_modelica(path)

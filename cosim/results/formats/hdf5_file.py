@@ -37,7 +37,7 @@ def _h5py() -> Any:
     return optional_module("h5py", "hdf5", "HDF5 files")
 
 
-def write_hdf5(path: str | Path, result: ResultData) -> None:
+def _write_hdf5(path: str | Path, result: ResultData) -> None:
     """Write a result; a table larger than the memory is written block by block.
 
     Args:
@@ -111,7 +111,7 @@ def _write_events(group: Any, events: Sequence[BaliseRecord]) -> None:
 
 
 def read_hdf5(path: str | Path) -> ResultData:
-    """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
+    """Read a file of `_write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
     become names.
 
     Args:
@@ -198,7 +198,7 @@ class Hdf5Format(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        write_hdf5(path, result)
+        _write_hdf5(path, result)
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format

@@ -20,7 +20,7 @@ from cosim.results.formats.matlab_names import matlab_names
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.table_layout import column_names, table_dtype
 
-RESERVED = ("time", "units", "signals", "events")
+_RESERVED = ("time", "units", "signals", "events")
 
 
 def _cells(texts: Sequence[str]) -> np.ndarray:
@@ -63,7 +63,7 @@ def write_mat(path: str | Path, result: ResultData) -> None:
         OSError: the file cannot be written.
     """
     names = column_names(result.table)[1:]
-    legal = matlab_names(names, RESERVED)
+    legal = matlab_names(names, _RESERVED)
     known = {signal.name: signal for signal in result.signals}
     signals = [known.get(name, SignalInfo(name)) for name in names]
     content: dict[str, Any] = {"time": result.table["time"]}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-MAX_LENGTH = 63  # namelengthmax of MATLAB
-FLOW_KEYWORDS = (
+_MAX_LENGTH = 63  # namelengthmax of MATLAB
+_FLOW_KEYWORDS = (
     "break",
     "case",
     "catch",
@@ -20,14 +20,16 @@ FLOW_KEYWORDS = (
     "parfor",
     "return",
 )
-KEYWORDS = frozenset((*FLOW_KEYWORDS, "classdef", "function", "global", "persistent", "spmd", "switch", "try", "while"))
+_KEYWORDS = frozenset(
+    (*_FLOW_KEYWORDS, "classdef", "function", "global", "persistent", "spmd", "switch", "try", "while")
+)
 
 
 def _legal(name: str) -> str:
     legal = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    if not legal or not legal[0].isalpha() or legal in KEYWORDS:
+    if not legal or not legal[0].isalpha() or legal in _KEYWORDS:
         legal = "x" + legal
-    return legal[:MAX_LENGTH]
+    return legal[:_MAX_LENGTH]
 
 
 def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
@@ -47,7 +49,7 @@ def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, s
         while candidate in used:
             number += 1
             suffix = f"_{number}"
-            candidate = stem[: MAX_LENGTH - len(suffix)] + suffix
+            candidate = stem[: _MAX_LENGTH - len(suffix)] + suffix
         used.add(candidate)
         legal[name] = candidate
     return legal

@@ -23,9 +23,9 @@ from cosim.results.formats.about import about_text, blocks, signals_of
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.table_layout import column_names
 
-ACLASS = [text.ljust(11) for text in ("Atrajectory", "1.1", "", "binTrans")]  # OpenModelica wants it so to the byte
+_ACLASS = [text.ljust(11) for text in ("Atrajectory", "1.1", "", "binTrans")]  # OpenModelica wants it so to the byte
 ABOUT = "fmu_observer"
-TEXT, INTEGERS, DOUBLES = 51, 20, 0  # types of a matrix: little-endian; letters are bytes of UTF-8
+TEXT, INTEGERS, _DOUBLES = 51, 20, 0  # types of a matrix: little-endian; letters are bytes of UTF-8
 LARGEST = 2**31 - 1
 
 
@@ -48,13 +48,13 @@ def write_modelica(path: str | Path, result: ResultData) -> None:
     signals = signals_of(result)
     parameters = _parameters(result.summary, names)
     with Path(path).open("wb") as file:
-        _matrix(file, "Aclass", TEXT, np.array([list(text) for text in ACLASS], "S1"))
+        _matrix(file, "Aclass", TEXT, np.array([list(text) for text in _ACLASS], "S1"))
         _text_matrix(file, "name", [*names, *parameters])
         _text_matrix(file, "description", ["Time [s]", *map(_description, signals), *[""] * len(parameters)])
         _matrix(file, "dataInfo", INTEGERS, _data_info(len(names), len(parameters)))
         ends = _ends(result.table)
-        _matrix(file, "data_1", DOUBLES, np.array([ends, *([value] * 2 for value in parameters.values())]))
-        _header(file, "data_2", DOUBLES, len(names), len(result.table))
+        _matrix(file, "data_1", _DOUBLES, np.array([ends, *([value] * 2 for value in parameters.values())]))
+        _header(file, "data_2", _DOUBLES, len(names), len(result.table))
         for _, rows in blocks(result.table):
             file.write(np.ascontiguousarray(rows).tobytes())
         more = {"signals": [asdict(signal) for signal in signals], "about": about_text(result)}

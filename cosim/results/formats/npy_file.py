@@ -18,7 +18,7 @@ from cosim.results.table_layout import column_names
 HEADER = 1 << 26  # bytes; thousands of names need more than NumPy allows unasked
 
 
-def write_npy(path: str | Path, table: np.ndarray) -> None:
+def _write_npy(path: str | Path, table: np.ndarray) -> None:
     """Write a result table; a table that is a map of a file is not loaded for it.
 
     Args:
@@ -56,8 +56,8 @@ def _is_there(path: Path, table: np.ndarray) -> bool:
     return True
 
 
-def read_npy(path: str | Path) -> np.ndarray:
-    """Read a table written by `write_npy`; it stays in the file, whose pages are read when they are looked at.
+def _read_npy(path: str | Path) -> np.ndarray:
+    """Read a table written by `_write_npy`; it stays in the file, whose pages are read when they are looked at.
 
     Args:
         path: the file.
@@ -84,8 +84,8 @@ class NpyFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        write_npy(path, result.table)
+        _write_npy(path, result.table)
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return bare(read_npy, path)
+        return bare(_read_npy, path)

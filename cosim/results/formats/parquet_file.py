@@ -30,7 +30,7 @@ def _modules() -> tuple[Any, Any]:
     return arrow, parquet
 
 
-def write_parquet(path: str | Path, result: ResultData) -> None:
+def _write_parquet(path: str | Path, result: ResultData) -> None:
     """Write a result; a table larger than the memory is written block by block.
 
     Args:
@@ -64,7 +64,7 @@ def _metadata(signal: SignalInfo) -> dict[str, str]:
 
 
 def read_parquet(path: str | Path) -> ResultData:
-    """Read a file of `write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
+    """Read a file of `_write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
 
     Args:
         path: the file.
@@ -133,7 +133,7 @@ class ParquetFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        write_parquet(path, result)
+        _write_parquet(path, result)
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format

@@ -14,7 +14,7 @@ from fmus.check.findings import CheckOutcome, skipped
 from fmus.check.runner import WARM_UP_STEPS
 
 
-def slave_derivatives(context: Context) -> CheckOutcome:
+def _slave_derivatives(context: Context) -> CheckOutcome:
     """Directional derivatives of the outputs along the inputs between two steps.
 
     Args:
@@ -57,4 +57,4 @@ class DirectionalDerivativesCheck(Check):
     failing = LIMIT
     advice = "do not use its derivatives"
     place = 18
-    run = staticmethod(slave_derivatives)
+    run = staticmethod(_slave_derivatives)

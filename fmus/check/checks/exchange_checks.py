@@ -16,7 +16,7 @@ from fmus.check.exchange_model import FmuModel
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
 from fmus.fmi.standard import MODEL_EXCHANGE
 
-NO_STATES = "has no continuous states"
+_NO_STATES = "has no continuous states"
 SHIFT = 0.01
 """States are moved by this share, so that derivatives are not judged at a start at rest, where friction has its
 kink.
@@ -56,7 +56,7 @@ def loading(context: Context) -> CheckOutcome:
     return passed("the library and what it needs are loaded")
 
 
-def model_symbols(context: Context) -> CheckOutcome:
+def _model_symbols(context: Context) -> CheckOutcome:
     """`exported_symbols` for model exchange.
 
     Args:
@@ -75,7 +75,7 @@ def initialise(context: Context) -> CheckOutcome:
         return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
 
 
-def finite_derivatives(context: Context) -> CheckOutcome:
+def _finite_derivatives(context: Context) -> CheckOutcome:
     """Outputs, derivatives and event indicators are finite at the start.
 
     Args:
@@ -104,7 +104,7 @@ def states(context: Context) -> CheckOutcome:
     """
     with started(context) as model:
         if not model.state_count:
-            return skipped(NO_STATES)
+            return skipped(_NO_STATES)
         x = model.states()
         before = model.derivatives()
         moved = _moved(x)
@@ -128,7 +128,7 @@ def round_trip(context: Context) -> CheckOutcome:
         if not model.can_save:
             return skipped("does not declare canGetAndSetFMUstate")
         if not model.state_count:
-            return skipped(NO_STATES)
+            return skipped(_NO_STATES)
         state = model.save()
         try:
             first = _path(model, context)
@@ -150,7 +150,7 @@ def reset(context: Context) -> CheckOutcome:
     """
     with started(context) as model:
         if not model.state_count:
-            return skipped(NO_STATES)
+            return skipped(_NO_STATES)
         first = _path(model, context)
         model.terminate()
         model.reset()
@@ -240,7 +240,7 @@ class ModelExchangeExportedSymbolsCheck(Check):
     advice = MISSING
     interface = MODEL_EXCHANGE
     place = 2
-    run = staticmethod(model_symbols)
+    run = staticmethod(_model_symbols)
 
 
 class ModelExchangeInitialiseCheck(Check):
@@ -263,7 +263,7 @@ class ModelExchangeValuesAtStartCheck(Check):
     advice = "give start values"
     interface = MODEL_EXCHANGE
     place = 4
-    run = staticmethod(finite_derivatives)
+    run = staticmethod(_finite_derivatives)
 
 
 class ModelExchangeStatesCheck(Check):

@@ -16,15 +16,15 @@ from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
 from fmus.check.runner import WARM_UP_STEPS, elsewhere, end_of_experiment
 
-INSTANCES = 50
-FIRST_INSTANCES = 10
+_INSTANCES = 50
+_FIRST_INSTANCES = 10
 """Instances made before memory is measured: libraries open files and fill caches once."""
 
-LEAK = 16 * 1024
+_LEAK = 16 * 1024
 """Growth of memory for each instance that is taken for a leak [bytes]; a few pages each are the allocator's own."""
 
 
-def repeated_instantiation(context: Context) -> CheckOutcome:
+def _repeated_instantiation(context: Context) -> CheckOutcome:
     """Many instances, one after the other: memory and open files must not grow.
 
     Args:
@@ -35,24 +35,24 @@ def repeated_instantiation(context: Context) -> CheckOutcome:
     slave = context.slave()
     since, marks = perf_counter(), []
     try:
-        for count in range(1, INSTANCES + 1):
+        for count in range(1, _INSTANCES + 1):
             slave.instantiate()
             slave.enter_initialization(context.start_time, end_of_experiment(context.description, context.start_time))
             slave.exit_initialization()
             slave.free_instance_only()
-            if count in (FIRST_INSTANCES, INSTANCES):
-                marks.append((count, resident_bytes(), open_files()))
-            elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > FIRST_INSTANCES:
-                marks.append((count, resident_bytes(), open_files()))
+            if count in (_FIRST_INSTANCES, _INSTANCES):
+                marks.append((count, _resident_bytes(), _open_files()))
+            elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > _FIRST_INSTANCES:
+                marks.append((count, _resident_bytes(), _open_files()))
                 break
     finally:
         slave.free()
     if len(marks) < 2:
-        return skipped(f"instances take too long to make {FIRST_INSTANCES + 1} of them; use a longer --timeout")
+        return skipped(f"instances take too long to make {_FIRST_INSTANCES + 1} of them; use a longer --timeout")
     return _growth(*marks)
 
 
-def two_instances(context: Context) -> CheckOutcome:
+def _two_instances(context: Context) -> CheckOutcome:
     """Two instances at once, under different inputs, step by step in turn: the first one must not notice.
 
     Args:
@@ -80,7 +80,7 @@ def two_instances(context: Context) -> CheckOutcome:
 # -- what the process holds ------------------------------------------------------------------------------------------
 
 
-def resident_bytes() -> int | None:
+def _resident_bytes() -> int | None:
     """Memory of this process in main memory [bytes], or None where that is not known."""
     gc.collect()
     with suppress(OSError, ValueError):
@@ -88,7 +88,7 @@ def resident_bytes() -> int | None:
     return None
 
 
-def open_files() -> int | None:
+def _open_files() -> int | None:
     """Open file descriptors of this process, or None where that is not known."""
     if sys.platform == "win32":
         return None
@@ -108,7 +108,7 @@ def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | No
         said.append("no file stays open")
     if first[1] is None or last[1] is None:
         said.append("memory is not measured on this system")
-    elif last[1] - first[1] > LEAK * count:
+    elif last[1] - first[1] > _LEAK * count:
         grown = (last[1] - first[1]) / 1024
         return failed(f"leaks memory: {grown:.0f} kB more after {count} more instances, {grown / count:.0f} kB each")
     else:
@@ -124,7 +124,7 @@ class TwoInstancesCheck(Check):
     advice = ONE_INSTANCE
     compares = True
     place = 14
-    run = staticmethod(two_instances)
+    run = staticmethod(_two_instances)
 
 
 class RepeatedInstantiationCheck(Check):
@@ -134,4 +134,4 @@ class RepeatedInstantiationCheck(Check):
     failing = LIMIT
     advice = "do not make many instances in one process"
     place = 15
-    run = staticmethod(repeated_instantiation)
+    run = staticmethod(_repeated_instantiation)

@@ -22,7 +22,7 @@ from fmus.fmi.library import functions_of_capabilities
 from fmus.fmi.types import FLOATING_TYPES
 
 SHARE_OF_BUDGET = 0.4
-TIMED_STEPS = 200
+_TIMED_STEPS = 200
 UNSEEN = "what it does when it moves was not seen: give start values (--start) or a longer step (--step)"
 NAMES_SHOWN = 4
 
@@ -59,7 +59,7 @@ def exported_symbols(instance: FmuInstance) -> CheckOutcome:
     return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
 
 
-def slave_symbols(context: Context) -> CheckOutcome:
+def _slave_symbols(context: Context) -> CheckOutcome:
     """`exported_symbols` for co-simulation.
 
     Args:
@@ -82,7 +82,7 @@ def initialise(context: Context) -> CheckOutcome:
     return passed("instantiates, initialises, terminates and is freed")
 
 
-def values_at_start(context: Context) -> CheckOutcome:
+def _values_at_start(context: Context) -> CheckOutcome:
     """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs.
 
     Args:
@@ -230,7 +230,7 @@ def logging(context: Context) -> CheckOutcome:
     return by(problem and f"with logging on {problem}", "logging changes no output")
 
 
-def time_per_step(context: Context) -> CheckOutcome:
+def _time_per_step(context: Context) -> CheckOutcome:
     """Median time of one step.
 
     Args:
@@ -240,7 +240,7 @@ def time_per_step(context: Context) -> CheckOutcome:
     bench.begin()
     seconds: list[float] = []
     advance, since = bench.component.advance, perf_counter()
-    most = min(TIMED_STEPS, max(context.steps, 1))
+    most = min(_TIMED_STEPS, max(context.steps, 1))
     while (
         len(seconds) < most
         and not bench.component.terminated
@@ -321,7 +321,7 @@ class ExportedSymbolsCheck(Check):
     failing = LIMIT
     advice = MISSING
     place = 2
-    run = staticmethod(slave_symbols)
+    run = staticmethod(_slave_symbols)
 
 
 class InitialiseCheck(Check):
@@ -342,7 +342,7 @@ class ValuesAtStartCheck(Check):
     failing = LIMIT
     advice = "give start values, so that what it feeds does not begin with these"
     place = 4
-    run = staticmethod(values_at_start)
+    run = staticmethod(_values_at_start)
 
 
 class GettersCheck(Check):
@@ -403,4 +403,4 @@ class TimePerStepCheck(Check):
     name = "time per step"
     failing = NOTE
     place = 24
-    run = staticmethod(time_per_step)
+    run = staticmethod(_time_per_step)

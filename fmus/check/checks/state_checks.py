@@ -10,9 +10,9 @@ from fmus.check.restoring import near, restoring
 from fmus.check.runner import WARM_UP_STEPS
 from fmus.fmi.slave import Slave
 
-NO_STATE = "does not declare canGetAndSetFMUstate"
+_NO_STATE = "does not declare canGetAndSetFMUstate"
 WITHIN = "steps may be redone, and what is redone differs by as much; the master tells it in its bounds"
-NOT_SERIALISED = "does not declare canSerializeFMUstate"
+_NOT_SERIALISED = "does not declare canSerializeFMUstate"
 
 
 def round_trip(context: Context) -> CheckOutcome:
@@ -22,7 +22,7 @@ def round_trip(context: Context) -> CheckOutcome:
         context: what is checked.
     """
     if not context.bench.component.can_save:
-        return skipped(NO_STATE)
+        return skipped(_NO_STATE)
     found = restoring(context.bench)
     if found.restores == "exact":
         return passed("what follows a restored state is identical, bit for bit")
@@ -40,7 +40,7 @@ def serialised(context: Context) -> CheckOutcome:
     return _through_bytes(context, elsewhere=False)
 
 
-def other_instance(context: Context) -> CheckOutcome:
+def _other_instance(context: Context) -> CheckOutcome:
     """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from.
 
     Args:
@@ -55,7 +55,7 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
     bench = context.bench
     slave = bench.component
     if not slave.can_save or not slave.capabilities.canSerializeFMUState:
-        return skipped(NOT_SERIALISED)
+        return skipped(_NOT_SERIALISED)
     path = continuation(bench)
     bench.begin()
     bench.steps((bench.h,) * WARM_UP_STEPS)
@@ -127,4 +127,4 @@ class StateInAnotherInstanceCheck(Check):
     advice = NO_BYTES
     compares = True
     place = 13
-    run = staticmethod(other_instance)
+    run = staticmethod(_other_instance)

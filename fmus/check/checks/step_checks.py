@@ -16,9 +16,9 @@ from fmus.fmi.slave import RawStep
 SCALES = (1.0, 0.37, 3.0)
 TINY = 1e-9
 HUGE = 1000.0
-BEFORE = 3
+_BEFORE = 3
 """Ordinary steps before an odd one."""
-NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
+_NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
 
 
 def divided(context: Context) -> CheckOutcome:
@@ -29,7 +29,7 @@ def divided(context: Context) -> CheckOutcome:
     """
     bench = context.bench
     if not bench.component.can_vary_step:
-        return skipped(NO_VARIABLE_STEP)
+        return skipped(_NO_VARIABLE_STEP)
     for scale in SCALES:
         problem = divided_steps(bench, scale)
         if problem:
@@ -44,7 +44,7 @@ def short(context: Context) -> CheckOutcome:
         context: what is checked.
     """
     if not context.bench.component.can_vary_step:
-        return skipped(NO_VARIABLE_STEP)
+        return skipped(_NO_VARIABLE_STEP)
     return by(short_step(context.bench), "tiny steps after a short one move the outputs by their share")
 
 
@@ -55,7 +55,7 @@ def tiny(context: Context) -> CheckOutcome:
         context: what is checked.
     """
     if not context.bench.component.can_vary_step:
-        return skipped(NO_VARIABLE_STEP)
+        return skipped(_NO_VARIABLE_STEP)
     return _odd(context, lambda _h: TINY, _done_or_refused)
 
 
@@ -65,7 +65,7 @@ def huge(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    left = context.bench.end - context.start_time - BEFORE * context.step
+    left = context.bench.end - context.start_time - _BEFORE * context.step
     return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
 
 
@@ -87,7 +87,7 @@ def negative(context: Context) -> CheckOutcome:
     return _odd(context, lambda h: -h, _must_refuse)
 
 
-def wrong_time(context: Context) -> CheckOutcome:
+def _wrong_time(context: Context) -> CheckOutcome:
     """A step from a currentCommunicationPoint where the FMU does not stand.
 
     Args:
@@ -106,7 +106,7 @@ def _odd(
     bench = context.fresh_bench()
     try:
         bench.begin()
-        before = bench.steps((bench.h,) * BEFORE)[-1]
+        before = bench.steps((bench.h,) * _BEFORE)[-1]
         slave = bench.component
         bench.set_inputs(bench.amplitude)
         said = slave.raw_step(bench.now + shift(bench.h), size(bench.h))
@@ -213,4 +213,4 @@ class StepFromElsewhereCheck(Check):
     failing = NOTE
     advice = "never step it from where it does not stand"
     place = 23
-    run = staticmethod(wrong_time)
+    run = staticmethod(_wrong_time)
