@@ -8,9 +8,9 @@ from typing import Any
 
 from cosim.scenario.package_names import split_variant
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.load_package import find_variant, load_structure
 from cosim.ssp.package import Package, Unpacked
 from cosim.ssp.package_data import ComponentElement, DictionaryReference, SsdElement, SystemElement
+from cosim.ssp.package_loading import find_variant, load_structure
 from cosim.ssp.system_structure import read_structure
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.studies.seed_study import SeedRow
+from cosim.studies.seed_runs import SeedRow
 
 SEEDS_CSV = "seeds.csv"
 COLUMNS = ("seed", "observer", "phase", "speed_error_max", "failure")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from cosim import Scenario
-from cosim.studies.seed_study import seed_study
+from cosim.studies.seed_runs import seed_study
 from fmus import Batch
 
 SYSTEM, SCENARIO = "takagi_sugeno_cdo", "freight_profile_d"

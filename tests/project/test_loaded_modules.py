@@ -16,7 +16,7 @@ HEAVY = ("casadi", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.io",
 OPTIONAL = ("matplotlib", "pandas", "xarray", "control", "cvxpy", "clarabel", "pyarrow", "h5py", "jinja2")
 FOR_NUMBERS = ("numpy", "fmpy", "pydantic", "lxml", "scipy")
 
-SELDOM = ("cosim.studies.sweep", "cosim.comparison.compare", "cosim.ssp.load_package")
+SELDOM = ("cosim.studies.sweep", "cosim.comparison.compare", "cosim.ssp.package_loading")
 SMALL = """
 stop = 1.0
 step = 0.1

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cosim import Outcome, Scenario
-from cosim.studies.seed_study import SeedStudy, seed_study
+from cosim.studies.seed_runs import SeedStudy, seed_study
 
 pytestmark = [pytest.mark.compiler, pytest.mark.slow]
 

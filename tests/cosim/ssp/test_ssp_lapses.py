@@ -15,7 +15,7 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.components.description import read_description
 from cosim.errors import ScenarioError
-from cosim.ssp.load_package import load_package
+from cosim.ssp.package_loading import load_package
 
 RAMP = f"""<ssd:Component name="ramp" source="resources/ramp.fmu">
 <ssd:Connectors>{connector("speed", "output", "m/s")}</ssd:Connectors></ssd:Component>"""

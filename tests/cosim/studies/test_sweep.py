@@ -18,7 +18,7 @@ from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
 from cosim.studies.sampling import uniform
 from cosim.studies.seed_rows import seed_file
-from cosim.studies.seed_study import seed_study
+from cosim.studies.seed_runs import seed_study
 from cosim.studies.sweep_result import SweepResult
 
 MASSES = [70e3, 110e3]
