@@ -107,8 +107,8 @@ def build_fmu(
         preset: preset whose values become the start values; None for the system's default.
         platforms: ``host`` (built by the system's compiler), ``all``, or platform tuples such as ``x86_64-windows``
             (built by the cross compiler of the extra ``cross``), as a sequence or separated by commas.
-        protocol: how it is told of triggered events, and what it does with late ones; by default clocks in FMI 3 and
-            counts in FMI 2, and late events are replayed.
+        protocol: how it is notified of triggered events, and what it does with late ones; by default clocks in FMI 3
+            and counts in FMI 2, and late events are replayed.
         progress: called with the name of each platform whose library is done, from any thread.
 
     Returns:

@@ -41,7 +41,7 @@ def cached_fmu(
         system: the hybrid system.
         fmi_version: 2 or 3.
         preset: preset whose values become the start values; None for the system's default.
-        protocol: how it is told of triggered events, see `build_fmu`.
+        protocol: how it is notified of triggered events, see `build_fmu`.
 
     Returns:
         Path of the FMU; do not change the file.
@@ -90,7 +90,7 @@ def cache_entry(
 
     Args:
         system: the hybrid system. fmi_version: 2 or 3. preset: its preset; None for the default.
-        protocol: how it is told of triggered events; None for the default.
+        protocol: how it is notified of triggered events; None for the default.
 
     Returns:
         The place of the FMU, with a draft where it is not there, or not whole.

@@ -125,8 +125,8 @@ def versions_of(result: Result) -> dict[str, str]:
     Args:
         result: the run.
     """
-    told: Mapping[str, Any] = result.summary.get("versions") or {}
-    kept = {name: str(value) for name, value in told.items() if name != "platform"}
+    versions: Mapping[str, Any] = result.summary.get("versions") or {}
+    kept = {name: str(value) for name, value in versions.items() if name != "platform"}
     return kept | {"platform": f"{sys.platform} {platform.machine()}"}
 
 

@@ -73,14 +73,14 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Compare, tell, and write what was asked for.
+    """Compare, print, and write what was asked for.
 
     Args:
         options: of the command line.
     """
-    asked = asked_tolerances(options)  # before anything is read: a mistake in them is told at once
+    asked = asked_tolerances(options)  # before anything is read: a mistake in them is named at once
     comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
-    _tell(comparison, options)
+    _print(comparison, options)
     return EQUAL if comparison.equal else _DIFFERENT
 
 
@@ -135,10 +135,7 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
     )
 
 
-# -- telling ----------------------------------------------------------------------------------------------------------
-
-
-def _tell(comparison: Comparison, options: argparse.Namespace) -> None:
+def _print(comparison: Comparison, options: argparse.Namespace) -> None:
     """Text or JSON first, so that it is seen also where a file cannot be written."""
     if options.json:
         print_json(comparison.to_dict())

@@ -49,7 +49,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run, compare, tell.
+    """Run, compare, print.
 
     Args:
         options: of the command line.

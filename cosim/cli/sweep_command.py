@@ -109,10 +109,12 @@ def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:
 
 def _cases(scenario: Scenario, settings: list[str], zipped: bool) -> dict[str, list[Any]]:
     """All cases, and what ``--set`` says of values that a case sets too: that wins, as it does for one run."""
-    told = {name for values in scenario.cases.values() for name in values}
+    set_by_cases = {name for values in scenario.cases.values() for name in values}
     given = dict(parse_setting(text) for text in settings)
     times = len(scenario.cases) if zipped else 1
-    return {CASE: list(scenario.cases)} | {name: [value] * times for name, value in given.items() if name in told}
+    return {CASE: list(scenario.cases)} | {
+        name: [value] * times for name, value in given.items() if name in set_by_cases
+    }
 
 
 def _values(given: list[str]) -> dict[str, Any]:

@@ -156,14 +156,14 @@ class _Pair:
     def __init__(
         self, reference: Result, result: Result, tolerances: Tolerances, curves: bool, extra: list[str]
     ) -> None:
-        self.sides = (reference, result)
+        self.results = (reference, result)
         self.tolerances, self.curves, self.extra = tolerances, curves, extra
         self.length = float(reference.time[-1] - reference.time[0])
-        self.rows = [rows_to_keep(side.time) for side in self.sides]
-        self.times = [np.asarray(s.time[k], dtype=float) for s, k in zip(self.sides, self.rows, strict=True)]
-        self.infos = [{info.name: info for info in side.signals} for side in self.sides]
+        self.rows = [rows_to_keep(side.time) for side in self.results]
+        self.times = [np.asarray(s.time[k], dtype=float) for s, k in zip(self.results, self.rows, strict=True)]
+        self.infos = [{info.name: info for info in side.signals} for side in self.results]
         self.has = set(_names(result))
-        self.bare = [tells_no_units(side) for side in self.sides]
+        self.bare = [tells_no_units(side) for side in self.results]
 
     def compare(self, name: str) -> SignalComparison:
         """The comparison of a signal of the reference."""
@@ -178,7 +178,7 @@ class _Pair:
             )
         except UnitError as error:
             return self._other_unit(name, one.unit, two.unit, str(error))
-        values = [np.asarray(side[name][rows], dtype=float) for side, rows in zip(self.sides, self.rows, strict=True)]
+        values = [np.asarray(side[name][rows], dtype=float) for side, rows in zip(self.results, self.rows, strict=True)]
         if (factor, offset) != (1.0, 0.0):
             values[1] = factor * values[1] + offset
         held = "discrete" in (one.variability, two.variability) or all(map(looks_held, values))

@@ -72,15 +72,15 @@ def _headline(comparison: Comparison) -> str:
         "ignored": "ignored",
     }
     counts = [f"{statuses.count(s)} {word}" for s, word in words.items() if s in statuses]
-    told = _events_told("telegrams", comparison.events)
+    events = _events_text("telegrams", comparison.events)
     packets = comparison.packets
     if packets.matched or packets.differences or not packets.compared:
-        told += f"; {_events_told('packets', packets)}"
+        events += f"; {_events_text('packets', packets)}"
     verdict = "agrees with" if comparison.equal else "DIFFERS from"
-    return f"{comparison.result} {verdict} {comparison.reference}: {', '.join(counts)}; {told}."
+    return f"{comparison.result} {verdict} {comparison.reference}: {', '.join(counts)}; {events}."
 
 
-def _events_told(what: str, events: EventComparison) -> str:
+def _events_text(what: str, events: EventComparison) -> str:
     if not events.compared:
         return f"{what} not compared: one side keeps none"
     if events.differences:

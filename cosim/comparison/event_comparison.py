@@ -80,12 +80,12 @@ def event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float
         tolerance: what is allowed.
         length: of the run [s].
     """
-    told: dict[str, list[float]] = {}
+    by_name: dict[str, list[float]] = {}
     for event in reference:
         for name, value in event.payload.items():
-            told.setdefault(name, []).append(value)
+            by_name.setdefault(name, []).append(value)
     payload = {}
-    for name, all_values in told.items():
+    for name, all_values in by_name.items():
         values = [v for v in all_values if isfinite(v)]
         spread = max(values) - min(values) if values else 0.0
         payload[name] = tolerance.value_for(spread or max(map(abs, values), default=0.0))
@@ -137,8 +137,8 @@ def _assign(one: list[Event], two: list[Event]) -> tuple[list[Pair], list[Event]
 
 def _differences(one: Event, two: Event, limits: EventLimits) -> list[EventDifference]:
     times = [text for what in one.times if (text := _time_text(what, one.times[what], two.times[what], limits.time))]
-    told = [name for name in one.payload if name in two.payload]
-    contents = [text for name in told if (text := _payload_text(name, one, two, limits.payload[name]))]
+    shared = [name for name in one.payload if name in two.payload]
+    contents = [text for name in shared if (text := _payload_text(name, one, two, limits.payload[name]))]
     contents += [f"{name} {a!r} instead of {b!r}" for name, a, b in _words(one, two) if a != b]
     kinds: tuple[tuple[Literal["time", "payload"], list[str]], ...] = (("time", times), ("payload", contents))
     return [

@@ -21,8 +21,8 @@ def _keeps_telegrams(result: Result) -> bool:
     Args:
         result: result or reference.
     """
-    told = result.summary.get("events_recorded")
-    return bool(result.events) or (bool(told) if told is not None else "components" in result.summary)
+    recorded = result.summary.get("events_recorded")
+    return bool(result.events) or (bool(recorded) if recorded is not None else "components" in result.summary)
 
 
 def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, length: float) -> EventComparison:

@@ -225,8 +225,8 @@ def _badness(signal: SignalComparison) -> float:
 
 
 def _event_data(events: EventComparison) -> dict[str, Any]:
-    told = {name: getattr(events, name) for name in ("compared", "matched", "max_shift")}
-    return told | {"differences": [{"kind": d.kind, "text": d.text} for d in events.differences]}
+    data = {name: getattr(events, name) for name in ("compared", "matched", "max_shift")}
+    return data | {"differences": [{"kind": d.kind, "text": d.text} for d in events.differences]}
 
 
 def _signal_data(signal: SignalComparison) -> dict[str, Any]:

@@ -233,9 +233,9 @@ def root_mean_square(errors: np.ndarray) -> float:
 
 
 def _read(events: Sequence[BaliseRecord]) -> list[BaliseRecord]:
-    """Telegrams of balises that were read and told, in order of what they tell of, one at an instant."""
-    told = [event for event in events if event.kind == "true" and np.isfinite(event.delivered_at)]
-    by_time = {event.delivered_at: event for event in sorted(told, key=lambda event: event.stamp)}
+    """Telegrams of balises that were read and told, in order of their stamps, one at an instant."""
+    delivered = [event for event in events if event.kind == "true" and np.isfinite(event.delivered_at)]
+    by_time = {event.delivered_at: event for event in sorted(delivered, key=lambda event: event.stamp)}
     return [by_time[time] for time in sorted(by_time)]
 
 

@@ -85,7 +85,7 @@ class FilterConsistency:
 
 
 def filter_consistency(result: Result, spec: ReportSpec) -> list[FilterConsistency]:
-    """NIS and NEES of all observers that tell a covariance, from the start of the evaluation on.
+    """NIS and NEES of all observers that state a covariance, from the start of the evaluation on.
 
     An observer is judged by its outputs: ``nis`` (degrees: the outputs ``innovation...``, or ``nis_degrees`` at each
     sample); ``<x>_std`` beside the true value of x; and all of them together where ``covariance`` was recorded, its
@@ -210,9 +210,9 @@ def _judged(
 
 def _degrees(result: Result, observer: str, names: list[str]) -> np.ndarray:
     """Degrees of freedom of NIS in each row: told, or the number of innovations, or 1."""
-    told = estimate(result, observer, "nis_degrees")
-    if told is not None:
-        return told
+    degrees = estimate(result, observer, "nis_degrees")
+    if degrees is not None:
+        return degrees
     return np.full(len(result.time), float(measurement_count(names)))
 
 

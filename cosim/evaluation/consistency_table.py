@@ -45,6 +45,6 @@ def consistency_text(entries: Sequence[FilterConsistency], spec: ReportSpec) -> 
     if not entries:
         return ""
     rows = [["filter consistency", *SHORT], *([label(spec, e.observer), *cells(e)] for e in entries)]
-    told = dict.fromkeys(entry.kind for entry in entries)
-    meanings = [f"{'NEES of one quantity' if kind == 'error' else kind}: {MEANING[kind]}." for kind in told]
+    kinds = dict.fromkeys(entry.kind for entry in entries)
+    meanings = [f"{'NEES of one quantity' if kind == 'error' else kind}: {MEANING[kind]}." for kind in kinds]
     return "\n".join([*text_table(rows, (0, 1, 6), heading=True), *meanings, VERDICTS])

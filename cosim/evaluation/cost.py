@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.evaluation.facts import list_entry, number_entry
 from cosim.evaluation.numbers import DASH
+from cosim.evaluation.summary_entries import list_entry, number_entry
 from cosim.results.result import Result
 from fmus.text_table import text_table
 

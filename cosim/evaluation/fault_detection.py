@@ -1,4 +1,4 @@
-"""How well observers tell faults, say that the odometer lies: found and missed, false alarms, delays, positions at
+"""How well observers find faults, say that the odometer lies: found and missed, false alarms, delays, positions at
 balises.
 
 Rates come with the interval that their count allows. Imports NumPy only; SciPy is loaded for an interval.
@@ -35,14 +35,14 @@ class FaultDetection:
     Args:
         observer: component name.
         duration: time judged [s].
-        faults: number of true faults in it. detected: of those, how many it told in time, by a detection that began in
+        faults: number of true faults in it. detected: of those, how many it found in time, by a detection that began in
             them.
-        detections: how many intervals it told. false: of those, how many belong to no fault.
+        detections: how many intervals it indicated. false: of those, how many belong to no fault.
         start_delays: from the start of each detected fault to the detection [s], in their order.
         end_delays: from its end to the end of the detection [s]; infinite where that was still on when the run ended.
         time_outside: time for which it was on without a fault, false alarms and late ends together [s].
         position_errors: estimate minus true position at the last row before each balise [m].
-        tells: whether it says anything of faults; where it does not, the position errors alone mean something.
+        indicates: whether it says anything of faults; where it does not, the position errors alone mean something.
     """
 
     observer: str
@@ -55,11 +55,11 @@ class FaultDetection:
     end_delays: tuple[float, ...]
     time_outside: float
     position_errors: tuple[float, ...]
-    tells: bool = True
+    indicates: bool = True
 
     @property
     def missed(self) -> int:
-        """Faults that it did not tell."""
+        """Faults that it did not find."""
         return self.faults - self.detected
 
     @property
@@ -83,7 +83,7 @@ class FaultDetection:
         return self.false / (self.duration / HOUR) if self.duration > 0.0 else nan
 
     def within(self, limit: float) -> bool:
-        """Whether every fault was told, and none later than that.
+        """Whether every fault was found, and none later than that.
 
         Args:
             limit: longest delay [s].
@@ -126,9 +126,9 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
         return []
     start = max(float(result.time[0]), spec.evaluate_after)
     faults = [f for f in intervals(result.time, true) if f[0] >= start]
-    told = {observer: estimate(result, observer, spec.detection) for observer in spec.observers}
-    seen = [o for o in told if told[o] is not None or estimate(result, o, "position") is not None]
-    return [_judged(result, spec, observer, told[observer], faults, start) for observer in seen]
+    indicated = {observer: estimate(result, observer, spec.detection) for observer in spec.observers}
+    seen = [o for o in indicated if indicated[o] is not None or estimate(result, o, "position") is not None]
+    return [_judged(result, spec, observer, indicated[observer], faults, start) for observer in seen]
 
 
 def judged_detections(
@@ -146,7 +146,7 @@ def judged_detections(
     fault that begins later than that is late, and not false.
 
     Args:
-        faults: true intervals [s], in order. detections: told intervals [s], in order. end: of the run [s].
+        faults: true intervals [s], in order. detections: indicated intervals [s], in order. end: of the run [s].
         grace: see above [s]. delay_limit: longest delay [s]; None for none.
 
     Returns:
@@ -237,10 +237,10 @@ def clopper_pearson(count: int, trials: int, level: float = LEVEL) -> Interval:
 
 
 def _judged(
-    result: Result, spec: ReportSpec, observer: str, told: np.ndarray | None, faults: list[Interval], start: float
+    result: Result, spec: ReportSpec, observer: str, indicated: np.ndarray | None, faults: list[Interval], start: float
 ) -> FaultDetection:
     end = float(result.time[-1])
-    detections = [] if told is None else [d for d in intervals(result.time, told) if d[1] > start]
+    detections = [] if indicated is None else [d for d in intervals(result.time, indicated) if d[1] > start]
     begun = [d for d in detections if d[0] >= start or any(d[1] > a for a, _ in faults)]
     starts, ends, false = judged_detections(faults, begun, end, delay_limit=spec.delay_limit)
     inside = sum(max(0.0, min(b, d) - max(a, c)) for a, b in faults for c, d in begun)
@@ -256,7 +256,7 @@ def _judged(
         tuple(ends),
         max(outside, 0.0),
         tuple(position_errors(result, spec, observer)),
-        told is not None,
+        indicated is not None,
     )
 
 

@@ -58,7 +58,7 @@ def cells(found: FaultDetection, limit: float | None = None) -> list[str]:
     share = found.missed_interval
     sizes = [abs(error) for error in found.position_errors]
     positions = [error_number(fmean(sizes)) if sizes else DASH, error_number(max(sizes)) if sizes else DASH]
-    if not found.tells:
+    if not found.indicates:
         return [str(found.faults), *[DASH] * (len(HEADINGS) - 3), *positions]
     return [
         str(found.faults),

@@ -10,11 +10,11 @@ from math import inf
 import numpy as np
 
 from cosim.evaluation.consistency import consistency_warnings
-from cosim.evaluation.facts import list_entry
 from cosim.evaluation.metrics import FEWEST_INSTANTS, instants, judged_size, within
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import estimation_error, label, phases, recorded
 from cosim.evaluation.spec import Phase, ReportSpec
+from cosim.evaluation.summary_entries import list_entry
 from cosim.results.result import Result
 
 _STANDSTILL = 0.01

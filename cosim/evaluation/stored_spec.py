@@ -9,8 +9,8 @@ from dataclasses import fields
 from math import isfinite
 from typing import Any
 
-from cosim.evaluation.facts import mapping_entry
 from cosim.evaluation.spec import Phase, ReportSpec
+from cosim.evaluation.summary_entries import mapping_entry
 from cosim.results.result import Result
 
 _SPEC_ENTRY = "report"  # of the summary

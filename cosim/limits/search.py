@@ -31,7 +31,7 @@ def survives(trial: Trial, values: Any) -> np.ndarray:
         batch.set(name, value)
     if trial.delay_parameter:
         batch.set(trial.delay_parameter, delays)
-    _tell(batch, trial, periods, delays)
+    _notify(batch, trial, periods, delays)
     instants = _COMMUNICATION_STEP * np.arange(round(trial.stop / _COMMUNICATION_STEP) + 1)
     batch.start(0.0)
     middles = np.minimum(instants + 0.5 * _COMMUNICATION_STEP, trial.stop)
@@ -93,7 +93,7 @@ def _first_lost(trial: Trial, values: np.ndarray) -> tuple[float, float] | None:
     return (float(values[lost[0] - 1]) if lost[0] else 0.0), float(values[lost[0]])
 
 
-def _tell(batch: Batch, trial: Trial, periods: np.ndarray, delays: np.ndarray) -> None:
+def _notify(batch: Batch, trial: Trial, periods: np.ndarray, delays: np.ndarray) -> None:
     numbers = [np.arange(int((trial.stop - delay) / period) + 1) for period, delay in zip(periods, delays, strict=True)]
     members = np.repeat(np.arange(len(periods)), [len(own) for own in numbers])
     turn = np.concatenate(numbers)
@@ -101,15 +101,15 @@ def _tell(batch: Batch, trial: Trial, periods: np.ndarray, delays: np.ndarray) -
     payload = dict(trial.payload(stamps))
     arrivals = stamps + delays[members]
     if not trial.node_events:
-        told = payload | ({"node": turn % trial.nodes + 1.0} if trial.nodes else {})
-        batch.notify(trial.event, members, arrivals, **told)
+        values = payload | ({"node": turn % trial.nodes + 1.0} if trial.nodes else {})
+        batch.notify(trial.event, members, arrivals, **values)
         return
     events = {event.name: event for event in trial.system.triggered_events}
     for node, name in enumerate(trial.node_events):
         own = turn % len(trial.node_events) == node
         fields = {s.name.removeprefix(f"{name}_") for s in events[name].payload}
-        told = {field: values[own] for field, values in payload.items() if field in fields}
-        batch.notify(name, members[own], arrivals[own], **told)
+        values = {field: values[own] for field, values in payload.items() if field in fields}
+        batch.notify(name, members[own], arrivals[own], **values)
 
 
 def _error(trial: Trial, names: list[str], instants: np.ndarray, found: np.ndarray, delay: float) -> np.ndarray:

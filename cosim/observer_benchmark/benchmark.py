@@ -16,7 +16,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
 from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
-from cosim.observer_benchmark.playback import Sides, find_sides, playback_scenario, recording_scenario
+from cosim.observer_benchmark.playback import ScenarioParts, find_parts, playback_scenario, recording_scenario
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import write_results
@@ -73,7 +73,7 @@ def benchmark_observers(
             run.
         repeat: runs of each observer; the cost per step is the median of them.
         progress: called with what is done now, the number done and the number in all.
-        warn: told of what is doubtful about the recorded run.
+        warn: receives what is doubtful about the recorded run.
 
     Returns:
         Scores; an observer that fails is among them with the reason.
@@ -84,26 +84,26 @@ def benchmark_observers(
     """
     if repeat < 1:
         raise ScenarioError(f"repeat must be at least 1, got {repeat}.")
-    sides = find_sides(scenario)
-    candidates, notes = find_candidates(scenario, sides, observers)
+    parts = find_parts(scenario)
+    candidates, notes = find_candidates(scenario, parts, observers)
     if not candidates:
         raise ScenarioError(f"{scenario.where}: no observer fits this scenario. " + " ".join(notes))
-    tell = progress or (lambda _what, _done, _all: None)
+    report = progress or (lambda _what, _done, _all: None)
     total = len(candidates) * repeat + 1
     with ExitStack() as stack:
-        tell("recording", 0, total)
+        report("recording", 0, total)
         folder = Path(recorded) if recorded is not None else None
         if folder is None:
             folder = Path(record) if record is not None else Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            _record(recording_scenario(scenario, sides), folder, warn, keep=record is not None)
-        notes = [*_loop_notes(sides, load_result(folder)), *notes]
-        judge = _Judge(scenario, sides, folder, repeat, lambda what, done: tell(what, done + 1, total))
+            _record(recording_scenario(scenario, parts), folder, warn, keep=record is not None)
+        notes = [*_loop_notes(parts, load_result(folder)), *notes]
+        judge = _Judge(scenario, parts, folder, repeat, lambda what, done: report(what, done + 1, total))
         scores = judge.scores(candidates)
         interrupted = len(scores) < len(candidates)
         if interrupted:
             notes.append(f"Interrupted; not judged: {', '.join(c.name for c in candidates[len(scores) :])}.")
-        tell("done", total, total)
-    spec = _spec_of_all(sides.table.title, judge.outcomes.values())
+        report("done", total, total)
+    spec = _spec_of_all(parts.table.title, judge.outcomes.values())
     return ObserverBenchmark(scenario.name, spec, tuple(scores), tuple(notes), judge.steps, judge.outcomes, interrupted)
 
 
@@ -115,7 +115,7 @@ def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
 
 def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None, *, keep: bool) -> None:
     """Run the plant side and write it; where the folder is kept, also what a run left that did not end."""
-    outcome = scenario.run(warn=warn or _silent)
+    outcome = scenario.run(warn=warn or _ignore)
     if keep or outcome.failure is None:
         write_results(outcome.result, folder, ("csv", "npy") if keep else ("npy",))
     if outcome.failure == INTERRUPTED:
@@ -124,17 +124,17 @@ def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None
         raise RunError(f"The run of the plant side failed, so there is nothing to play back: {outcome.failure}")
 
 
-def _loop_notes(sides: Sides, recording: Result) -> list[str]:
+def _loop_notes(parts: ScenarioParts, recording: Result) -> list[str]:
     """What to know of the recording: who acted on the train in it, and whether every step is there."""
     notes = []
-    if sides.acting:
-        names = ", ".join(sides.acting)
+    if parts.acting:
+        names = ", ".join(parts.acting)
         notes.append(
             f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer "
             f"only "
             "listens to that run. What the train would do with another one in the loop is not told."
         )
-    steps = step_count(sides.table.start, sides.table.stop, sides.table.step)
+    steps = step_count(parts.table.start, parts.table.stop, parts.table.step)
     if len(recording.time) < steps + 1:
         notes.append(
             f"The recording has {len(recording.time)} rows for {steps} steps; inputs between them are interpolated, "
@@ -152,10 +152,10 @@ class _Judge:
     """Runs observers one by one beside a recording."""
 
     def __init__(
-        self, scenario: Scenario, sides: Sides, folder: Path, repeat: int, tell: Callable[[str, int], None]
+        self, scenario: Scenario, parts: ScenarioParts, folder: Path, repeat: int, report: Callable[[str, int], None]
     ) -> None:
-        self.scenario, self.sides, self.folder, self.repeat, self.tell = scenario, sides, folder, repeat, tell
-        table = sides.table
+        self.scenario, self.parts, self.folder, self.repeat, self.report = scenario, parts, folder, repeat, report
+        table = parts.table
         self.steps = step_count(table.start, table.stop, table.step)
         self.outcomes: dict[str, Outcome] = {}
         self._expected, self._seen = self._gaps()
@@ -184,7 +184,7 @@ class _Judge:
         }
         known: dict[str, Any] = labelled | {
             "settings": candidate.settings,
-            "in_loop": candidate.name in self.sides.acting,
+            "in_loop": candidate.name in self.parts.acting,
             "certificate": self._certificate(candidate),
         }
         if candidate.misfit:
@@ -196,15 +196,15 @@ class _Judge:
 
     def _run(self, candidate: BenchmarkCandidate, done: int, known: dict[str, Any]) -> ObserverScore:
         name = candidate.name
-        scenario = playback_scenario(self.scenario, self.sides, self.folder, name, candidate.table, candidate.sources)
+        scenario = playback_scenario(self.scenario, self.parts, self.folder, name, candidate.table, candidate.sources)
         costs = []
         for again in range(self.repeat):
-            self.tell(candidate.table.label or name, done + again)
-            outcome = scenario.run(warn=_silent)
+            self.report(candidate.table.label or name, done + again)
+            outcome = scenario.run(warn=_ignore)
             if outcome.failure == INTERRUPTED:
                 raise KeyboardInterrupt
             reached = max(
-                round((outcome.result.summary["reached"] - self.sides.table.start) / self.sides.table.step), 1
+                round((outcome.result.summary["reached"] - self.parts.table.start) / self.parts.table.step), 1
             )
             costs.append(_MICROSECONDS * outcome.result.summary["seconds"][name] / reached)
         self.outcomes[name] = outcome
@@ -215,7 +215,7 @@ class _Judge:
 
     def _gaps(self) -> tuple[Any, float | None]:
         """Gap to expect from the scenario, and the longest one told in the recording."""
-        table = with_seeds(self.sides.table)
+        table = with_seeds(self.parts.table)
         if table.balises is None:
             return None, None
         layout = make_layout(table.balises, table.start, table.stop, self.scenario.folder, self.scenario.where)
@@ -238,5 +238,5 @@ class _Judge:
         return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
 
 
-def _silent(_text: str) -> None:
+def _ignore(_text: str) -> None:
     """What is doubtful about an observer stands in its score."""

@@ -11,7 +11,13 @@ from typing import Any
 import fmu_observer
 from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError, nearest
-from cosim.observer_benchmark.playback import FACTS, Sides, known_facts, told_to, train_observers
+from cosim.observer_benchmark.playback import (
+    SHARED_PARAMETERS,
+    ScenarioParts,
+    settable,
+    shared_parameters,
+    train_observers,
+)
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.run.component_models import make_declared
 from cosim.scenario.model_name import ModelName, settings_of
@@ -48,23 +54,23 @@ class BenchmarkCandidate:
 
 
 def find_candidates(
-    scenario: Scenario, sides: Sides, names: Sequence[Any] | None
+    scenario: Scenario, parts: ScenarioParts, names: Sequence[Any] | None
 ) -> tuple[list[BenchmarkCandidate], list[str]]:
     """The observers to be judged, and notes on what was assumed and left out.
 
     Args:
-        scenario: for messages. sides: of it. names: those asked for; None for all that fit.
+        scenario: for messages. parts: of it. names: those asked for; None for all that fit.
 
     Raises:
         ScenarioError: a name is neither an observer of the scenario nor a shipped one.
     """
     if names is not None:
         asked = {name if isinstance(name, str) else id(name): name for name in names}
-        found = _told_apart([_named(scenario, sides, name) for name in asked.values()])
+        found = _told_apart([_named(scenario, parts, name) for name in asked.values()])
         return found, [f"{c.name}: {text}" for c in found for text in c.settings]
-    own = [_own(sides, name) for name in sides.observers]
-    used = {sides.table.components[name].observer for name in sides.observers}
-    others = [_shipped(sides, name) for name in train_observers() if name not in used]
+    own = [_own(parts, name) for name in parts.observers]
+    used = {parts.table.components[name].observer for name in parts.observers}
+    others = [_shipped(parts, name) for name in train_observers() if name not in used]
     reasons = dict.fromkeys(c.misfit for c in others if c.misfit)
     left_out = [f"left out, as {why}: {', '.join(c.model for c in others if c.misfit == why)}" for why in reasons]
     found = [*own, *(c for c in others if not c.misfit)]
@@ -78,51 +84,51 @@ def _told_apart(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandi
     return [replace(c, name=f"{c.name}_{n + 1}") if n else c for c, n in zip(candidates, earlier, strict=True)]
 
 
-def _named(scenario: Scenario, sides: Sides, given: Any) -> BenchmarkCandidate:
+def _named(scenario: Scenario, parts: ScenarioParts, given: Any) -> BenchmarkCandidate:
     """An observer of the scenario, or one by the name of its model, or a class or an instance from a script."""
-    if isinstance(given, str) and given in sides.observers:
-        return _own(sides, given)
+    if isinstance(given, str) and given in parts.observers:
+        return _own(parts, given)
     try:
         name = ModelName.of(given)
     except ValueError as error:
         raise ScenarioError(f"{scenario.where}: {error}") from error
     if name.given is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
-        known = [*sides.observers, *(n for n in train_observers() if n not in sides.observers)]
+        known = [*parts.observers, *(n for n in train_observers() if n not in parts.observers)]
         raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, known)}")
     if name.given is None:
         name = ModelName.of(move_file(name, lambda path: absolute(path, ".")))
-    return _shipped(sides, name)
+    return _shipped(parts, name)
 
 
-def _own(sides: Sides, name: str) -> BenchmarkCandidate:
-    return BenchmarkCandidate(name, sides.table.components[name], sides.sources(name), "scenario")
+def _own(parts: ScenarioParts, name: str) -> BenchmarkCandidate:
+    return BenchmarkCandidate(name, parts.table.components[name], parts.sources(name), "scenario")
 
 
-def _shipped(sides: Sides, model: str) -> BenchmarkCandidate:
+def _shipped(parts: ScenarioParts, model: str) -> BenchmarkCandidate:
     """An observer with its own defaults and what the scenario says of the train."""
     said = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
     table = ComponentTable.model_validate({"observer": model, **said})
     system = make_declared(table, model)
     name = model.rpartition(":")[2].replace(".", "_")
-    parameters = {s.name for s in told_to(system)}
+    parameters = {s.name for s in settable(system)}
     untold = parameters - table.parameters.keys()
-    facts = {fact: known for fact, known in known_facts(sides).items() if fact in untold}
-    told = {fact: value for fact, (value, _) in facts.items()}
-    table = table.model_copy(update={"parameters": {**table.parameters, **told}})
-    template = sides.template()
+    shared = {name: known for name, known in shared_parameters(parts).items() if name in untold}
+    values = {name: value for name, (value, _) in shared.items()}
+    table = table.model_copy(update={"parameters": {**table.parameters, **values}})
+    template = parts.template()
     sources = {s.name: template[s.name] for s in system.inputs if s.name in template}
-    unique = name if name not in sides.table.components else f"{name}_with_defaults"
-    settings = (_assumed(system, facts),) if parameters & set(FACTS) else ()
-    return BenchmarkCandidate(unique, table, sources, "defaults", settings, _misfit(sides, system, sources))
+    unique = name if name not in parts.table.components else f"{name}_with_defaults"
+    settings = (_assumed(system, shared),) if parameters & set(SHARED_PARAMETERS) else ()
+    return BenchmarkCandidate(unique, table, sources, "defaults", settings, _misfit(parts, system, sources))
 
 
-def _assumed(system: Any, facts: Mapping[str, tuple[float, str]]) -> str:
-    given = ", ".join(f"{fact} = {value:g} ({why})" for fact, (value, why) in facts.items())
-    units = {s.name: (s.start, s.unit) for s in told_to(system)}
+def _assumed(system: Any, shared: Mapping[str, tuple[float, str]]) -> str:
+    given = ", ".join(f"{name} = {value:g} ({why})" for name, (value, why) in shared.items())
+    units = {s.name: (s.start, s.unit) for s in settable(system)}
     rest = ", ".join(
         f"{f} = {units[f][0]:g}" + (f" {units[f][1]}" if units[f][1] != "1" else "")
-        for f in FACTS
-        if f in units and f not in facts
+        for f in SHARED_PARAMETERS
+        if f in units and f not in shared
     )
     return (
         f"not set in the scenario, gains at their defaults; told {given or 'nothing of the train'}; assumed "
@@ -130,13 +136,13 @@ def _assumed(system: Any, facts: Mapping[str, tuple[float, str]]) -> str:
     )
 
 
-def _misfit(sides: Sides, system: Any, sources: Iterable[str]) -> str:
+def _misfit(parts: ScenarioParts, system: Any, sources: Iterable[str]) -> str:
     """Why an observer cannot listen here, or an empty text."""
     triggered = getattr(system, "triggered_events", ())  # plain Python says with its `balise` what it takes
     payload = {s.name for event in triggered for s in event.payload}
     missing = [s.name for s in system.inputs if s.name not in sources and s.name not in payload | OPTIONAL]
     if missing:
         return f"nothing in this scenario gives its input{'s' if len(missing) > 1 else ''} {', '.join(missing)}"
-    if BALISE_EVENT in [event.name for event in triggered] and sides.table.balises is None:
+    if BALISE_EVENT in [event.name for event in triggered] and parts.table.balises is None:
         return "it is corrected by balises, and this scenario has none"
     return ""

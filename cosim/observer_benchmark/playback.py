@@ -32,7 +32,7 @@ _PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
 
 
 @dataclass(frozen=True)
-class Sides:
+class ScenarioParts:
     """What is what in a scenario.
 
     Args:
@@ -55,8 +55,8 @@ class Sides:
     def acting(self) -> tuple[str, ...]:
         """Observers that act on the train; all that are listened to where nobody says which component the train is."""
         balises, report = self.table.balises, self.table.report
-        told = (None if balises is None else balises.position) or report.true_position or report.true_speed or ""
-        train = told.partition(".")[0]
+        position = (None if balises is None else balises.position) or report.true_position or report.true_speed or ""
+        train = position.partition(".")[0]
         if train not in self.table.components:
             return self.in_loop
         before = _ancestors([train], self.links, self.table.components)
@@ -85,7 +85,7 @@ class Sides:
         return found
 
 
-def find_sides(scenario: Scenario) -> Sides:
+def find_parts(scenario: Scenario) -> ScenarioParts:
     """Tell the plant side of a scenario from its observers.
 
     Args:
@@ -100,11 +100,11 @@ def find_sides(scenario: Scenario) -> Sides:
     observers = tuple(name for name in table.components if name != plant and _is_observer(scenario, table, name))
     roots = [n for n, t in table.components.items() if n not in observers and t.observer is None]
     roots += [link[0].partition(".")[0] for link in links if link[1].partition(".")[0] in observers]
-    return Sides(table, observers, _ancestors(roots, links, table.components), links)
+    return ScenarioParts(table, observers, _ancestors(roots, links, table.components), links)
 
 
 def _is_observer(scenario: Scenario, table: ScenarioTable, name: str) -> bool:
-    """Named as one in the report, or an estimator of position or speed: shipped, or an FMU that is told of balises."""
+    """Named as one in the report, or an estimator of position or speed: shipped, or an FMU that receives balises."""
     component, where = table.components[name], f"{scenario.where}: components.{name}"
     if name in (table.report.observers or []):
         return True
@@ -133,39 +133,44 @@ def _ancestors(roots: Iterable[str], links: Iterable[Link], components: Iterable
 # -----------------------------------------------------------------------------------------------------
 
 
-def recording_scenario(scenario: Scenario, sides: Sides) -> Scenario:
+def recording_scenario(scenario: Scenario, parts: ScenarioParts) -> Scenario:
     """The plant side alone, everything recorded that an observer listens to.
 
     Args:
         scenario: the scenario.
-        sides: the plant side and the observers, from `find_sides`.
+        parts: the plant side and the observers, from `find_parts`.
     """
-    data = _table(sides.table)
-    heard = _heard(sides)
-    data["components"] = {name: _recorded(data["components"][name], heard.get(name, set())) for name in sides.plant}
-    kept = [link for link in sides.links if {link[0].partition(".")[0], link[1].partition(".")[0]} <= set(sides.plant)]
+    data = _table(parts.table)
+    signals = _listened_to(parts)
+    data["components"] = {name: _recorded(data["components"][name], signals.get(name, set())) for name in parts.plant}
+    kept = [link for link in parts.links if {link[0].partition(".")[0], link[1].partition(".")[0]} <= set(parts.plant)]
     data["connections"] = [connection(link, link[1]) for link in kept]
     data["master"] = data.get("master", {}) | {"record_every": 1}
     data |= {"certificates": "ignore", "expect": []}
-    if sides.table.balises is not None and sides.table.balises.receivers is not None:
-        data["balises"]["receivers"] = [name for name in sides.table.balises.receivers if name in sides.plant]
-    if sides.table.network is not None and sides.table.network.receivers is not None:
-        data["network"]["receivers"] = [name for name in sides.table.network.receivers if name in sides.plant]
-    data["report"] = _roles(sides.table, sides.in_loop)
+    if parts.table.balises is not None and parts.table.balises.receivers is not None:
+        data["balises"]["receivers"] = [name for name in parts.table.balises.receivers if name in parts.plant]
+    if parts.table.network is not None and parts.table.network.receivers is not None:
+        data["network"]["receivers"] = [name for name in parts.table.network.receivers if name in parts.plant]
+    data["report"] = _roles(parts.table, parts.in_loop)
     return _scenario(scenario, data)
 
 
 def playback_scenario(
-    scenario: Scenario, sides: Sides, folder: Path, name: str, observer: ComponentTable, sources: Mapping[str, Link]
+    scenario: Scenario,
+    parts: ScenarioParts,
+    folder: Path,
+    name: str,
+    observer: ComponentTable,
+    sources: Mapping[str, Link],
 ) -> Scenario:
     """One observer beside the recording.
 
     Args:
-        scenario: that was recorded. sides: of it. folder: with the results of the plant side.
+        scenario: that was recorded. parts: of it. folder: with the results of the plant side.
         name: of the observer; not that of a component of the plant side it listens to. observer: its table.
         sources: where its inputs come from.
     """
-    table = sides.table
+    table = parts.table
     report, balises = _roles(table, [name]), table.balises
     used = [link[0] for link in sources.values()] + [value for value in report.values() if isinstance(value, str)]
     watched = {} if balises is None else {k: v for k in ("position", "speed") if (v := getattr(balises, k)) is not None}
@@ -174,7 +179,7 @@ def playback_scenario(
     travels = network is not None and (network.receivers is None or name in network.receivers)
     used += network.signals if network is not None and travels else []
     wanted = dict.fromkeys(signal.partition(".")[0] for signal in used)
-    if name in wanted and name in sides.in_loop:
+    if name in wanted and name in parts.in_loop:
         raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
     components: dict[str, Any] = {n: {"recording": str(folder.resolve()), "component": n} for n in wanted if n != name}
     master = {key: value for key, value in _table(table.master).items() if key in _PLAYED_MASTER}
@@ -224,14 +229,14 @@ def connection(link: Link, target: str) -> str | dict[str, Any]:
     }
 
 
-def _heard(sides: Sides) -> dict[str, set[str]]:
+def _listened_to(parts: ScenarioParts) -> dict[str, set[str]]:
     """Signals that observers listen to, by component."""
-    heard: dict[str, set[str]] = {}
-    for link in sides.links:
+    signals: dict[str, set[str]] = {}
+    for link in parts.links:
         source, _, signal = link[0].partition(".")
-        if link[1].partition(".")[0] in sides.observers:
-            heard.setdefault(source, set()).add(signal)
-    return heard
+        if link[1].partition(".")[0] in parts.observers:
+            signals.setdefault(source, set()).add(signal)
+    return signals
 
 
 def _recorded(component: dict[str, Any], signals: set[str]) -> dict[str, Any]:
@@ -240,7 +245,7 @@ def _recorded(component: dict[str, Any], signals: set[str]) -> dict[str, Any]:
 
 
 def _roles(table: ScenarioTable, observers: Iterable[str]) -> dict[str, Any]:
-    """The report table for these observers, without what is told of others."""
+    """The report table for these observers, without what it says of others."""
     kept = {*ROLES, "phases", "zones", "evaluate_after"}
     given = {key: value for key, value in _table(table.report).items() if key in kept}
     given = {key: value for key, value in given.items() if key not in ROLES or value is not None}
@@ -260,7 +265,7 @@ def _table(table: Any) -> dict[str, Any]:
 # -- observers
 # ----------------------------------------------------------------------------------------------------------
 
-FACTS = (
+SHARED_PARAMETERS = (
     "mass",
     "davis_a",
     "davis_b",
@@ -271,7 +276,7 @@ FACTS = (
     "estimated_position",
     "estimated_speed",
 )
-"""What every train observer is told of the train, and where it believes it to start."""
+"""What every train observer knows of the train, and where it believes it to start."""
 
 
 def train_observers() -> dict[str, type[GatedObserver]]:
@@ -285,38 +290,38 @@ def train_observers() -> dict[str, type[GatedObserver]]:
     }
 
 
-def known_facts(sides: Sides) -> dict[str, tuple[float, str]]:
+def shared_parameters(parts: ScenarioParts) -> dict[str, tuple[float, str]]:
     """What the scenario says of the train that an observer should know too: value, and who says so.
 
-    What its own observers, as far as they want to know it, were told in agreement comes first; then parameters and
+    What its own observers, as far as they want to know it, agree on comes first; then parameters and
     preset of the plant.
 
     Args:
-        sides: the plant side and the observers, from `find_sides`.
+        parts: the plant side and the observers, from `find_parts`.
     """
     found: dict[str, tuple[float, str]] = {}
-    for fact in FACTS:
-        wanting = [sides.table.components[n] for n in sides.observers if _wants(sides.table.components[n], fact)]
-        told = [table.parameters.get(fact) for table in wanting]
-        values = {value for value in told if isinstance(value, int | float) and not isinstance(value, bool)}
-        if len(values) == 1 and None not in told:
-            found[fact] = float(values.pop()), "as for the observers of the scenario"
-    plant = "" if sides.table.balises is None else (sides.table.balises.position or "").partition(".")[0]
-    plant = plant or (sides.table.report.true_speed or "").partition(".")[0]
-    if plant in sides.table.components:
-        for fact, value in _plant_facts(sides.table.components[plant]).items():
-            found.setdefault(fact, (value, f"as for {plant}"))
+    for parameter in SHARED_PARAMETERS:
+        wanting = [parts.table.components[n] for n in parts.observers if _wants(parts.table.components[n], parameter)]
+        stated = [table.parameters.get(parameter) for table in wanting]
+        values = {value for value in stated if isinstance(value, int | float) and not isinstance(value, bool)}
+        if len(values) == 1 and None not in stated:
+            found[parameter] = float(values.pop()), "as for the observers of the scenario"
+    plant = "" if parts.table.balises is None else (parts.table.balises.position or "").partition(".")[0]
+    plant = plant or (parts.table.report.true_speed or "").partition(".")[0]
+    if plant in parts.table.components:
+        for parameter, value in _plant_values(parts.table.components[plant]).items():
+            found.setdefault(parameter, (value, f"as for {plant}"))
     return found
 
 
-def _wants(table: ComponentTable, fact: str) -> bool:
-    """Whether an observer has a parameter or start value of this name; of one that cannot tell: yes."""
+def _wants(table: ComponentTable, parameter: str) -> bool:
+    """Whether an observer has a parameter or start value of this name; of one that does not say: yes."""
     if table.observer is None:
         return True
-    return fact in {signal.name for signal in told_to(make_declared(table, ""))}
+    return parameter in {signal.name for signal in settable(make_declared(table, ""))}
 
 
-def told_to(system: Any) -> tuple[Signal, ...]:
+def settable(system: Any) -> tuple[Signal, ...]:
     """What a component's table may say to a model: its parameters and, of a hybrid system, its states at the start.
 
     Args:
@@ -325,8 +330,12 @@ def told_to(system: Any) -> tuple[Signal, ...]:
     return (*system.parameter_signals, *getattr(system, "states", ()))
 
 
-def _plant_facts(table: ComponentTable) -> dict[str, float]:
+def _plant_values(table: ComponentTable) -> dict[str, float]:
     system = make_system(table, "")
     preset: Mapping[str, Any] = {} if system is None or table.preset is None else system.presets[table.preset]
     given = {**preset, **table.parameters}
-    return {fact: float(given[fact]) for fact in FACTS if isinstance(given.get(fact), int | float)}
+    return {
+        parameter: float(given[parameter])
+        for parameter in SHARED_PARAMETERS
+        if isinstance(given.get(parameter), int | float)
+    }

@@ -154,11 +154,11 @@ def _new_ones(warn: Callable[[str], None] | None, stored: Result) -> Callable[[s
     """Tells only of what was not warned of before."""
     known = set(stored.summary.get("warnings", ()))
 
-    def tell(text: str) -> None:
+    def warn_new(text: str) -> None:
         if text not in known:
             (warn or LOG.warning)(text)
 
-    return tell
+    return warn_new
 
 
 def _demand_all_there(manifest: Manifest, settings: Mapping[str, Any]) -> None:
@@ -204,7 +204,7 @@ def _changes(manifest: Manifest, outcome: Outcome) -> list[str]:
         for part in foreign["parts"]
         if part.get("note")
     ]
-    notes += [told["text"] for told in manifest.objects.values()]
+    notes += [made["text"] for made in manifest.objects.values()]
     return lines + notes + manifest.moved_on()
 
 

@@ -72,12 +72,12 @@ def report(terminal: pytest.TerminalReporter, config: pytest.Config) -> None:
     terminal.write_line(f"{len(records)} checked: " + ", ".join(f"{n} {WORDS[s]}" for s, n in sorted(counts.items())))
     for record in records:
         if record.status not in ("equal", "unchanged"):
-            _tell(terminal, record, config)
+            _write_record(terminal, record, config)
     if options.mode(config) == "update":
-        _tell_update(terminal, records, config)
+        _write_update(terminal, records, config)
 
 
-def _tell(terminal: pytest.TerminalReporter, record: RegressionRecord, config: pytest.Config) -> None:
+def _write_record(terminal: pytest.TerminalReporter, record: RegressionRecord, config: pytest.Config) -> None:
     terminal.write_line(f"{record.test}: {_shown(Path(record.baseline), config)} {_verb(record)}")
     for line in record.lines[:LINES]:
         terminal.write_line(f"    {line}")
@@ -92,7 +92,7 @@ def _verb(record: RegressionRecord) -> str:
     return verbs.get(record.status, record.status)
 
 
-def _tell_update(terminal: pytest.TerminalReporter, records: list[RegressionRecord], config: pytest.Config) -> None:
+def _write_update(terminal: pytest.TerminalReporter, records: list[RegressionRecord], config: pytest.Config) -> None:
     staged = [record for record in records if record.staged]
     for fault in config.stash.get(_WRITTEN, []):
         terminal.write_line(f"error: {fault}", red=True)

@@ -12,12 +12,12 @@ import numpy as np
 
 from cosim.evaluation.corrections import corrections
 from cosim.evaluation.event_counts import accepted_stamps
-from cosim.evaluation.facts import number_entry
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import number_entry
 from cosim.report.figures.scales import error_scale
 from cosim.results.result import BaliseRecord, Result
 
@@ -51,7 +51,7 @@ def notable_windows(result: Result, spec: ReportSpec, most: int = MOST) -> list[
     """Windows in order of time: largest errors, telegrams gone wrong, zones, indicators, largest jumps at balises.
 
     Args:
-        result: the run. spec: roles, zones, start of the evaluation. most: how many at most; the most telling are kept.
+        result: the run. spec: roles, zones, start of the evaluation. most: how many at most.
 
     Returns:
         Windows of which none holds the instant of another; where two would, they are one with both reasons.
@@ -90,7 +90,7 @@ class _Scale:
 
 
 def _candidates(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[ZoomWindow]:
-    """Windows, the most telling first."""
+    """Windows, the most instructive first."""
     yield from _largest_error(result, spec, scale, "speed")
     yield from _largest_error(result, spec, scale, "position")
     yield from _telegrams(result, spec, scale)
@@ -151,12 +151,14 @@ def _telegrams(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Zoom
     Those during the start-up count only where there are no others.
     """
     events = [e for e in result.events if e.stamp >= spec.evaluate_after] or result.events
-    told = [e for e in events if e.kind != "missed"]
-    yield from _at(scale, (e for e in told if e.kind == "false"), "A false telegram")
-    latest = max(told, key=lambda e: e.delivered_at - e.stamp, default=None)
+    delivered = [e for e in events if e.kind != "missed"]
+    yield from _at(scale, (e for e in delivered if e.kind == "false"), "A false telegram")
+    latest = max(delivered, key=lambda e: e.delivered_at - e.stamp, default=None)
     if latest is not None and latest.delivered_at > latest.stamp:
         yield from _at(scale, [latest], f"A telegram {number(1000 * (latest.delivered_at - latest.stamp))} ms late")
-    refused = (e for e in told if e.kind == "true" and any(outcome in _NOT_TAKEN for outcome in e.outcomes.values()))
+    refused = (
+        e for e in delivered if e.kind == "true" and any(outcome in _NOT_TAKEN for outcome in e.outcomes.values())
+    )
     yield from _at(scale, refused, "A telegram that not every observer took")
     stamps = np.array([*accepted_stamps(result.events), np.inf])
     missed = [e for e in events if e.kind == "missed"]

@@ -39,7 +39,7 @@ class BaliseRecord:
 
     Args:
         stamp: when the train passed the balise [s].
-        delivered_at: when the receivers were told [s]; NaN for a missed one.
+        delivered_at: when the receivers were notified [s]; NaN for a missed one.
         identity: name of the balise.
         position: position told [m].
         true_position: position of the plant at the stamp [m].

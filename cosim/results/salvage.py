@@ -24,7 +24,7 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
             its table. reason: why the run ended.
 
     Returns:
-        What to tell the user.
+        What to say to the user.
     """
     spare, out = Path(note["spare"]), Path(note["out"])
     try:

@@ -59,7 +59,7 @@ class Scenario:
         self.folder, self.where = Path(folder), where
         self._data: dict[str, Any] = {"components": {}, "connections": [], **deepcopy(tables)}
         self._places: dict[Key, str] = {}  # in which file a value stands, where one file includes others
-        self._doubts: list[str] = []
+        self._warnings: list[str] = []
         self._name: str | None = None  # where it is not that of the file
         self._files: object = None  # what keeps unpacked files alive
 
@@ -108,7 +108,7 @@ class Scenario:
     def _from_package(cls, name: str, strict: bool) -> Scenario:
         loaded = ssp.load_package(name, strict)
         scenario = cls(where=name, **loaded.tables)
-        scenario._doubts, scenario._files = loaded.doubts, loaded.unpacked
+        scenario._warnings, scenario._files = loaded.warnings, loaded.unpacked
         return scenario
 
     @classmethod
@@ -144,11 +144,11 @@ class Scenario:
             FmuLoadError: the FMU cannot be read.
             ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
         """
-        tables, doubts = single_tables(
+        tables, warnings = single_tables(
             Path(path), name, start, stop, step, inputs, parameters or {}, record, interpolation
         )
         scenario = cls(where=Path(path).name, **tables)
-        scenario._doubts = doubts
+        scenario._warnings = warnings
         return scenario
 
     def to_toml(self, folder: str | Path | None = None) -> str:
@@ -284,7 +284,7 @@ class Scenario:
     def copy(self) -> Scenario:
         """An independent copy."""
         scenario = Scenario(folder=self.folder, where=self.where, **self._data)
-        scenario._doubts, scenario._files, scenario._places = list(self._doubts), self._files, self._places
+        scenario._warnings, scenario._files, scenario._places = list(self._warnings), self._files, self._places
         scenario._name = self._name
         return scenario
 
@@ -348,10 +348,10 @@ class Scenario:
         Args:
             progress: called with the time reached and the end [s].
             overrides: as for `set`, for this run only.
-            warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
-                ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
+            warn: receives everything doubtful as soon as it is known, before the run where it can be; by default the
+                log ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
             call_log: a file to log every call of every component to, as `master.log_calls` asks for.
-            building: told of the FMUs of shipped models that are built for the first time, some seconds each; by
+            building: receives the FMUs of shipped models that are built for the first time, some seconds each; by
                 default the log ``cosim``, as information.
             stream: a results folder to which everything is written while the run goes on, so that it outlives the
                 program; what an earlier run left there is removed before the first step. The table is written as
@@ -374,15 +374,15 @@ class Scenario:
             scenario.master(log_calls=True)
         table = scenario.table()
         log = None if call_log is None else Path(call_log)
-        for doubt in self._doubts:
-            (warn or LOG.warning)(doubt)
+        for warning in self._warnings:
+            (warn or LOG.warning)(warning)
         with self._places_named():
             place = scenario.name, self.folder, self.where
             origin = Origin.of(table, *place, self._files)
             folder, streaming = where_to(stream, spare, origin)
             finish = ending(origin, folder, warn or LOG.warning, finished)
             return run_scenario(
-                table, *place, progress, warn, log, building, doubts=self._doubts, stream=streaming, finish=finish
+                table, *place, progress, warn, log, building, doubts=self._warnings, stream=streaming, finish=finish
             )
 
     def structure(self) -> Structure:

@@ -60,7 +60,7 @@ def start_values(nets: Nets, lapses: Lapses) -> Starts:
     """Start values that the bindings of all elements give.
 
     Args:
-        nets: the elements. lapses: told of parameters that nothing is called.
+        nets: the elements. lapses: receives parameters that nothing is called.
 
     Raises:
         ScenarioError: a value that does not fit its variable, or a mapping to what does not exist.
@@ -86,14 +86,14 @@ class _Applying:
         if binding.mapping is None:
             for name, parameter in parameters.items():
                 if not self.assign(Given(parameter), name, path):
-                    self.lapses.tell(
+                    self.lapses.note(
                         parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored."
                     )
             return
         for entry in binding.mapping:
             if entry.source not in parameters:
                 known = nearest(entry.source, parameters)
-                self.lapses.tell(entry.node, f"{entry.source!r} is mapped and not in the parameter set; {known}")
+                self.lapses.note(entry.node, f"{entry.source!r} is mapped and not in the parameter set; {known}")
             elif not self.assign(Given(parameters[entry.source], entry), entry.target, path):
                 fail(entry.node, f"{entry.source!r} is mapped to {entry.target!r}, {self.nothing(entry.target, path)}.")
 

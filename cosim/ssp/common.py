@@ -87,7 +87,7 @@ class UnitTable:
     where the name is the same or none, and nowhere else.
 
     Args:
-        root: root element of the file. prefix: of its own namespace. lapses: told of what is used and not defined.
+        root: root element of the file. prefix: of its own namespace. lapses: receives what is used and not defined.
 
     Raises:
         ScenarioError: a name is given twice.
@@ -137,7 +137,7 @@ class UnitTable:
         usual, defined = _usual(name), self._units[name]
         if usual is not None and not _same(usual, defined):
             meant = f"unit {name!r} is defined as {_formula(defined)}, usually it is {_formula(usual)}"
-            self._lapses.tell(node, f"{meant}; values are converted by the definition of the package.")
+            self._lapses.note(node, f"{meant}; values are converted by the definition of the package.")
 
 
 def read_type(node: Node, units: UnitTable, prefix: str = "ssc") -> Type | None:

@@ -38,7 +38,7 @@ def describe_package(name: str) -> dict[str, Any]:
         "system": list(_tree(structure.system, 0)),
         "components": list(tables["components"]),
         "connections": [line if isinstance(line, str) else dict(line) for line in tables["connections"]],
-        "doubts": loaded.doubts,
+        "doubts": loaded.warnings,
     }
 
 

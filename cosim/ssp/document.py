@@ -52,7 +52,7 @@ def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], No
 
     Args:
         text: its content. file: its name for messages. kind: ``ssd``, ``ssv``, ``ssm`` or ``ssb``.
-        undeclared: told of each prefix that is used and not declared, and of the namespace that is taken for it;
+        undeclared: receives each prefix that is used and not declared, and of the namespace that is taken for it;
             without it such a file is refused.
 
     Raises:

@@ -85,7 +85,7 @@ def interface_of(element: ComponentElement, lapses: Lapses) -> Interface:
     """The interface of a component's FMU.
 
     Args:
-        element: the component. lapses: told of names that it gives twice.
+        element: the component. lapses: receives names that it gives twice.
 
     Raises:
         ScenarioError: its file is no FMU that can be read.

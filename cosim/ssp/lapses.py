@@ -35,9 +35,9 @@ class Lapses:
         if self.strict:
             where = node if isinstance(node, str) else place(node)
             raise ScenarioError(f"{where}: {text} (Read strictly; without --strict this is a warning.)")
-        self.tell(node, text)
+        self.note(node, text)
 
-    def tell(self, node: Node | str, text: str) -> None:
+    def note(self, node: Node | str, text: str) -> None:
         """Something doubtful that is no fault by the standard.
 
         Args:
@@ -47,9 +47,9 @@ class Lapses:
 
     def lines(self) -> list[str]:
         """Each of them once, with the first place where it was met and the number of others."""
-        told = []
+        texts = []
         for text, places in self._places.items():
             others = len(set(places)) - 1
             more = f" (and {others} more place{'s' if others > 1 else ''})" if others else ""
-            told.append(f"{places[0]}{more}: {text}")
-        return told
+            texts.append(f"{places[0]}{more}: {text}")
+        return texts

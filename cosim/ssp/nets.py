@@ -120,7 +120,7 @@ class Nets:
     """All elements of a nested system by path, and the connections between their connectors.
 
     Args:
-        root: the root system. lapses: told of names that an FMU gives twice.
+        root: the root system. lapses: receives names that an FMU gives twice.
 
     Raises:
         ScenarioError: a connector that does not exist or does not fit its FMU, a connection without direction, two

@@ -47,7 +47,7 @@ class Package:
         path: the file.
         title: how it is called in messages.
         unpacked: where its members go when a file of them is needed.
-        lapses: told of what is not as the standard wants it.
+        lapses: receives what is not as the standard wants it.
 
     Raises:
         ScenarioError: it is missing, no archive, dangerous, or has no ``SystemStructure.ssd``.

@@ -34,13 +34,13 @@ class Loaded:
 
     Args:
         tables: as in a scenario file; paths are absolute.
-        doubts: what was not as it should be, and could be read all the same.
+        warnings: what was not as it should be, and could be read all the same.
         unpacked: the folder of the FMUs, to be kept as long as they are needed.
     """
 
     tables: dict[str, Any]
     unpacked: Unpacked
-    doubts: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 def load_package(name: str, strict: bool = False) -> Loaded:
@@ -119,7 +119,7 @@ def load_structure(structure: SsdStructure, package: Package) -> Loaded:
     tables |= _experiment(structure, nets, tables)
     tables["components"] = {names[path]: _component(nets, path, starts.get(path, {}), package.lapses) for path in names}
     tables["connections"] = [line for chain in nets.chains if (line := _connection(chain, nets, names)) is not None]
-    loaded.doubts = package.lapses.lines()
+    loaded.warnings = package.lapses.lines()
     return loaded
 
 
@@ -129,7 +129,7 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: La
     extras = {key: value for key, value in element.extras.items() if key != READS_BALISES}
     made = extras.pop(DIGEST, None)
     if made is not None and made != digest(element.fmu):
-        lapses.tell(
+        lapses.note(
             element.node, f"{element.member} is not the FMU that the annotation speaks of; it is used as it is."
         )
         extras = {key: value for key, value in extras.items() if key not in ORIGIN}

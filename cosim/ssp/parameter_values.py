@@ -15,7 +15,7 @@ def read_parameter_set(root: Node, prefix: str, lapses: Lapses) -> tuple[Paramet
     """The parameters of a valid ParameterSet.
 
     Args:
-        root: its element. prefix: put before every name. lapses: told of units that are not defined.
+        root: its element. prefix: put before every name. lapses: receives units that are not defined.
 
     Raises:
         ScenarioError: a name is given twice, or the number of values is not that of the dimensions.

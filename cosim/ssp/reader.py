@@ -1,7 +1,7 @@
 """The balise reader of an exported system: it tells the observers of balises where no master does.
 
 Other tools know nothing of balises. The FMU `balise_reader`, wired to the watched plant and to every observer that is
-told by counts, finds them from position and speed. Read back, the package's own master takes its place.
+notified by counts, finds them from position and speed. Read back, the package's own master takes its place.
 """
 
 from __future__ import annotations
@@ -43,25 +43,25 @@ class Reader:
 def make_reader(
     table: BalisesTable, layout: TrackLayout, interfaces: Mapping[str, Interface], taken: set[str], version: int
 ) -> Reader | None:
-    """The reader that a system needs, or None where it has no observer that is told by counts.
+    """The reader that a system needs, or None where it has no observer that is notified by counts.
 
     Args:
         table: of the balises. layout: where they lie. interfaces: of all components.
         taken: inputs that have a source, as ``component.input``. version: of FMI.
     """
-    told = [
+    listeners = [
         n
         for n, interface in interfaces.items()
         if is_told_by_counts(interface) and (table.receivers is None or n in table.receivers)
     ]
-    told = [n for n in told if not {f"{n}.{BALISE_EVENT}_{field}" for field in TOLD} & taken]
-    if not told or table.position is None or table.speed is None:
+    listeners = [n for n in listeners if not {f"{n}.{BALISE_EVENT}_{field}" for field in TOLD} & taken]
+    if not listeners or table.position is None or table.speed is None:
         return None
     name = NAME
     while name in interfaces:
         name += "_"
     links = [f"{table.position} -> {name}.position", f"{table.speed} -> {name}.speed"]
-    links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in told for field in TOLD]
+    links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in listeners for field in TOLD]
     options, parameters = _track(table, [float(position) for position in layout.positions])
     component: dict[str, Any] = {"model": "balise_reader", "as": f"fmu{version}", "options": options}
     component["parameters"] = {"input_instant": _PARALLEL, **parameters}

@@ -24,13 +24,13 @@ def read_step(root: Node, lapses: Lapses) -> float | None:
     """The communication step that an annotation of a structure asks for [s]; None where none does.
 
     Args:
-        root: the structure. lapses: told of what is asked for and cannot be done.
+        root: the structure. lapses: receives what is asked for and cannot be done.
     """
     for node in _annotated(root):
         name = short(node.tag)
         length = next((node.get(key) for key in LENGTHS if node.get(key) is not None), "")
         if name in VARIABLE:
-            lapses.tell(
+            lapses.note(
                 node, f"the annotation asks for {name}, which is not carried out; the communication step is fixed."
             )
         elif name in FIXED:
@@ -40,7 +40,7 @@ def read_step(root: Node, lapses: Lapses) -> float | None:
                 step = 0.0
             if 0.0 < step < float("inf"):
                 return step
-            lapses.tell(node, f"the annotation's {name} has the step {length!r}, expected seconds; it is not used.")
+            lapses.note(node, f"the annotation's {name} has the step {length!r}, expected seconds; it is not used.")
     return None
 
 

@@ -78,7 +78,7 @@ def _seen(quantity: Quantity, look: Look, taken: Sequence[str] = (), part: str =
 
 
 def is_observer(look: Look) -> bool:
-    """Whether the FMU is told of balises, as observers are.
+    """Whether the FMU is notified of balises, as observers are.
 
     Args:
         look: what the FMU says of itself.

@@ -30,7 +30,7 @@ class Starter:
     Args:
         text: of the file.
         kind: ``train``, ``observer`` or ``alone``.
-        remarks: what the user should be told, a line each.
+        remarks: what the user should know, a line each.
     """
 
     text: str
@@ -48,7 +48,7 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
             observer.
 
     Returns:
-        The text of the file, and what the user should be told.
+        The text of the file, and what the user should know.
 
     Raises:
         FmuLoadError: the FMU cannot be read, or offers no co-simulation.
@@ -85,7 +85,7 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
         force: replace a file that exists.
 
     Returns:
-        The text of the file, and what the user should be told.
+        The text of the file, and what the user should know.
 
     Raises:
         OutputError: the file exists, or cannot be written.

@@ -95,11 +95,11 @@ class Link:
 
 @dataclass(frozen=True)
 class Balises:
-    """Who finds the balises, and who is told.
+    """Who finds the balises, and who is notified.
 
     Args:
         plant: the watched component. position, speed: its outputs, empty where telegrams are recorded.
-        receivers: components that are told.
+        receivers: components that are notified.
         method: as asked for; ``auto`` is decided by a probe of the plant when the run is set up. timing: ``exact`` or
             ``stale``.
         odometer: output whose reading the telegrams carry, or None.
@@ -120,8 +120,8 @@ class Packets:
 
     Args:
         nodes: signals by node. protocol: which node sends. period: between two transmissions [s].
-        delay: kind of delay. told: components that are told by events, with their event. held: components whose inputs
-            hold what came last.
+        delay: kind of delay. told: components that are notified by events, with their event. held: components whose
+            inputs hold what came last.
     """
 
     nodes: Mapping[str, tuple[str, ...]]

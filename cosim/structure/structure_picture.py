@@ -129,7 +129,7 @@ def structure_figure(structure: StructureData) -> Figure:
 
 
 def wires_of(structure: StructureData) -> list[Edge]:
-    """The wires to draw: connections by kind, and telegrams from the watched plant to those who are told.
+    """The wires to draw: connections by kind, and telegrams from the watched plant to those who are notified.
 
     Args:
         structure: of the run.

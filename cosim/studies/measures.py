@@ -114,7 +114,7 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
     measures: dict[str, float] = {}
     for found in fault_detection(outcome.result, outcome.spec):
         sizes = np.abs(found.position_errors)
-        told = {
+        counts = {
             "faults": found.faults,
             "missed_faults": found.missed,
             "detections": found.detections,
@@ -128,7 +128,7 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
             "false_alarms_per_hour": found.false_per_hour,
         }
         largest = float(sizes.max()) if sizes.size else nan
-        numbers = (told if found.tells else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}
+        numbers = (counts if found.indicates else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}
         failed = outcome.failure is not None
         measures |= {f"{found.observer}.{name}": nan if failed else float(v) for name, v in numbers.items()}
     return measures

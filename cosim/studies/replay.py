@@ -112,10 +112,12 @@ class Replay:
         """Values of all parameters in the run, by scalar name."""
         signals, known = self.system.parameter_signals, scalar_names(self.system.parameter_signals)
         values = dict(zip(known, map(float, self.system.start_parameters(self._component.preset)), strict=True))
-        told = {signal.name: signal.scalar_names for signal in signals} | {name: [name] for name in known}
+        elements = {signal.name: signal.scalar_names for signal in signals} | {name: [name] for name in known}
         for name, given in self._given.items():
-            if name in told:
-                values |= zip(told[name], np.broadcast_to(np.asarray(given, float), len(told[name])), strict=True)
+            if name in elements:
+                values |= zip(
+                    elements[name], np.broadcast_to(np.asarray(given, float), len(elements[name])), strict=True
+                )
         return values
 
     # -- internals --------------------------------------------------------------------------------------------------

@@ -119,7 +119,7 @@ class SeedStudy:
 def seed_study(
     scenario: Scenario,
     seeds: Iterable[int],
-    tell: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
     done: Callable[[SeedRow], None] | None = None,
 ) -> SeedStudy:
     """Run a scenario once for each seed. One that fails is kept as a failure and does not stop the others.
@@ -127,7 +127,7 @@ def seed_study(
     Args:
         scenario: that leaves something to chance.
         seeds: seeds to run.
-        tell: called with the number done and the number in all.
+        progress: called with the number done and the number in all.
         done: called with the row of each seed as soon as it is there.
 
     Returns:
@@ -141,7 +141,7 @@ def seed_study(
     rows: list[SeedRow] = []
     sweep = scenario.copy().set("certificates", "ignore").vary({"seed": chosen})
     # what is doubtful is said once, by the scenario's own run, and not for every seed
-    for run in sweep.each(progress=tell):
+    for run in sweep.each(progress=progress):
         spec = spec or (None if run.outcome is None else run.outcome.spec)
         rows.append(SeedRow(chosen[run.number], _errors(run.outcome), run.failure))
         if done is not None:

@@ -83,11 +83,11 @@ class Sweep:
         numbers = [number for number in range(len(self)) if number not in without]
         jobs = [_Job(self.scenario, self.variations[number]) for number in numbers]
         one_by_one = ((place, attempt(_run, job)) for place, job in enumerate(jobs))
-        answers = one_by_one if workers == 1 else in_processes(_run, jobs, workers)
-        for done, (place, answer) in enumerate(answers, start=len(self) - len(jobs) + 1):
+        results = one_by_one if workers == 1 else in_processes(_run, jobs, workers)
+        for done, (place, found) in enumerate(results, start=len(self) - len(jobs) + 1):
             if progress is not None:
                 progress(done, len(self))
-            run = _entry(numbers[place], self.variations[numbers[place]], answer)
+            run = _entry(numbers[place], self.variations[numbers[place]], found)
             yield run
             if run.failure == INTERRUPTED:  # who interrupts a run of a sweep means the sweep
                 raise KeyboardInterrupt
@@ -214,10 +214,10 @@ def _run(job: _Job) -> Outcome | str:
 def _silent(_text: str) -> None: ...
 
 
-def _entry(number: int, settings: Variation, answer: Any) -> SweepRun:
-    if isinstance(answer, Outcome):
-        return SweepRun(number, settings, answer, answer.failure)
-    reason = answer.reason if isinstance(answer, Died | Raised) else str(answer)
+def _entry(number: int, settings: Variation, found: Any) -> SweepRun:
+    if isinstance(found, Outcome):
+        return SweepRun(number, settings, found, found.failure)
+    reason = found.reason if isinstance(found, Died | Raised) else str(found)
     return SweepRun(number, settings, None, reason)
 
 

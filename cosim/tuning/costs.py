@@ -83,8 +83,8 @@ class StateCost(Cost):
         result = outcome.result
         errors = [_of(result, estimate) - _of(result, true) for estimate, true in self.pairs]
         if not errors:
-            told = (estimation_error(result, outcome.spec, self.observer, q) for q in ("speed", "position"))
-            errors = [error for error in told if error is not None][:1]
+            found = (estimation_error(result, outcome.spec, self.observer, q) for q in ("speed", "position"))
+            errors = [error for error in found if error is not None][:1]
         if not errors:
             raise ScenarioError(
                 f"The report of the scenario names no true speed or position that {self.observer} estimates; name "
@@ -145,7 +145,7 @@ class NisCost(Cost):
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """The normalised innovation squared, and its degrees of freedom where they are told."""
+        """The normalised innovation squared, and its degrees of freedom where they are outputs."""
         return (*self.seen, *(() if self.measurements else (f"{self.observer}.nis_degrees",)))
 
     @property
@@ -156,8 +156,8 @@ class NisCost(Cost):
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""
         rows = _evaluated(outcome)
-        nis, *told = (float(np.mean(_of(outcome.result, name)[rows])) for name in self.signals)
-        expected = told[0] if told else float(self.measurements or 1)
+        nis, *degrees = (float(np.mean(_of(outcome.result, name)[rows])) for name in self.signals)
+        expected = degrees[0] if degrees else float(self.measurements or 1)
         return log(nis / expected) ** 2 if nis > 0.0 < expected and isfinite(nis) else inf
 
 

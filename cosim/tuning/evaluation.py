@@ -65,14 +65,14 @@ class Evaluator:
     """Evaluates candidates.
 
     Args:
-        benches: the scenario with each seed. tunable: what is tuned. cost: of a run. directory: of recordings and
+        by_seed: the scenario with each seed. tunable: what is tuned. cost: of a run. directory: of recordings and
             journal. workers: processes at a time, 1 for this one. resume: whether the journal of an earlier search is
             taken over.
     """
 
     def __init__(
         self,
-        benches: Mapping[int, Seeded],
+        by_seed: Mapping[int, Seeded],
         tunable: Tunable,
         cost: Cost,
         directory: Path,
@@ -80,7 +80,7 @@ class Evaluator:
         workers: int = 1,
         resume: bool = False,
     ) -> None:
-        self.benches, self.tunable, self.cost, self.directory = benches, tunable, cost, directory
+        self.by_seed, self.tunable, self.cost, self.directory = by_seed, tunable, cost, directory
         self.runs = 0
         self.failures: dict[str, int] = {}
         self._team = Team(_do, workers) if workers > 1 else None
@@ -99,23 +99,23 @@ class Evaluator:
         """Record the plant side with these seeds, as far as it has not been.
 
         Args:
-            seeds: of the benches. progress: called with the number done and the number in all.
+            seeds: of those prepared. progress: called with the number done and the number in all.
 
         Raises:
             RunError: a recording failed.
         """
         new = [seed for seed in seeds if seed not in self._bases]
         folders = {seed: self.directory / "recordings" / f"seed_{seed}" for seed in new}
-        wanted = {seed: self.benches[seed].recording() for seed in new}
+        wanted = {seed: self.by_seed[seed].recording() for seed in new}
         jobs = [(s, _Job(scenario, {}, folder=folders[s])) for s, scenario in wanted.items() if scenario is not None]
         for done, (place, answer) in enumerate(self._answers([job for _, job in jobs]), start=1):
             if answer.failure is not None:
                 raise RunError(f"The plant side with seed {jobs[place][0]} could not be recorded: {answer.failure}")
             if progress is not None:
                 progress(done, len(jobs))
-        self._bases |= {seed: self.benches[seed].base(folders[seed], self.cost) for seed in new}
+        self._bases |= {seed: self.by_seed[seed].base(folders[seed], self.cost) for seed in new}
         for seed in new:
-            if self.benches[seed].candidate is not None and (self.replayed or not self._replays):
+            if self.by_seed[seed].candidate is not None and (self.replayed or not self._replays):
                 found = self._make_replays(seed)
                 self.replayed = found is not None
                 if found is not None:
@@ -131,7 +131,7 @@ class Evaluator:
         """Costs of candidates with each seed, shape (m, seeds); infinite where a run failed.
 
         Args:
-            candidates: values by name; None for the scenario as it is. seeds: of the benches.
+            candidates: values by name; None for the scenario as it is. seeds: of those prepared.
             label: what the journal says of them besides.
             step: called after each run.
 
@@ -181,7 +181,7 @@ class Evaluator:
         """What the observer estimates with each candidate.
 
         Args:
-            candidates: values by name. seed: of a bench. observed: component whose outputs are compared.
+            candidates: values by name. seed: of those prepared. observed: component whose outputs are compared.
         """
         self.prepare([seed])
         jobs = [self._job(candidate, seed, observed) for candidate in candidates]
@@ -192,7 +192,7 @@ class Evaluator:
         """The observer beside the recordings of these seeds; none where candidates are not replayed.
 
         Args:
-            seeds: of the benches.
+            seeds: of those prepared.
         """
         self.prepare(seeds)
         return [self._replays[seed] for seed in seeds] if self.replayed else []
@@ -207,7 +207,7 @@ class Evaluator:
         return _Job(self._bases[seed], settings, self.cost, observed=observed, seed=seed)
 
     def _make_replays(self, seed: int) -> Replays | None:
-        candidate = self.benches[seed].candidate
+        candidate = self.by_seed[seed].candidate
         names = list(self.tunable.settings(self.tunable.start))
         return None if candidate is None else make_replays(self._bases[seed], candidate.name, self.cost, names)
 
@@ -236,8 +236,8 @@ class Evaluator:
 
     def _key(self, seed: int, candidate: Mapping[str, Any] | None) -> str:
         if seed not in self._keys:
-            played = "recorded" if self.benches[seed].sides is not None else "whole"
-            self._keys[seed] = f"{scenario_key(self.benches[seed].whole)} {played} {self.cost.text} {self.cost.signals}"
+            played = "recorded" if self.by_seed[seed].parts is not None else "whole"
+            self._keys[seed] = f"{scenario_key(self.by_seed[seed].whole)} {played} {self.cost.text} {self.cost.signals}"
         said = None if candidate is None else self.tunable.settings(candidate)
         return hashlib.sha256(f"{self._keys[seed]} {json.dumps(said, sort_keys=True)}".encode()).hexdigest()
 

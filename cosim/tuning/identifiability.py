@@ -45,9 +45,11 @@ class Directions:
 
     def warnings(self) -> list[str]:
         """What the user should know, in words."""
-        told = [f"{name} changes nothing in the estimates of this run: it cannot be tuned by it." for name in self.idle]
+        texts = [
+            f"{name} changes nothing in the estimates of this run: it cannot be tuned by it." for name in self.idle
+        ]
         if self.scale_invariant:
-            told.append(
+            texts.append(
                 "A common factor of all covariances changes next to nothing "
                 f"({self.scale:.2g} of the strongest direction): only their ratios can be tuned."
             )
@@ -55,8 +57,8 @@ class Directions:
             parts = [(n, w) for n, w in zip(self.names, direction, strict=True) if abs(w) > 0.2 and n not in self.idle]
             if value < WEAK and len(parts) > 1 and not (self.scale_invariant and _all_alike(parts)):
                 text = ", ".join(f"{name} {weight:+.2f}" for name, weight in parts)
-                told.append(f"Hardly visible together ({value:.2g} of the strongest direction): {text}.")
-        return told
+                texts.append(f"Hardly visible together ({value:.2g} of the strongest direction): {text}.")
+        return texts
 
 
 def neighbours(space: SearchSpace, values: Mapping[str, float]) -> list[dict[str, float]]:

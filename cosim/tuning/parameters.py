@@ -165,8 +165,8 @@ def _present(scenario: Scenario, name: str, given: str) -> Any:
     component = describe_component(
         head, table.components[head], scenario.folder, f"{scenario.where}: components.{head}"
     )
-    told = table.components[head].parameters.get(variable)
-    return _told(component, variable, told, given)
+    set_value = table.components[head].parameters.get(variable)
+    return _start_of(component, variable, set_value, given)
 
 
 def _of_table(scenario: Scenario, head: str, rest: str, given: str) -> float:
@@ -178,7 +178,7 @@ def _of_table(scenario: Scenario, head: str, rest: str, given: str) -> float:
     return float(value)
 
 
-def _told(component: DescribedComponent, variable: str, told: Any, given: str) -> Any:
+def _start_of(component: DescribedComponent, variable: str, set_value: Any, given: str) -> Any:
     elements = [n for n in component.variables if n.startswith(f"{variable}[")]
     if variable not in component.variables and not elements:
         settable = [v.name for v in component.variables.values() if v.causality in ("parameter", "input")]
@@ -188,15 +188,15 @@ def _told(component: DescribedComponent, variable: str, told: Any, given: str) -
         first = component.settable(elements[0] if elements else variable)
     except CosimError as error:
         raise ScenarioError(f"cannot tune {given!r}: {error}") from error
-    if isinstance(told, list):
-        return [float(v) for v in told]
+    if isinstance(set_value, list):
+        return [float(v) for v in set_value]
     if elements:
         starts = [_number(component.variables[n].start) for n in elements]
-        singles = starts if told is None else [float(told)] * len(elements)
+        singles = starts if set_value is None else [float(set_value)] * len(elements)
         return singles
     if first.shape or first.dimensions:
         return [float(v) for v in str(first.start).split()]
-    return _number(first.start) if told is None else float(told)
+    return _number(first.start) if set_value is None else float(set_value)
 
 
 def _number(start: Any) -> float:

@@ -11,12 +11,12 @@ class Bar:
     """What is to come is known as far as populations have one size.
 
     Args:
-        tell: called with runs done, runs in all as far as known, and what is done; None for nobody.
+        progress: called with runs done, runs in all as far as known, and what is done; None for nobody.
     """
 
-    def __init__(self, tell: Progress | None) -> None:
+    def __init__(self, progress: Progress | None) -> None:
         self.text = ""
-        self._tell, self._done, self._total = tell, 0, 0
+        self._progress, self._done, self._total = progress, 0, 0
 
     def expect(self, now: int, later: int) -> None:
         """Before a population.
@@ -29,5 +29,5 @@ class Bar:
     def step(self) -> None:
         """A run is done."""
         self._done += 1
-        if self._tell is not None:
-            self._tell(self._done, max(self._total, self._done), self.text)
+        if self._progress is not None:
+            self._progress(self._done, max(self._total, self._done), self.text)

@@ -10,7 +10,13 @@ from pathlib import Path
 
 from cosim.errors import ScenarioError
 from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
-from cosim.observer_benchmark.playback import Sides, connection, find_sides, playback_scenario, recording_scenario
+from cosim.observer_benchmark.playback import (
+    ScenarioParts,
+    connection,
+    find_parts,
+    playback_scenario,
+    recording_scenario,
+)
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
 
@@ -20,18 +26,18 @@ class Seeded:
     """The scenario with one seed.
 
     Args:
-        seed: of it. whole: the scenario. sides: plant side and observers; None where whole runs are made.
+        seed: of it. whole: the scenario. parts: plant side and observers; None where whole runs are made.
         candidate: who listens to the recording.
     """
 
     seed: int
     whole: Scenario
-    sides: Sides | None = None
+    parts: ScenarioParts | None = None
     candidate: BenchmarkCandidate | None = None
 
     def recording(self) -> Scenario | None:
         """What is to be recorded before candidates can be run; None where whole runs are made."""
-        return None if self.sides is None else recording_scenario(self.whole, self.sides)
+        return None if self.parts is None else recording_scenario(self.whole, self.parts)
 
     def base(self, folder: Path, cost: Cost) -> Scenario:
         """What is run with each candidate.
@@ -39,13 +45,13 @@ class Seeded:
         Args:
             folder: with the recording. cost: whose signals must be there.
         """
-        if self.sides is None or self.candidate is None:
+        if self.parts is None or self.candidate is None:
             return self.whole
         name = self.candidate.name
-        played = playback_scenario(self.whole, self.sides, folder, name, self.candidate.table, self.candidate.sources)
+        played = playback_scenario(self.whole, self.parts, folder, name, self.candidate.table, self.candidate.sources)
         there = played.table().components
         for other in dict.fromkeys(signal.partition(".")[0] for signal in cost.signals):
-            if other not in there and other in self.sides.plant:
+            if other not in there and other in self.parts.plant:
                 played.add(other, recording=str(folder.resolve()), component=other)
         return played
 
@@ -60,11 +66,11 @@ def seeded(scenario: Scenario, seed: int, observer: str | None, heads: Sequence[
     """
     if whole or observer is None or set(heads) != {observer}:
         return Seeded(seed, scenario)
-    sides = find_sides(scenario)
-    if observer not in sides.observers or observer in sides.plant:
+    parts = find_parts(scenario)
+    if observer not in parts.observers or observer in parts.plant:
         return Seeded(seed, scenario)
-    (candidate,), _ = find_candidates(scenario, sides, [observer])
-    return Seeded(seed, scenario, sides, candidate)
+    (candidate,), _ = find_candidates(scenario, parts, [observer])
+    return Seeded(seed, scenario, parts, candidate)
 
 
 def with_observer(scenario: Scenario, name: str) -> tuple[Scenario, str]:
@@ -81,8 +87,8 @@ def with_observer(scenario: Scenario, name: str) -> tuple[Scenario, str]:
     """
     changed = scenario.copy()
     if name not in changed.table().components:
-        sides = find_sides(changed)
-        (candidate,), _ = find_candidates(changed, sides, [name])
+        parts = find_parts(changed)
+        (candidate,), _ = find_candidates(changed, parts, [name])
         if candidate.misfit:
             raise ScenarioError(f"{name} cannot be coupled: {candidate.misfit}")
         changed.add(candidate.name, **candidate.table.model_dump(by_alias=True, exclude_unset=True))
@@ -101,7 +107,7 @@ def why_whole(scenario: Scenario, observer: str | None, heads: Sequence[str]) ->
     others = [head for head in heads if head != observer]
     if observer is None or others:
         return f"{', '.join(dict.fromkeys(others or heads))} is tuned, which is no observer that only listens"
-    sides = find_sides(scenario)
-    if observer not in sides.observers:
+    parts = find_parts(scenario)
+    if observer not in parts.observers:
         return f"{observer} is no observer that the report names, or that estimates position or speed"
     return f"something listens to {observer}"

@@ -71,13 +71,13 @@ def _accumulated(found: Replays, asked: Tunable) -> AccumulatedOutput:
         names.append((f"{entry.whole}[{entry.place + 1}]" if entry else name).removeprefix(before))
     try:
         made = AccumulatedOutput(replay.system, _samples(replay, values), names, parameters=values)
-        told, slopes = made([values[name] for name in names])
+        traced, slopes = made([values[name] for name in names])
     except (ValueError, KeyError) as error:  # of what cannot be traced, too
         raise NoSlopesError(f"{replay.system.name} cannot be differentiated ({error})") from error
     run = next(found.outcomes([asked.settings(asked.start)]))
     expected = float(run[f"{before}{LIKELIHOOD}"][-1]) if not isinstance(run, str) else np.nan
-    if not (abs(told - expected) <= SAME * max(abs(expected), 1.0) and np.isfinite(slopes).all()):
-        raise NoSlopesError(f"the traced likelihood at the start is {told:.9g}, that of the run {expected:.9g}")
+    if not (abs(traced - expected) <= SAME * max(abs(expected), 1.0) and np.isfinite(slopes).all()):
+        raise NoSlopesError(f"the traced likelihood at the start is {traced:.9g}, that of the run {expected:.9g}")
     return made
 
 

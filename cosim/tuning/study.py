@@ -208,10 +208,10 @@ class Study:
         return fixed, why
 
     def _warnings(self, shown: Directions | None, at_best: Directions | None) -> list[str]:
-        told = [*self.asked.notes, *([] if shown is None else shown.warnings())]
+        texts = [*self.asked.notes, *([] if shown is None else shown.warnings())]
         later = [] if at_best is None else at_best.warnings()
-        told += [f"At the best candidate: {text}" for text in later if text not in told]
-        return told + [f"{count} runs failed: {reason}" for reason, count in self.evaluator.failures.items()]
+        texts += [f"At the best candidate: {text}" for text in later if text not in texts]
+        return texts + [f"{count} runs failed: {reason}" for reason, count in self.evaluator.failures.items()]
 
 
 def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, str]) -> list[str]:
@@ -220,17 +220,17 @@ def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, 
     Args:
         space: names and bounds. best: values found, by name. held: parameters that were not searched.
     """
-    told = []
+    texts = []
     point = space.coordinates([best[name] for name in space.names])
     for p, value, low, high in zip(space.parameters, point, space.lower, space.upper, strict=True):
         near = _NEAR_BOUND * (high - low)
         if p.name not in held and (value - low <= near or high - value <= near):
             end = "lower" if value - low <= near else "upper"
-            told.append(
+            texts.append(
                 f"{p.name} ends at its {end} bound, {p.low if end == 'lower' else p.high:g}: the best value may lie "
                 "beyond. Widen the bounds, where that makes sense."
             )
-    return told
+    return texts
 
 
 def _make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[str, Any]) -> Optimiser:

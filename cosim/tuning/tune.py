@@ -73,8 +73,8 @@ def tune(
     asked, (training, judging) = tunable(scenario, observer, parameters), _seeds(seeds, judge)
     judged_by = make_cost(cost, observer, _outputs(scenario, observer))
     with _folder(directory, resume) as folder:
-        benches, how = _benches(scenario, observer, asked, (*training, *judging), whole_runs)
-        evaluator = Evaluator(benches, asked, judged_by, folder, workers=workers, resume=resume)
+        by_seed, how = _by_seed(scenario, observer, asked, (*training, *judging), whole_runs)
+        evaluator = Evaluator(by_seed, asked, judged_by, folder, workers=workers, resume=resume)
         more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": progress}
         with closing(evaluator):
             study = Study(scenario, asked, evaluator, training, judging, observer=observer, method=method, **more)
@@ -84,7 +84,7 @@ def tune(
         return found
 
 
-def _benches(
+def _by_seed(
     scenario: Scenario,
     observer: str | None,
     asked: Tunable,
@@ -99,7 +99,7 @@ def _benches(
             "give one training seed only."
         )
     found = {seed: seeded(with_seed(scenario, seed), seed, observer, heads, whole_runs) for seed in seeds}
-    if found[seeds[0]].sides is not None:
+    if found[seeds[0]].parts is not None:
         return found, "each beside the recorded plant side of its seed"
     return found, f"of the whole scenario: {'as asked for' if whole_runs else why_whole(scenario, observer, heads)}"
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fmus.check.runner import WARM_UP_STEPS, Bench, elsewhere
+from fmus.check.runner import WARM_UP_STEPS, Runner, elsewhere
 
 STEP_TOLERANCE = 0.01
 """A divided step may differ from a whole one by this share of the change: far above any integration error, far below a
@@ -36,66 +36,66 @@ RESOLUTION = 1e-9
 _DIVISIONS = ((0.5, 0.5), (UNEVEN, 1.0 - UNEVEN))
 
 
-def repeatable(bench: Bench) -> str:
-    """After a reset the same steps must give the identical outputs. From here on the bench resets where that works."""
-    pattern = (bench.h,) * (2 * WARM_UP_STEPS)
-    bench.begin()
-    first = bench.steps(pattern)
-    bench.reset_works = True
-    bench.begin()
-    problem = difference(bench, first, bench.steps(pattern))
-    bench.reset_works = not problem
+def repeatable(runner: Runner) -> str:
+    """After a reset the same steps must give the identical outputs. From here on the runner resets where that works."""
+    pattern = (runner.h,) * (2 * WARM_UP_STEPS)
+    runner.begin()
+    first = runner.steps(pattern)
+    runner.reset_works = True
+    runner.begin()
+    problem = difference(runner, first, runner.steps(pattern))
+    runner.reset_works = not problem
     return problem and f"after a reset {problem}"
 
 
-def divided_steps(bench: Bench, scale: float = 1.0) -> str:
+def divided_steps(runner: Runner, scale: float = 1.0) -> str:
     """A whole step against the same step in two parts, even and uneven.
 
     Args:
-        bench: the instance.
-        scale: the whole step, in communication steps of the bench.
+        runner: the instance.
+        scale: the whole step, in communication steps of the runner.
     """
-    h = scale * bench.h
-    start, whole, *all_divided = ends_of_divided_steps(bench, h)
+    h = scale * runner.h
+    start, whole, *all_divided = ends_of_divided_steps(runner, h)
     change = np.abs(whole - start)
     moving = change > RESOLUTION * np.abs(whole)
     for parts, divided in zip(_DIVISIONS, all_divided, strict=True):
         same = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
         if not _enough(same, moving):
             shares = " and ".join(f"{part:g}" for part in parts)
-            found = worst(bench, whole, divided)
+            found = worst(runner, whole, divided)
             return f"the outputs differ: a step of {h:g} s and one in parts of {shares} of it end apart, {found}"
     return ""
 
 
-def ends_of_divided_steps(bench: Bench, h: float) -> list[np.ndarray]:
+def ends_of_divided_steps(runner: Runner, h: float) -> list[np.ndarray]:
     """Outputs before a step of `h` [s], after it, and after it in the parts of `_DIVISIONS`, each of shape (q,).
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
     """
-    warm_up = (bench.h,) * WARM_UP_STEPS
-    bench.begin()
-    rows = bench.steps((*warm_up, h))[-2:]
+    warm_up = (runner.h,) * WARM_UP_STEPS
+    runner.begin()
+    rows = runner.steps((*warm_up, h))[-2:]
     for parts in _DIVISIONS:
-        bench.begin()
-        rows.append(bench.steps((*warm_up, *(h * part for part in parts)))[-1])
+        runner.begin()
+        rows.append(runner.steps((*warm_up, *(h * part for part in parts)))[-1])
     return rows
 
 
-def short_step(bench: Bench) -> str:
+def short_step(runner: Runner) -> str:
     """The first change after a short step: a tiny step must move the outputs, by about its share of a whole one.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
     """
-    h, warm_up = bench.h, (bench.h,) * WARM_UP_STEPS
-    bench.begin()
-    start, whole = bench.steps((*warm_up, h))[-2:]
+    h, warm_up = runner.h, (runner.h,) * WARM_UP_STEPS
+    runner.begin()
+    start, whole = runner.steps((*warm_up, h))[-2:]
     change = np.abs(whole - start)
-    moving = (change > RESOLUTION * np.abs(whole)) & ~bench.discrete  # a discrete output moves at events only
-    bench.begin()
-    at = np.array(bench.steps((*warm_up, h * UNEVEN, h * MICRO, h * MICRO))[-3:])
+    moving = (change > RESOLUTION * np.abs(whole)) & ~runner.discrete  # a discrete output moves at events only
+    runner.begin()
+    at = np.array(runner.steps((*warm_up, h * UNEVEN, h * MICRO, h * MICRO))[-3:])
     moved = np.abs(np.diff(at, axis=0))
     small = np.all((moved > 0.0) & (moved <= _MICRO_EXCESS * MICRO * change), axis=0)
     if not moving.any() or _enough(small, moving):
@@ -105,68 +105,68 @@ def short_step(bench: Bench) -> str:
     return f"the outputs differ: after a step of {h * UNEVEN:g} s a tiny one of {h * MICRO:g} s is not done, {what}"
 
 
-def honest_step(bench: Bench) -> str:
-    """Steps of any length do what they say: divided ones and tiny ones, at the communication step of the bench."""
-    return divided_steps(bench) or short_step(bench)
+def honest_step(runner: Runner) -> str:
+    """Steps of any length do what they say: divided ones and tiny ones, at the communication step of the runner."""
+    return divided_steps(runner) or short_step(runner)
 
 
-def continuation(bench: Bench) -> tuple[float, ...]:
+def continuation(runner: Runner) -> tuple[float, ...]:
     """The steps [s] by which continuations are compared.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
     """
-    h = bench.h
-    return (h, UNEVEN * h, h, h) if bench.component.can_vary_step else (h, h, h)
+    h = runner.h
+    return (h, UNEVEN * h, h, h) if runner.component.can_vary_step else (h, h, h)
 
 
-def go_elsewhere(bench: Bench, distance: float = 1.0) -> None:
+def go_elsewhere(runner: Runner, distance: float = 1.0) -> None:
     """Some steps under other inputs, `distance` times as large, so that a restored state has something to undo.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
     """
-    bench.set_inputs(distance * elsewhere(bench.amplitude))
-    bench.steps((bench.h,) * WARM_UP_STEPS)
+    runner.set_inputs(distance * elsewhere(runner.amplitude))
+    runner.steps((runner.h,) * WARM_UP_STEPS)
 
 
-def again(bench: Bench, saved_at: float, path: Sequence[float]) -> list[np.ndarray]:
+def again(runner: Runner, saved_at: float, path: Sequence[float]) -> list[np.ndarray]:
     """Steps from a restored state of time `saved_at` [s] under the inputs of before.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
         path: of the FMU.
     """
-    bench.now = saved_at
-    bench.set_inputs(bench.amplitude)
-    return bench.steps(path)
+    runner.now = saved_at
+    runner.set_inputs(runner.amplitude)
+    return runner.steps(path)
 
 
-def difference(bench: Bench, first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> str:
+def difference(runner: Runner, first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> str:
     """Where two runs that must be identical part, in words; nothing where they do not.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
         first: outputs after each step, each of shape (q,).
         second: the same of the other run.
     """
     for number, (a, b) in enumerate(zip(first, second, strict=True), start=1):
         if not np.array_equal(a, b, equal_nan=True):
-            return f"the outputs differ: in step {number} of {len(first)}, {worst(bench, a, b)}"
+            return f"the outputs differ: in step {number} of {len(first)}, {worst(runner, a, b)}"
     return ""
 
 
-def worst(bench: Bench, a: np.ndarray, b: np.ndarray) -> str:
+def worst(runner: Runner, a: np.ndarray, b: np.ndarray) -> str:
     """The output that differs most between two rows, in words.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
         a: outputs, shape (q,).
         b: outputs, shape (q,).
     """
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), np.finfo(float).tiny)
     place = int(np.argmax(np.where(np.isnan(apart), np.inf, apart)))
-    return f"{bench.output_names[place]} {float(a[place])!r} and {float(b[place])!r}"
+    return f"{runner.output_names[place]} {float(a[place])!r} and {float(b[place])!r}"
 
 
 def _enough(good: np.ndarray, moving: np.ndarray) -> bool:

@@ -1,5 +1,5 @@
-"""Context: all that a check function needs: the unpacked FMU, how to run it, and a bench that the checks of one process
-share.
+"""Context: all that a check function needs: the unpacked FMU, how to run it, and a runner that the checks of one
+process share.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from fmpy.model_description import ModelDescription
 
 from fmus.check.checked_slave import FmuSlave, make_slave
 from fmus.check.exchange_model import FmuModel, make_model
-from fmus.check.runner import Bench
+from fmus.check.runner import Runner
 
 SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
@@ -60,24 +60,24 @@ class Context:
         """A fresh model exchange instance, not yet instantiated."""
         return make_model(self.folder, self.description, INSTANCE)
 
-    def quiet_bench(self) -> Bench:
-        """A bench that has not been stepped to find an excitation; the caller puts it away."""
-        return Bench(
+    def quiet_bench(self) -> Runner:
+        """A runner that has not been stepped to find an excitation; the caller puts it away."""
+        return Runner(
             self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step
         )
 
     @cached_property
-    def bench(self) -> Bench:
-        """The shared bench, excited where some input moves the outputs."""
-        bench = self.quiet_bench()
-        bench.excite(SHARE_OF_BUDGET * self.budget)
-        return bench
+    def runner(self) -> Runner:
+        """The shared runner, excited where some input moves the outputs."""
+        runner = self.quiet_bench()
+        runner.excite(SHARE_OF_BUDGET * self.budget)
+        return runner
 
-    def fresh_bench(self) -> Bench:
-        """A bench with an instance of its own, to be spoiled; the caller puts it away."""
+    def fresh_bench(self) -> Runner:
+        """A runner with an instance of its own, to be spoiled; the caller puts it away."""
         if self.only_once:
-            self.bench.park()
-        return self.bench.twin(self.slave)
+            self.runner.park()
+        return self.runner.twin(self.slave)
 
     @property
     def only_once(self) -> bool:
@@ -85,6 +85,6 @@ class Context:
         return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
 
     def close(self) -> None:
-        """Free the shared bench."""
-        if "bench" in self.__dict__:
-            self.bench.put_away()
+        """Free the shared runner."""
+        if "runner" in self.__dict__:
+            self.runner.put_away()

@@ -49,8 +49,8 @@ class _Child:
     """What came of one child process.
 
     Args:
-        findings: what it told. current: the check it was in when it ended, empty where it did all. end: how it ended,
-            in words.
+        findings: what it reported. current: the check it was in when it ended, empty where it did all. end: how it
+            ended, in words.
         crashed: whether it ended by itself or had to be stopped for what it took; not where it was silent.
         left: processes that it left running.
     """

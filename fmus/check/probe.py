@@ -15,7 +15,7 @@ import numpy as np
 from fmus.check.behaviour import ends_of_divided_steps, honest_step, repeatable
 from fmus.check.drift import drift
 from fmus.check.restoring import ROUNDING, Restores, Restoring, largest, restoring
-from fmus.check.runner import Bench
+from fmus.check.runner import Runner
 from fmus.fmi.instance import FAILURES
 from fmus.fmi.slave import Slave
 
@@ -87,29 +87,29 @@ def probe(make: Callable[[], Slave], starts: Mapping[str, Any], start_time: floa
         component.free()
         remark = "not probed: the FMU allows one instance per process only"
         return ProbeReport(component.name, **declares, **nothing_seen, remarks=(remark,))
-    bench = Bench(make, starts, start_time, h, component)
+    runner = Runner(make, starts, start_time, h, component)
     remarks: list[str] = []
     try:
-        seen = _seen(bench, declares, remarks)
+        seen = _seen(runner, declares, remarks)
     except FAILURES as error:
         seen = nothing_seen
         remarks.append(f"the probe came to an end: {error}")
     finally:
-        bench.put_away()
+        runner.put_away()
     return ProbeReport(component.name, **declares, **seen, remarks=tuple(remarks))
 
 
-def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dict[str, Any]:
+def _seen(runner: Runner, declares: Mapping[str, bool], remarks: list[str]) -> dict[str, Any]:
     """Find an excitation, then check what is declared. Resets come first: the other checks rely on them where they
     work.
     """
-    excited = bench.excite()
+    excited = runner.excite()
     if not excited:
         remarks.append("no input made the outputs move; findings are weak")
-    repeats = _attempt(bench, "reset and re-run", repeatable, remarks)
-    honest = declares["declares_variable_step"] and _attempt(bench, "steps of other lengths", honest_step, remarks)
-    found = _restoring(bench, remarks) if declares["declares_state"] else None
-    spread = _spread(bench, found) if honest else {}
+    repeats = _attempt(runner, "reset and re-run", repeatable, remarks)
+    honest = declares["declares_variable_step"] and _attempt(runner, "steps of other lengths", honest_step, remarks)
+    found = _restoring(runner, remarks) if declares["declares_state"] else None
+    spread = _spread(runner, found) if honest else {}
     return {
         "honest_step": honest,
         "repeatable": repeats,
@@ -117,48 +117,48 @@ def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dic
         "restores": found.restores if found else "no",
         "restore_mismatch": found.mismatch if found else None,
         "spread": spread,
-        "drift": _drift(bench) if any(spread.values()) else {},
+        "drift": _drift(runner) if any(spread.values()) else {},
     }
 
 
-def _restoring(bench: Bench, remarks: list[str]) -> Restoring | None:
+def _restoring(runner: Runner, remarks: list[str]) -> Restoring | None:
     """What a restored state is worth; None where none could be had."""
     found: list[Restoring] = []
 
-    def problem(bench: Bench) -> str:
-        found.append(restoring(bench))
+    def problem(runner: Runner) -> str:
+        found.append(restoring(runner))
         within = " (within the tolerance of its solver)" if found[0].restores == "within_tolerance" else ""
         return found[0].problem + within
 
-    _attempt(bench, "saving and restoring", problem, remarks)
+    _attempt(runner, "saving and restoring", problem, remarks)
     return found[0] if found else None
 
 
-def _spread(bench: Bench, found: Restoring | None) -> dict[str, float]:
+def _spread(runner: Runner, found: Restoring | None) -> dict[str, float]:
     """By output: what the solver's own steps make of it, seen after restoring and between a step and its parts."""
     try:
-        _, whole, *divided = ends_of_divided_steps(bench, bench.h)
+        _, whole, *divided = ends_of_divided_steps(runner, runner.h)
     except FAILURES:
         return {}
     apart = largest(whole, np.array(divided)) + (found.apart if found and found.restores == "within_tolerance" else 0.0)
     apart = np.where(apart <= ROUNDING * np.maximum(np.abs(whole), 1.0), 0.0, apart)
-    return dict(zip(bench.output_names, apart.tolist(), strict=True))
+    return dict(zip(runner.output_names, apart.tolist(), strict=True))
 
 
-def _drift(bench: Bench) -> dict[str, float]:
+def _drift(runner: Runner) -> dict[str, float]:
     """By output: what the solver's own errors add up to; empty where the FMU cannot be asked."""
     try:
-        return dict(zip(bench.output_names, drift(bench).tolist(), strict=True))
+        return dict(zip(runner.output_names, drift(runner).tolist(), strict=True))
     except FAILURES:
         return {}
 
 
-def _attempt(bench: Bench, what: str, check: Callable[[Bench], str], remarks: list[str]) -> bool:
+def _attempt(runner: Runner, what: str, check: Callable[[Runner], str], remarks: list[str]) -> bool:
     try:
-        problem = check(bench)
+        problem = check(runner)
     except FAILURES as error:
         problem = str(error)
-        bench.reset_works = False  # whatever failed, go on with a fresh instance
+        runner.reset_works = False  # whatever failed, go on with a fresh instance
     if problem:
         remarks.append(f"{what}: {problem}")
     return not problem

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fmus.check.behaviour import again, continuation, difference, go_elsewhere
-from fmus.check.runner import WARM_UP_STEPS, Bench
+from fmus.check.runner import WARM_UP_STEPS, Runner
 from fmus.fmi.instance import FAILURES
 
 Restores = Literal["exact", "within_tolerance", "no"]
@@ -55,7 +55,7 @@ class Restoring:
     problem: str = ""
 
 
-def restoring(bench: Bench) -> Restoring:
+def restoring(runner: Runner) -> Restoring:
     """Save, go on, go elsewhere under other inputs, restore twice: the same steps must give the same outputs.
 
     Several steps are compared, because a part of the state that was not restored may take time to show, and one of them
@@ -63,41 +63,41 @@ def restoring(bench: Bench) -> Restoring:
     not restored then differs by more, what a solver makes of its restart does not.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
     """
-    path = continuation(bench)
-    bench.begin()
-    bench.steps((bench.h,) * WARM_UP_STEPS)
-    component = bench.component
-    state, saved_at = component.save(), bench.now
+    path = continuation(runner)
+    runner.begin()
+    runner.steps((runner.h,) * WARM_UP_STEPS)
+    component = runner.component
+    state, saved_at = component.save(), runner.now
     try:
-        first = bench.steps(path)
-        trips = [_trip(bench, state, saved_at, path) for _ in range(2)]
-        problem = difference(bench, first, trips[0][0]) or difference(bench, first, trips[1][0])
+        first = runner.steps(path)
+        trips = [_trip(runner, state, saved_at, path) for _ in range(2)]
+        problem = difference(runner, first, trips[0][0]) or difference(runner, first, trips[1][0])
         if not problem:
             return Restoring("exact", 0.0, np.zeros(len(first[0])))
         with suppress(*FAILURES):  # inputs that the FMU cannot stand say nothing of its states
-            trips.append(_trip(bench, state, saved_at, path, FAR))
+            trips.append(_trip(runner, state, saved_at, path, FAR))
     finally:
         component.release(state)
-    return _judged(np.array(first), trips, solver_tolerance(bench), f"after a restored state {problem}")
+    return _judged(np.array(first), trips, solver_tolerance(runner), f"after a restored state {problem}")
 
 
-def _trip(bench: Bench, state: Any, saved_at: float, path: Sequence[float], distance: float = 1.0) -> _Trip:
+def _trip(runner: Runner, state: Any, saved_at: float, path: Sequence[float], distance: float = 1.0) -> _Trip:
     """The outputs after an excursion, shape (q,), and the rows that follow once the state is restored, shape (k, q)."""
-    go_elsewhere(bench, distance)
-    away = bench.outputs()
-    bench.component.restore(state)
-    return again(bench, saved_at, path), away
+    go_elsewhere(runner, distance)
+    away = runner.outputs()
+    runner.component.restore(state)
+    return again(runner, saved_at, path), away
 
 
-def solver_tolerance(bench: Bench) -> float:
+def solver_tolerance(runner: Runner) -> float:
     """Relative tolerance that the solver in the FMU may be thought to have.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
     """
-    return max(bench.component.tolerance or 0.0, USUAL_TOLERANCE)
+    return max(runner.component.tolerance or 0.0, USUAL_TOLERANCE)
 
 
 def _judged(first: np.ndarray, trips: Sequence[_Trip], tolerance: float, problem: str) -> Restoring:
@@ -120,17 +120,17 @@ def _judged(first: np.ndarray, trips: Sequence[_Trip], tolerance: float, problem
     return Restoring(verdict, mismatch, furthest, problem)
 
 
-def near(bench: Bench, first: Sequence[np.ndarray], redone: Sequence[np.ndarray]) -> bool:
+def near(runner: Runner, first: Sequence[np.ndarray], redone: Sequence[np.ndarray]) -> bool:
     """Whether two runs differ by no more than the solver in the FMU may make of it.
 
     Args:
-        bench: the instance under test.
+        runner: the instance under test.
         first: outputs after each step, each of shape (q,).
         redone: the same of the other run.
     """
     rows = np.array(first)
     size = np.max(np.abs(rows), axis=0)
-    slack = SOLVER_FACTOR * solver_tolerance(bench) * size + ROUNDING * np.maximum(size, 1.0)
+    slack = SOLVER_FACTOR * solver_tolerance(runner) * size + ROUNDING * np.maximum(size, 1.0)
     return bool(np.all(largest(rows, np.array([redone])) <= slack))
 
 

@@ -1,4 +1,4 @@
-"""The bench: one instance under test, with inputs that make something happen, moved through patterns of steps."""
+"""The runner: one instance under test, with inputs that make something happen, moved through patterns of steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LOOKED_AT = 200
 """Local variables that are looked at where there is no output."""
 
 
-class Bench:
+class Runner:
     """One probe under way: an instance, its outputs and the inputs that excite it.
 
     Args:
@@ -58,13 +58,13 @@ class Bench:
         """A fresh component, not yet instantiated."""
         return self._make()
 
-    def twin(self, make: Callable[[], Slave] | None = None) -> Bench:
-        """A second bench with an instance of its own and the same inputs.
+    def twin(self, make: Callable[[], Slave] | None = None) -> Runner:
+        """A second runner with an instance of its own and the same inputs.
 
         Args:
             make: makes its component; by default the same way as here.
         """
-        other = Bench(make or self._make, self.starts, self.t0, self.h, until=self.end)
+        other = Runner(make or self._make, self.starts, self.t0, self.h, until=self.end)
         other.amplitude, other.spread, other.excited = self.amplitude, self.spread, self.excited
         return other
 

@@ -1,4 +1,4 @@
-"""The child process: runs the checks of a job and tells each finding as one line of JSON.
+"""The child process: runs the checks of a job and reports each finding as one line of JSON.
 
 Forked by `fmus.check.watchdog`. What the FMU prints goes to the file that the parent opened
 for it; the lines go to what was standard output when the process began.
@@ -31,7 +31,7 @@ _MAX_FILE_BYTES = 256 * 1024**2
 
 
 def main() -> NoReturn:
-    """Read a job from standard input, run it, tell the findings."""
+    """Read a job from standard input, run it, report the findings."""
     lines = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
     os.dup2(2, 1)  # from here on standard output is the file for console output, like standard error
     _limit()
@@ -39,23 +39,23 @@ def main() -> NoReturn:
 
     me = os.getpid()
 
-    def tell(message: dict[str, Any]) -> None:
+    def report(message: dict[str, Any]) -> None:
         if os.getpid() != me:
-            os._exit(0)  # the FMU has forked: a copy of the worker, which must tell nothing
+            os._exit(0)  # the FMU has forked: a copy of the worker, which must report nothing
         lines.write(json.dumps(message) + "\n")
         lines.flush()
 
-    run(job, tell)
+    run(job, report)
     lines.close()
     os._exit(0)  # an FMU may have left threads, or handlers that crash at exit
 
 
-def run(job: Job, tell: Callable[[dict[str, Any]], None]) -> None:
+def run(job: Job, report: Callable[[dict[str, Any]], None]) -> None:
     """Run a job.
 
     Args:
         job: which checks of which FMU.
-        tell: is called with ``{"start": name}`` before each check and with its finding after it.
+        report: is called with ``{"start": name}`` before each check and with its finding after it.
     """
     description = read_description(Path(job.folder))
     context = Context(Path(job.folder), description, job.step, job.start_time, job.starts, job.budget, job.steps)
@@ -63,10 +63,10 @@ def run(job: Job, tell: Callable[[dict[str, Any]], None]) -> None:
         try:
             CHECKS[name] = load_class(place, EXPECTED)
         except UserFileError as error:
-            tell({"finding": Finding(name, Verdict.ERROR, str(error), BY_HAND).to_dict()})
+            report({"finding": Finding(name, Verdict.ERROR, str(error), BY_HAND).to_dict()})
     wanted = [CHECKS[name] for name in job.checks if name in CHECKS]
-    for finding in findings(wanted, context, lambda name: tell({"start": name})):
-        tell({"finding": finding.to_dict()})
+    for finding in findings(wanted, context, lambda name: report({"start": name})):
+        report({"finding": finding.to_dict()})
     context.close()
 
 
@@ -107,14 +107,14 @@ def _outcome(check: type[Check], context: Context) -> CheckOutcome:
         return check.run(context)
     except SlaveError as error:
         outcome = failed(str(error))
-    except Exception as error:  # whatever is wrong here must not be told of the FMU
+    except Exception as error:  # whatever is wrong here must not be blamed on the FMU
         place = extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
         outcome = CheckOutcome(
             Verdict.ERROR, f"an error of this check, not of the FMU; please report it: {said}", BY_HAND
         )
-    if "bench" in context.__dict__:
-        context.bench.reset_works = False  # whatever failed, go on with a fresh instance
+    if "runner" in context.__dict__:
+        context.runner.reset_works = False  # whatever failed, go on with a fresh instance
     return outcome
 
 

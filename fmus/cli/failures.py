@@ -10,7 +10,7 @@ EXPECTED = (ValueError, LookupError, OSError, RuntimeError, TypeError)
 
 
 def in_words(error: BaseException, options: argparse.Namespace) -> str:
-    """What the user is told.
+    """What the user reads.
 
     Args:
         error: one of `EXPECTED`. options: the command line, which says what was being done.

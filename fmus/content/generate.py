@@ -329,7 +329,7 @@ def _event_fields(system: HybridSystem, description: ModelDescription) -> dict[s
 
 
 def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, str]:
-    """How events are told, from the description: the start values of its parameters are those of the library."""
+    """How events are announced, from the description: the start values of its parameters are those of the library."""
     if not system.triggered_events:
         return {"counts_events": "false", "late_policy": "LATE_REJECT", "replay_horizon": "0.0"}
     table, variables = VariableTable.of(system), description.modelVariables

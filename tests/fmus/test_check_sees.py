@@ -19,7 +19,7 @@ from test_fmus.typed import expected, typed_fmu
 from fmus.check import Class, Verdict, check_fmu
 from fmus.check.checked_instance import FmuInstance
 from fmus.check.checked_slave import make_slave
-from fmus.check.runner import END, Bench, end_of_experiment
+from fmus.check.runner import END, Runner, end_of_experiment
 from fmus.fmi.archive import open_archive
 
 pytestmark = pytest.mark.compiler
@@ -28,14 +28,14 @@ OUTPUTS = '<Outputs><Unknown index="2"/><Unknown index="3"/></Outputs>'
 
 
 @contextmanager
-def bench_of(path: Path, starts: Mapping[str, Any] | None = None, until: float | None = None) -> Iterator[Bench]:
+def runner_of(path: Path, starts: Mapping[str, Any] | None = None, until: float | None = None) -> Iterator[Runner]:
     archive = open_archive(path)
     with archive.unpacked() as folder:
-        bench = Bench(lambda: make_slave(folder, archive.description), starts or {}, 0.0, 0.01, until=until)
+        runner = Runner(lambda: make_slave(folder, archive.description), starts or {}, 0.0, 0.01, until=until)
         try:
-            yield bench
+            yield runner
         finally:
-            bench.put_away()
+            runner.put_away()
 
 
 def test_inputs_begin_at_their_start_values_and_stay_in_their_range(tmp_path: Path) -> None:
@@ -45,13 +45,13 @@ def test_inputs_begin_at_their_start_values_and_stay_in_their_range(tmp_path: Pa
     )
     path = build(tmp_path, xml=xml)
     for starts, own in (({}, 5.0), ({"force": 4.5}, 4.5)):
-        with bench_of(path, starts) as bench:
-            bench.begin()
-            assert isinstance(bench.component, FmuInstance)
+        with runner_of(path, starts) as runner:
+            runner.begin()
+            assert isinstance(runner.component, FmuInstance)
             seen = []
             for amplitude in (0.0, 0.5, 1e5):
-                bench.set_inputs(amplitude)
-                seen.append(float(bench.component.read(["force"])[0]))
+                runner.set_inputs(amplitude)
+                seen.append(float(runner.component.read(["force"])[0]))
         assert seen == [own, own + 0.5, 6.0]
 
 
@@ -112,9 +112,9 @@ def test_the_announced_end_is_that_of_the_experiment(tmp_path: Path) -> None:
     """Some tools divide the time up to it: a far end makes their FMUs coarse, or hang."""
     path = build(tmp_path)
     for until, end in ((None, 10.0), (50.0, 50.0)):
-        with bench_of(path, until=until) as bench:
-            assert bench.end == end
-            bench.begin()
+        with runner_of(path, until=until) as runner:
+            assert runner.end == end
+            runner.begin()
     assert end_of_experiment(SimpleNamespace(defaultExperiment=None), 2.0) == 2.0 + END
 
 

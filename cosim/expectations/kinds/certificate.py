@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from cosim.errors import ScenarioError, nearest
-from cosim.evaluation.facts import certified_gap, mapping_entry, number_entry
+from cosim.evaluation.summary_entries import certified_gap, mapping_entry, number_entry
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, NotRecordedError

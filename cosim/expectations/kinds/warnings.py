@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from cosim.evaluation.facts import list_entry
+from cosim.evaluation.summary_entries import list_entry
 from cosim.expectations.expectation import Count, Expectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun

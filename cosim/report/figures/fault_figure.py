@@ -30,10 +30,10 @@ def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
     Returns:
         The axes.
     """
-    told = {o: v for o in spec.observers if (v := estimate(result, o, spec.detection)) is not None}
+    indicated = {o: v for o in spec.observers if (v := estimate(result, o, spec.detection)) is not None}
     true = recorded(result, spec.true_fault)
     rows = [("fault acts", MARK, true)] if true is not None else []
-    rows += [(label(spec, o), observer_line(spec.observers, o)["color"], v) for o, v in told.items()]
+    rows += [(label(spec, o), observer_line(spec.observers, o)["color"], v) for o, v in indicated.items()]
     ax = axes_or_new(ax, (8.2, REST + ROW * len(rows)))
     for place, (_, colour, values) in enumerate(rows):
         bars = [(start, end - start) for start, end in intervals(result.time, values)]

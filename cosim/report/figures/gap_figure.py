@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, envelope, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
-from cosim.evaluation.facts import certified_gap, mapping_entry
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import certified_gap, mapping_entry
 from cosim.report.figures.drawing import legend_above, logarithmic, shade_zones, time_axis
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import bounded

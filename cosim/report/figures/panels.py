@@ -14,7 +14,7 @@ FIGURES: Registry[type[Panel]] = Registry(
 
 
 def panels() -> list[type[Panel]]:
-    """All figures in the order of the report; the log tells of one that cannot be loaded."""
+    """All figures in the order of the report; the log names one that cannot be loaded."""
     return sorted(FIGURES.usable().values(), key=lambda panel: panel.place)
 
 

@@ -19,7 +19,7 @@ from cosim.report.figures.comparison_figure import comparison_picture
 from cosim.report.page.page_files import explained, page_bytes, write_file
 from cosim.report.page.page_table import PageTable, simple_table
 from cosim.report.page.render import render
-from cosim.report.page.run_statements import Fact
+from cosim.report.page.run_statements import Statement
 from cosim.results.summary_file import jsonable
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
@@ -173,12 +173,12 @@ def _cut(lines: list[str], most: int = FINDINGS_SHOWN, rest: str = "and {} more"
     return lines if len(lines) <= most else [*lines[:most], rest.format(len(lines) - most)]
 
 
-def _facts(comparison: Comparison) -> list[Fact]:
+def _facts(comparison: Comparison) -> list[Statement]:
     """The numbers at the head of the page."""
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
     failed = comparison.failed
     used = max(map(_use_of_tolerance, comparison.signals), default=-1.0)
-    cards: list[Fact] = [
+    cards: list[Statement] = [
         (
             "Verdict",
             "equal" if comparison.equal else "different",
@@ -191,8 +191,8 @@ def _facts(comparison: Comparison) -> list[Fact]:
         cards.append(("Tolerance", f"{number(100.0 * used, 2)} %", "used at most", ""))
     for what, events in (("Balise telegrams", comparison.events), ("Packets", comparison.packets)):
         if events.compared and (events.matched or events.differences):
-            told = f"{events.matched} match", f"{len(events.differences)} differences"
-            cards.append((what, *told, _mood(not events.differences)))
+            counts = f"{events.matched} match", f"{len(events.differences)} differences"
+            cards.append((what, *counts, _mood(not events.differences)))
     return cards
 
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
-from cosim.evaluation.facts import number_entry
 from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import number_entry
 from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
@@ -26,7 +26,7 @@ from cosim.report.overlay.overlay_measures import (
 from cosim.report.page.page_files import explained, write_file, write_page
 from cosim.report.page.page_table import PageTable, grouped_table, simple_table
 from cosim.report.page.render import render
-from cosim.report.page.run_statements import Fact
+from cosim.report.page.run_statements import Statement
 from cosim.results.result import Result
 
 PAGE, FIGURES = "overlay.html", "figures"
@@ -133,14 +133,14 @@ def _cut(rows: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
     return rows[:_DIFFERENCES_SHOWN], rows[_DIFFERENCES_SHOWN:]
 
 
-def _facts(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: int) -> list[Fact]:
+def _facts(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: int) -> list[Statement]:
     ended = sum(run.result.failure is None for run in runs)
-    complete: Fact = ("Runs", f"{ended} of {len(runs)} complete", "", "good" if ended == len(runs) else "bad")
-    settings: Fact = ("Settings that differ", str(different), "see below" if different else "none is known", "")
+    complete: Statement = ("Runs", f"{ended} of {len(runs)} complete", "", "good" if ended == len(runs) else "bad")
+    settings: Statement = ("Settings that differ", str(different), "see below" if different else "none is known", "")
     return [complete, settings, *_largest_changes(runs, errors)]
 
 
-def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> list[Fact]:
+def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> list[Statement]:
     """Where the rms speed error rose most and fell most, relative to the first run."""
     changes = []
     for row in errors:
@@ -149,7 +149,7 @@ def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> 
             now = row.values.get(run.label, (None,) * len(ERROR_HEADINGS))[_RMS_SPEED]
             if first and now is not None and isfinite(first):
                 changes.append((now / first - 1, now, f"{row.observer}, {row.phase}, {run.label}"))
-    found: list[Fact] = []
+    found: list[Statement] = []
     for name, mood, worst in (
         ("Largest rise of rms speed error", "doubt", max),
         ("Largest fall of rms speed error", "good", min),

@@ -11,11 +11,11 @@ from typing import Any
 from cosim.evaluation.balise_gaps import ENVELOPE, gap_errors
 from cosim.evaluation.cost import was_compiled
 from cosim.evaluation.event_counts import count_events
-from cosim.evaluation.facts import list_entry, mapping_entry, statement
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.result_warnings import all_warnings
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import list_entry, mapping_entry, statement
 from cosim.expectations.judged import Judged
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import draw_all, panels
@@ -25,7 +25,7 @@ from cosim.report.page.gaps import gaps_table
 from cosim.report.page.page_files import explained, page_bytes, write_file, write_page
 from cosim.report.page.phases import errors_table, phases_table
 from cosim.report.page.render import render
-from cosim.report.page.run_statements import verdict_facts
+from cosim.report.page.run_statements import run_statements
 from cosim.results.result import Result
 
 PAGE, FIGURES = "report.html", "figures"
@@ -100,7 +100,7 @@ def report_page(
         result=result,
         spec=spec,
         description=result.summary.get("description"),
-        facts=verdict_facts(result, spec),
+        facts=run_statements(result, spec),
         statement=statement(result),
         judged=judged,
         expectations=run_tables.expectations_table(sorted(judged, key=lambda j: j.passed)),

@@ -7,31 +7,31 @@ from collections.abc import Mapping
 import numpy as np
 
 from cosim.evaluation.event_counts import count_events
-from cosim.evaluation.facts import list_entry, mapping_entry, number_entry
 from cosim.evaluation.metrics import judged_size
 from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.result_warnings import all_warnings, result_warnings
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.results.result import Result
 
-Fact = tuple[str, str, str, str]
+Statement = tuple[str, str, str, str]
 """Name, value, remark, mood."""
 
 
-def verdict_facts(result: Result, spec: ReportSpec) -> list[Fact]:
+def run_statements(result: Result, spec: ReportSpec) -> list[Statement]:
     """The facts at the head of a report, the most important first.
 
     Args:
         result: the run. spec: roles.
     """
-    facts: list[Fact | None] = [_ending(result, spec), _expectations(result)]
+    facts: list[Statement | None] = [_ending(result, spec), _expectations(result)]
     facts += [_error(result, spec, "speed", "m/s"), _error(result, spec, "position", "m")]
     facts += [_telegrams(result), _certificates(result), _warnings(result, spec)]
     return [fact for fact in facts if fact is not None]
 
 
-def _ending(result: Result, spec: ReportSpec) -> Fact:
+def _ending(result: Result, spec: ReportSpec) -> Statement:
     reached = number(float(result.time[-1])) if len(result.time) else "0"
     if result.failure:
         stop = number_entry(result.summary, "stop")
@@ -41,7 +41,7 @@ def _ending(result: Result, spec: ReportSpec) -> Fact:
     return "Run", "complete", f"to {reached} s", "good"
 
 
-def _expectations(result: Result) -> Fact | None:
+def _expectations(result: Result) -> Statement | None:
     judged = [entry for entry in list_entry(result, "expectations") if isinstance(entry, Mapping)]
     if not judged:
         return None
@@ -49,7 +49,7 @@ def _expectations(result: Result) -> Fact | None:
     return "Expectations", f"{met} of {len(judged)} met", "", "good" if met == len(judged) else "bad"
 
 
-def _error(result: Result, spec: ReportSpec, quantity: Quantity, unit: str) -> Fact | None:
+def _error(result: Result, spec: ReportSpec, quantity: Quantity, unit: str) -> Statement | None:
     """The largest error of all observers, after the start-up."""
     settled = result.time >= spec.evaluate_after
     found = {o: e for o in spec.observers if (e := estimation_error(result, spec, o, quantity)) is not None}
@@ -66,7 +66,7 @@ def _error(result: Result, spec: ReportSpec, quantity: Quantity, unit: str) -> F
     return name, f"{error_number(sizes[worst])} {unit}", label(spec, worst) + among, ""
 
 
-def _telegrams(result: Result) -> Fact | None:
+def _telegrams(result: Result) -> Statement | None:
     if not result.events:
         return None
     counts = count_events(result.events)
@@ -75,7 +75,7 @@ def _telegrams(result: Result) -> Fact | None:
     return "Balise telegrams", f"{counts.delivered} delivered", remark, "doubt" if wrong else ""
 
 
-def _certificates(result: Result) -> Fact | None:
+def _certificates(result: Result) -> Statement | None:
     known = [
         entry.get("holds") for entry in mapping_entry(result, "certificates").values() if isinstance(entry, Mapping)
     ]
@@ -91,6 +91,6 @@ def _certificates(result: Result) -> Fact | None:
     )
 
 
-def _warnings(result: Result, spec: ReportSpec) -> Fact | None:
+def _warnings(result: Result, spec: ReportSpec) -> Statement | None:
     count = len(all_warnings(result, spec))
     return ("Warnings", str(count), "see below", "doubt") if count else None

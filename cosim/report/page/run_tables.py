@@ -11,13 +11,13 @@ from cosim.evaluation.consistency_table import HEADINGS as CONSISTENCY_HEADINGS
 from cosim.evaluation.consistency_table import cells as consistency_cells
 from cosim.evaluation.cost import KINDS, cost_rows
 from cosim.evaluation.event_counts import outcome_columns
-from cosim.evaluation.facts import list_entry, mapping_entry, number_entry
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.fault_table import HEADINGS, cells, columns
 from cosim.evaluation.indicators import indicator_statistics
 from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.expectations.judged import Judged
 from cosim.report.page.page_table import PageTable, simple_table
 from cosim.results.result import Result

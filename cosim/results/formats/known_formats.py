@@ -25,7 +25,7 @@ def usual_file(name: str) -> str:
 
 
 def fastest_first() -> list[type[Format]]:
-    """All formats, those that are read soonest first; the log tells of one that cannot be loaded."""
+    """All formats, those that are read soonest first; the log names one that cannot be loaded."""
     return sorted(FORMATS.usable().values(), key=lambda item: -item.speed)
 
 

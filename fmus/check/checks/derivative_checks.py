@@ -22,10 +22,10 @@ def _slave_derivatives(context: Context) -> CheckOutcome:
     """
     if not context.description.coSimulation.providesDirectionalDerivative:
         return skipped("does not declare providesDirectionalDerivative")
-    bench = context.bench
-    bench.begin()
-    bench.steps((bench.h,) * WARM_UP_STEPS)
-    slave = bench.component
+    runner = context.runner
+    runner.begin()
+    runner.steps((runner.h,) * WARM_UP_STEPS)
+    slave = runner.component
     inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
     if not inputs or not outputs:
         return skipped("has no pair of a continuous input and a continuous output")

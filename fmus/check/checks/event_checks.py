@@ -16,7 +16,7 @@ from fmus.check.check import DISTRUST, Check
 from fmus.check.checks.life_checks import listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, failed, limited, passed, skipped
-from fmus.check.runner import WARM_UP_STEPS, Bench
+from fmus.check.runner import WARM_UP_STEPS, Runner
 from fmus.fmi.fmi3 import FMI3Slave
 
 PAYLOAD = "give what comes with an event a value that makes sense"
@@ -29,7 +29,7 @@ def events(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    slave = context.bench.component
+    slave = context.runner.component
     names = list(slave.events)
     if not names:
         return skipped(NONE)
@@ -44,17 +44,17 @@ def _no_event_mode(clocks: Sequence[str]) -> CheckOutcome:
 
 def _clocks(context: Context, clocks: Sequence[str]) -> CheckOutcome:
     """Each clock ticks once, with the values its inputs have."""
-    bench = context.fresh_bench()
+    runner = context.fresh_bench()
     try:
-        bench.begin()
+        runner.begin()
         for clock in clocks:
-            bench.steps((bench.h,))
-            assert isinstance(bench.component, FMI3Slave)
-            bench.component.activate(clock)
-        rows = bench.steps((bench.h,) * WARM_UP_STEPS)
+            runner.steps((runner.h,))
+            assert isinstance(runner.component, FMI3Slave)
+            runner.component.activate(clock)
+        rows = runner.steps((runner.h,) * WARM_UP_STEPS)
     finally:
-        bench.put_away()
-    bad = not_finite(bench.output_names, np.sum(rows, axis=0), bench.component.variables)
+        runner.put_away()
+    bad = not_finite(runner.output_names, np.sum(rows, axis=0), runner.component.variables)
     if bad:
         return limited(f"not finite after a tick with the start values of its inputs: {listed(bad)}", PAYLOAD)
     return passed(f"its input clocks tick in event mode and the run goes on: {listed(clocks)}")
@@ -62,43 +62,43 @@ def _clocks(context: Context, clocks: Sequence[str]) -> CheckOutcome:
 
 def _counted(context: Context, names: Sequence[str]) -> CheckOutcome:
     """An event inside a step against the same one where two shorter steps meet."""
-    bench = context.bench
-    divisible = bench.component.can_vary_step and not divided_steps(bench)
+    runner = context.runner
+    divisible = runner.component.can_vary_step and not divided_steps(runner)
     for name in names:
-        start = _warmed_up(bench)
-        whole = _crossing(bench, name, (), (bench.h,))
-        bad = not_finite(bench.output_names, whole, bench.component.variables)
+        start = _warmed_up(runner)
+        whole = _crossing(runner, name, (), (runner.h,))
+        bad = not_finite(runner.output_names, whole, runner.component.variables)
         if bad:
             return limited(
                 f"not finite after event {name} with the start values of its payload: {listed(bad)}", PAYLOAD
             )
         slack = STEP_TOLERANCE * np.abs(whole - start) + RESOLUTION * np.abs(whole)
-        until, rest = UNEVEN * bench.h, (1.0 - UNEVEN) * bench.h
+        until, rest = UNEVEN * runner.h, (1.0 - UNEVEN) * runner.h
         for before, after in (((), (until, rest)), ((until,), (rest,))) if divisible else ():
-            _warmed_up(bench)
-            split = _crossing(bench, name, before, after)
+            _warmed_up(runner)
+            split = _crossing(runner, name, before, after)
             if np.any(np.abs(whole - split) > slack):
-                return failed(f"event {name} inside a step does not happen at its stamp: {worst(bench, whole, split)}")
+                return failed(f"event {name} inside a step does not happen at its stamp: {worst(runner, whole, split)}")
     exact = "happen at their stamps inside a step" if divisible else "are taken"
     return passed(f"its counted events {exact}: {listed(names)}")
 
 
-def _warmed_up(bench: Bench) -> np.ndarray:
-    bench.begin()
-    return bench.steps((bench.h,) * WARM_UP_STEPS)[-1]
+def _warmed_up(runner: Runner) -> np.ndarray:
+    runner.begin()
+    return runner.steps((runner.h,) * WARM_UP_STEPS)[-1]
 
 
-def _crossing(bench: Bench, name: str, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
+def _crossing(runner: Runner, name: str, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
     """Outputs after steps of lengths [s], the event announced between `before` and `after`, always with the same
     stamp.
     """
-    stamp = bench.now + UNEVEN * bench.h
-    bench.steps(before)
-    slave = bench.component
+    stamp = runner.now + UNEVEN * runner.h
+    runner.steps(before)
+    slave = runner.component
     write, buffer = slave.writer([f"{name}_time", f"{name}_count"])
     buffer[:] = stamp, slave.read([f"{name}_count"])[0] + 1.0
     write()
-    return bench.steps(after)[-1]
+    return runner.steps(after)[-1]
 
 
 class EventsCheck(Check):

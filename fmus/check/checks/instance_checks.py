@@ -60,20 +60,20 @@ def _two_instances(context: Context) -> CheckOutcome:
     """
     if context.only_once:
         return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-    bench, other = context.bench, context.fresh_bench()
-    bench.begin()
-    alone = bench.steps((bench.h,) * (2 * WARM_UP_STEPS))
+    runner, other = context.runner, context.fresh_bench()
+    runner.begin()
+    alone = runner.steps((runner.h,) * (2 * WARM_UP_STEPS))
     try:
-        bench.begin()
+        runner.begin()
         other.begin()
-        other.set_inputs(elsewhere(bench.amplitude))
+        other.set_inputs(elsewhere(runner.amplitude))
         beside = []
         for _ in alone:
-            other.steps((bench.h,))
-            beside += bench.steps((bench.h,))
+            other.steps((runner.h,))
+            beside += runner.steps((runner.h,))
     finally:
         other.put_away()
-    problem = difference(bench, alone, beside)
+    problem = difference(runner, alone, beside)
     return by(problem and f"beside a second instance {problem}", "a second instance changes nothing in the first")
 
 

@@ -74,11 +74,11 @@ def initialise(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.quiet_bench()
+    runner = context.quiet_bench()
     try:
-        bench.begin(excited=False)
+        runner.begin(excited=False)
     finally:
-        bench.put_away()
+        runner.put_away()
     return passed("instantiates, initialises, terminates and is freed")
 
 
@@ -88,15 +88,15 @@ def _values_at_start(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.quiet_bench()
+    runner = context.quiet_bench()
     try:
-        bench.begin(excited=False)
-        slave = bench.component
+        runner.begin(excited=False)
+        slave = runner.component
         outputs, locals_ = slave.names("output"), slave.names("local")
         bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
         bad_locals = not_finite(locals_, slave.read(locals_))
     finally:
-        bench.put_away()
+        runner.put_away()
     if bad_outputs:
         return failed(f"not finite after initialisation: {listed(bad_outputs)}")
     if bad_locals:
@@ -110,15 +110,15 @@ def getters(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.quiet_bench()
+    runner = context.quiet_bench()
     try:
-        bench.begin(excited=False)
-        slave = bench.component
+        runner.begin(excited=False)
+        slave = runner.component
         own = [v for v in slave.description.modelVariables if v.alias is None]
         readable = [v for v in own if v.type != "Clock" and not v.clocks]
         problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
     finally:
-        bench.put_away()
+        runner.put_away()
     left_out = len(own) - len(readable)
     note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
     if problems:
@@ -141,13 +141,13 @@ def stepping(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.bench
+    runner = context.runner
     try:
         return _run(context)
     except SlaveError as error:
-        if not bench.amplitude:
+        if not runner.amplitude:
             raise
-        broken, bench.amplitude, bench.spread, bench.excited = str(error), 0.0, 0.0, False
+        broken, runner.amplitude, runner.spread, runner.excited = str(error), 0.0, 0.0, False
     outcome = _run(context)
     if outcome.verdict is Verdict.DISTRUST:
         return outcome
@@ -157,30 +157,30 @@ def stepping(context: Context) -> CheckOutcome:
 
 
 def _run(context: Context) -> CheckOutcome:
-    bench = context.bench
-    bench.begin()
+    runner = context.runner
+    runner.begin()
     rows: list[np.ndarray] = []
     since = perf_counter()
     while len(rows) < context.steps and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
-        row = bench.step(bench.h)
+        row = runner.step(runner.h)
         if not row:
             break
         rows += row
     if not rows:
-        raise bench.component.failure("asks for the end in its first step")
-    bad = not_finite(bench.output_names, np.sum(rows, axis=0), bench.component.variables)
+        raise runner.component.failure("asks for the end in its first step")
+    bad = not_finite(runner.output_names, np.sum(rows, axis=0), runner.component.variables)
     if bad:
         raise SlaveError(f"not finite while stepping: {listed(bad)}")
-    done = f"{len(rows)} steps of {bench.h:g} s"
-    if bench.component.terminated:
-        return limited(f"{done}, then it asks for the end", f"end runs at {bench.now:g} s, where it ends by itself")
-    if not bench.output_names:
+    done = f"{len(rows)} steps of {runner.h:g} s"
+    if runner.component.terminated:
+        return limited(f"{done}, then it asks for the end", f"end runs at {runner.now:g} s, where it ends by itself")
+    if not runner.output_names:
         return limited(f"{done}; it has no number that moves and can be read", UNSEEN)
-    if not bench.excited:
+    if not runner.excited:
         return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
     late = f"; {context.steps} were asked for, use a longer --timeout" if len(rows) < context.steps else ""
     above = (
-        f"inputs {bench.amplitude:g} above their start values" if bench.amplitude else "inputs at their start values"
+        f"inputs {runner.amplitude:g} above their start values" if runner.amplitude else "inputs at their start values"
     )
     return passed(f"{done}, {above}{late}")
 
@@ -191,12 +191,12 @@ def repeated(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.bench
-    pattern = (bench.h,) * (2 * WARM_UP_STEPS)
-    bench.begin()
-    first = bench.steps(pattern)
-    bench.begin()
-    problem = difference(bench, first, bench.steps(pattern))
+    runner = context.runner
+    pattern = (runner.h,) * (2 * WARM_UP_STEPS)
+    runner.begin()
+    first = runner.steps(pattern)
+    runner.begin()
+    problem = difference(runner, first, runner.steps(pattern))
     return by(problem and f"in a second run {problem}", "a second run is identical")
 
 
@@ -206,7 +206,7 @@ def reset(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    return by(repeatable(context.bench), "the same run after a reset is identical")
+    return by(repeatable(context.runner), "the same run after a reset is identical")
 
 
 def logging(context: Context) -> CheckOutcome:
@@ -217,16 +217,16 @@ def logging(context: Context) -> CheckOutcome:
     """
     if context.only_once:
         return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-    bench = context.bench
-    bench.begin()
-    quiet = bench.steps((bench.h,) * WARM_UP_STEPS)
-    talking = bench.twin(lambda: context.slave(logging=True))
+    runner = context.runner
+    runner.begin()
+    quiet = runner.steps((runner.h,) * WARM_UP_STEPS)
+    talking = runner.twin(lambda: context.slave(logging=True))
     try:
         talking.begin()
-        loud = talking.steps((bench.h,) * WARM_UP_STEPS)
+        loud = talking.steps((runner.h,) * WARM_UP_STEPS)
     finally:
         talking.put_away()
-    problem = difference(bench, quiet, loud)
+    problem = difference(runner, quiet, loud)
     return by(problem and f"with logging on {problem}", "logging changes no output")
 
 
@@ -236,22 +236,22 @@ def _time_per_step(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.bench
-    bench.begin()
+    runner = context.runner
+    runner.begin()
     seconds: list[float] = []
-    advance, since = bench.component.advance, perf_counter()
+    advance, since = runner.component.advance, perf_counter()
     most = min(_TIMED_STEPS, max(context.steps, 1))
     while (
         len(seconds) < most
-        and not bench.component.terminated
+        and not runner.component.terminated
         and perf_counter() - since < SHARE_OF_BUDGET * context.budget
     ):
-        t = bench.t0 + len(seconds) * bench.h
+        t = runner.t0 + len(seconds) * runner.h
         begin = perf_counter()
-        advance(t, t + bench.h)
+        advance(t, t + runner.h)
         seconds.append(perf_counter() - begin)
     return passed(
-        f"median {median(seconds) * 1e6:.3g} microseconds for a step of {bench.h:g} s, the call from Python included"
+        f"median {median(seconds) * 1e6:.3g} microseconds for a step of {runner.h:g} s, the call from Python included"
     )
 
 

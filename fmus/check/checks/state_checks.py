@@ -21,9 +21,9 @@ def round_trip(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    if not context.bench.component.can_save:
+    if not context.runner.component.can_save:
         return skipped(_NO_STATE)
-    found = restoring(context.bench)
+    found = restoring(context.runner)
     if found.restores == "exact":
         return passed("what follows a restored state is identical, bit for bit")
     if found.restores == "within_tolerance":
@@ -52,16 +52,16 @@ def _other_instance(context: Context) -> CheckOutcome:
 
 
 def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
-    bench = context.bench
-    slave = bench.component
+    runner = context.runner
+    slave = runner.component
     if not slave.can_save or not slave.capabilities.canSerializeFMUState:
         return skipped(_NOT_SERIALISED)
-    path = continuation(bench)
-    bench.begin()
-    bench.steps((bench.h,) * WARM_UP_STEPS)
-    content, saved_at = _saved(bench.component), bench.now
-    first = bench.steps(path)
-    target = context.fresh_bench() if elsewhere else bench
+    path = continuation(runner)
+    runner.begin()
+    runner.steps((runner.h,) * WARM_UP_STEPS)
+    content, saved_at = _saved(runner.component), runner.now
+    first = runner.steps(path)
+    target = context.fresh_bench() if elsewhere else runner
     try:
         if elsewhere:
             target.begin()
@@ -72,12 +72,12 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
         if elsewhere:
             target.put_away()
     place = "in another instance" if elsewhere else "from bytes"
-    problem = difference(bench, first, redone)
+    problem = difference(runner, first, redone)
     if not problem:
         return passed(f"what follows a state restored {place} is identical")
-    told = f"after a state restored {place} {problem}"
+    what = f"after a state restored {place} {problem}"
     return (
-        limited(f"{told}; within the tolerance of its solver", WITHIN) if near(bench, first, redone) else failed(told)
+        limited(f"{what}; within the tolerance of its solver", WITHIN) if near(runner, first, redone) else failed(what)
     )
 
 

@@ -27,14 +27,14 @@ def divided(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    bench = context.bench
-    if not bench.component.can_vary_step:
+    runner = context.runner
+    if not runner.component.can_vary_step:
         return skipped(_NO_VARIABLE_STEP)
     for scale in SCALES:
-        problem = divided_steps(bench, scale)
+        problem = divided_steps(runner, scale)
         if problem:
             return failed(problem)
-    return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * bench.h:g}' for s in SCALES)} s")
+    return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * runner.h:g}' for s in SCALES)} s")
 
 
 def short(context: Context) -> CheckOutcome:
@@ -43,9 +43,9 @@ def short(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    if not context.bench.component.can_vary_step:
+    if not context.runner.component.can_vary_step:
         return skipped(_NO_VARIABLE_STEP)
-    return by(short_step(context.bench), "tiny steps after a short one move the outputs by their share")
+    return by(short_step(context.runner), "tiny steps after a short one move the outputs by their share")
 
 
 def tiny(context: Context) -> CheckOutcome:
@@ -54,7 +54,7 @@ def tiny(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    if not context.bench.component.can_vary_step:
+    if not context.runner.component.can_vary_step:
         return skipped(_NO_VARIABLE_STEP)
     return _odd(context, lambda _h: TINY, _done_or_refused)
 
@@ -65,7 +65,7 @@ def huge(context: Context) -> CheckOutcome:
     Args:
         context: what is checked.
     """
-    left = context.bench.end - context.start_time - _BEFORE * context.step
+    left = context.runner.end - context.start_time - _BEFORE * context.step
     return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
 
 
@@ -103,22 +103,22 @@ def _odd(
     context: Context, size: Callable[[float], float], judge: Judge, shift: Callable[[float], float] = lambda _h: 0.0
 ) -> CheckOutcome:
     """One odd step on an instance of its own after three ordinary ones; the judge says what it thinks of it."""
-    bench = context.fresh_bench()
+    runner = context.fresh_bench()
     try:
-        bench.begin()
-        before = bench.steps((bench.h,) * _BEFORE)[-1]
-        slave = bench.component
-        bench.set_inputs(bench.amplitude)
-        said = slave.raw_step(bench.now + shift(bench.h), size(bench.h))
+        runner.begin()
+        before = runner.steps((runner.h,) * _BEFORE)[-1]
+        slave = runner.component
+        runner.set_inputs(runner.amplitude)
+        said = slave.raw_step(runner.now + shift(runner.h), size(runner.h))
         if said.refused:
             return _refusal(said)
-        after = bench.outputs()
-        bad = not_finite(bench.output_names, after, slave.variables) if np.isfinite(before).all() else []
+        after = runner.outputs()
+        bad = not_finite(runner.output_names, after, slave.variables) if np.isfinite(before).all() else []
         moved = not np.array_equal(before, after, equal_nan=True)
-        what = f"a step of {size(bench.h):g} s" + (f" from {shift(bench.h):g} s too late" if shift(bench.h) else "")
+        what = f"a step of {size(runner.h):g} s" + (f" from {shift(runner.h):g} s too late" if shift(runner.h) else "")
         return judge(what, moved, listed(bad))
     finally:
-        bench.put_away()
+        runner.put_away()
 
 
 def _refusal(said: RawStep) -> CheckOutcome:

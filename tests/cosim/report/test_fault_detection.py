@@ -63,7 +63,7 @@ def test_faults_misses_false_alarms_and_delays() -> None:
     assert (found.detection_rate, found.missed_rate, found.false_rate) == (2 / 3, 1 / 3, 1 / 3)
     assert found.false_per_hour == pytest.approx(36.0)
     assert found.position_errors == (pytest.approx(-1.0),)  # the row before the balise, not the one after
-    assert not alone.tells
+    assert not alone.indicates
     assert alone.position_errors == (pytest.approx(3.0),)
     shown = dict(zip(HEADINGS, cells(found), strict=True))
     assert (shown["Faults"], shown["Missed"], shown["False"]) == ("3", "1", "1")

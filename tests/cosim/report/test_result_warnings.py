@@ -21,7 +21,7 @@ from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.overlay.overlaid_runs import make_runs
 from cosim.report.overlay.overlay_measures import measured
 from cosim.report.page.run_page import report_page
-from cosim.report.page.run_statements import verdict_facts
+from cosim.report.page.run_statements import run_statements
 from cosim.results.result import BaliseRecord, Result
 from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures
@@ -46,7 +46,7 @@ def run(speed: Any, estimate: Any, step: float = 0.1, **more: Any) -> Result:
 
 
 def card(result: Result, spec: ReportSpec, name: str) -> tuple[str, str, str]:
-    return next(fact[1:] for fact in verdict_facts(result, spec) if fact[0] == name)
+    return next(fact[1:] for fact in run_statements(result, spec) if fact[0] == name)
 
 
 @given(rows=st.integers(1, 9), event=st.booleans())

@@ -169,6 +169,6 @@ def test_internal_variables_of_one_name_are_told_apart(tmp_path: Path) -> None:
     element = '<ssd:Elements><ssd:Component name="twins" source="resources/twins.fmu"/></ssd:Elements>'
     path = package(tmp_path / "system.ssp", {"SystemStructure.ssd": ssd(element), "resources/twins.fmu": fmu})
     words = "the name 'error' is given to more than one internal variable"
-    assert words in "".join(load_package(str(path)).doubts)
+    assert words in "".join(load_package(str(path)).warnings)
     with pytest.raises(ScenarioError, match=words):
         load_package(str(path), strict=True)

@@ -30,7 +30,7 @@ from cosim.observer_benchmark.observer_scores import (
     telegram_outcomes,
 )
 from cosim.observer_benchmark.observer_table import certified, certified_limit
-from cosim.observer_benchmark.playback import find_sides, known_facts, train_observers
+from cosim.observer_benchmark.playback import find_parts, shared_parameters, train_observers
 from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
@@ -109,7 +109,7 @@ def test_an_observer_in_the_loop_is_recorded_in_it_and_said_to_be() -> None:
     data["connections"] = [c for c in data["connections"] if "driver.odometer" not in c]
     data["connections"] += ["observer.speed -> driver.odometer", "odometer.reading -> observer.odometer"]
     looped = Scenario(**data)
-    assert find_sides(looped).in_loop == ("observer",)
+    assert find_parts(looped).in_loop == ("observer",)
     together = quietly(looped)
     found = benchmark_observers(looped, ["observer", "uio"])
     assert any("observer acts on the train" in note for note in found.notes)
@@ -194,7 +194,7 @@ def test_a_certificate_is_held_against_both_gaps() -> None:
 
 def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
     scenario = two()
-    found, notes = find_candidates(scenario, find_sides(scenario), None)
+    found, notes = find_candidates(scenario, find_parts(scenario), None)
     names = [candidate.name for candidate in found]
     assert names[:2] == ["observer", "uio"]
     left_out = {"augmented_high_gain_cdo", "augmented_takagi_sugeno_cdo"}
@@ -207,11 +207,11 @@ def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
 
 def test_facts_come_from_the_observers_where_they_agree_else_from_the_plant() -> None:
     scenario = two().set("observer.mass", 80e3).set("locomotive.davis_b", 30.0).set("locomotive.mass", 95e3)
-    facts = known_facts(find_sides(scenario))
+    facts = shared_parameters(find_parts(scenario))
     assert facts["mass"] == (80e3, "as for the observers of the scenario")
     assert facts["davis_b"] == (30.0, "as for locomotive")
     assert "wheel_radius" not in facts
-    assert known_facts(find_sides(scenario.set("uio.mass", 70e3)))["mass"] == (95e3, "as for locomotive")
+    assert shared_parameters(find_parts(scenario.set("uio.mass", 70e3)))["mass"] == (95e3, "as for locomotive")
 
 
 def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
@@ -219,10 +219,10 @@ def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
     scenario.set("uio.estimated_position", 7.0).add("plain", observer="odometer_reset").connect(
         "odometer.reading -> plain.odometer"
     )
-    facts = known_facts(find_sides(scenario.set("plain.estimated_position", 7.0)))
+    facts = shared_parameters(find_parts(scenario.set("plain.estimated_position", 7.0)))
     assert facts["mass"][0] == 80e3  # the plain odometer has no mass
     assert facts["estimated_position"] == (7.0, "as for the observers of the scenario")
-    assert "estimated_position" not in known_facts(find_sides(scenario.set("plain.estimated_position", 0.0)))
+    assert "estimated_position" not in shared_parameters(find_parts(scenario.set("plain.estimated_position", 0.0)))
 
 
 def test_no_limit_is_told_as_any_gap() -> None:
@@ -235,8 +235,8 @@ def test_a_scenario_without_observers_serves_shipped_ones() -> None:
     data = small().table().model_dump(by_alias=True, exclude_unset=True)
     del data["components"]["observer"]
     data["connections"] = ["driver.effort -> locomotive.effort", "locomotive.wheel_speed -> odometer.wheel_speed"]
-    sides = find_sides(Scenario(**data))
-    assert {signal: link[0] for signal, link in sides.template().items()} == {
+    parts = find_parts(Scenario(**data))
+    assert {signal: link[0] for signal, link in parts.template().items()} == {
         "effort": "driver.effort",
         "wheel_speed": "locomotive.wheel_speed",
         "odometer": "odometer.reading",
