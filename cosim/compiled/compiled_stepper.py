@@ -311,7 +311,7 @@ def _load() -> Any:
 def _check(control: StepControl, system: System) -> None:
     if type(control) is not FixedStep:
         raise NotCompilable(f"the step control '{control.name}' is Python's")
-    if system.events is not None and not system.events.only_network:
+    if system.divides_steps:
         raise NotCompilable("events of the components are propagated")
     algorithm = system.algorithm
     if algorithm.name not in ("gauss-seidel", "jacobi") or getattr(algorithm, "threads", 1) != 1:

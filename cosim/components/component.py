@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from cosim.components.derivatives import demand_derivatives, make_derivative_writer
-from cosim.components.described import DescribedComponent
+from cosim.components.derivatives import DifferentiableComponent
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
@@ -26,7 +25,6 @@ from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.fmi.capabilities import tool_warning
 from fmus.fmi.instance import shown
-from fmus.fmi.slave import Slave
 from fmus.fmi.values import element_reader, write_start
 from plant_models.hybrid.missing import MISSED_SAMPLES
 
@@ -34,7 +32,7 @@ MISSED_VARIABLES = {MISSED_SAMPLES: MISSED_SAMPLES}
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 
 
-class Component(DescribedComponent, Slave):
+class Component(DifferentiableComponent):
     """One stepped thing, from instantiation to the end.
 
     The life: `configure`, `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn,
@@ -151,35 +149,6 @@ class Component(DescribedComponent, Slave):
     ) -> tuple[Callable[[], None], np.ndarray]:
         write, buffer = self._unguarded_writer(names, values)
         return self._counted("set", WRITE, f"writing {shown(names)}", write), buffer
-
-    def make_derivative_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        """A call that tells the first derivatives of inputs (FMI 1 and 2), and the array of shape (len(names),) it
-        tells from.
-
-        They hold for the coming step only.
-
-        Raises:
-            CouplingError: the slave does not take derivatives (canInterpolateInputs), or a name is no continuous real
-            input.
-        """
-        write, buffer = make_derivative_writer(self, names)
-        return self.guarded(f"derivatives of {shown(names)}", write), buffer
-
-    def derivative_call(
-        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
-    ) -> Callable[[], np.ndarray]:
-        """As for `Instance`.
-
-        Args:
-            unknowns: outputs and the like.
-            knowns: inputs and the like.
-            seed: the direction, shape (len(knowns),).
-
-        Raises:
-            CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
-        """
-        demand_derivatives(self, *unknowns, *knowns)
-        return super().derivative_call(unknowns, knowns, seed)
 
     def free(self) -> None:
         """Free the instance, its library and its files."""

@@ -1,73 +1,82 @@
-"""Which derivatives a component takes and gives, told in words where it does not; the calls are in
+"""Which derivatives a component takes and gives, with a reason where it does not; the calls are in
 `fmus.fmi.derivatives`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from fmpy.model_description import ModelVariable
 
+from cosim.components.described import DescribedComponent
 from cosim.errors import CouplingError
 from fmus.fmi.derivatives import input_derivative_writer
 from fmus.fmi.elements import described
+from fmus.fmi.instance import shown
+from fmus.fmi.slave import Slave
 from fmus.fmi.types import FLOATING_TYPES
 from fmus.fmi.values import signs
 
-if TYPE_CHECKING:
-    from cosim.components.component import Component
 
+class DifferentiableComponent(DescribedComponent, Slave):
+    """A slave in the words of a scenario, with its derivatives."""
 
-def make_derivative_writer(component: Component, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-    """A call of setRealInputDerivatives of first order, and the array of shape (len(names),) it writes from.
+    def make_derivative_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+        """A call of setRealInputDerivatives of first order (FMI 1 and 2), and the array of shape (len(names),) it
+        writes from. They hold for the coming step only.
 
-    Args:
-        component: an instantiated slave of FMI 1 or 2.
-        names: of real inputs.
+        Args:
+            names: of real inputs.
 
-    Raises:
-        CouplingError: the slave does not take derivatives, or a name is no real input.
-    """
-    if component.fmi_version == 3 or not component.capabilities.canInterpolateInputs:
-        why = (
-            "FMI 3 has no input derivatives"
-            if component.fmi_version == 3
-            else "it does not declare canInterpolateInputs"
-        )
-        raise CouplingError(f"{component.name} takes no derivatives of inputs: {why}.")
-    variables = [component.variable(name, "input") for name in names]
-    for variable in variables:
-        if variable.type != "Real":
-            raise CouplingError(f"{component.name}.{variable.name} has no derivative: it is a {described(variable)}.")
-    references, buffer = [v.valueReference for v in variables], np.zeros(len(names))
-    turn = signs(component, names)
-    held = buffer if turn is None else np.zeros(len(names))
-    write = input_derivative_writer(component.slave, component.fmi_version, references, held)
-    if turn is None:
-        return write, buffer
+        Raises:
+            CouplingError: the slave does not take derivatives (canInterpolateInputs), or a name is no continuous real
+            input.
+        """
+        references, buffer = [v.valueReference for v in self._differentiable_inputs(names)], np.zeros(len(names))
+        turn = signs(self, names)
+        held = buffer if turn is None else np.zeros(len(names))
+        write = input_derivative_writer(self.slave, self.fmi_version, references, held)
 
-    def turn_and_write() -> None:
-        turn(buffer, held)
-        write()
+        def turn_and_write() -> None:
+            assert turn is not None
+            turn(buffer, held)
+            write()
 
-    return turn_and_write, buffer
+        return self.guarded(f"derivatives of {shown(names)}", write if turn is None else turn_and_write), buffer
 
+    def derivative_call(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> Callable[[], np.ndarray]:
+        """As for `Instance`.
 
-def demand_derivatives(component: Component, *names: str) -> None:
-    """Refuse a component without directional derivatives, and variables that have none.
+        Args:
+            unknowns: outputs and the like.
+            knowns: inputs and the like.
+            seed: the direction, shape (len(knowns),).
 
-    Args:
-        component: whose they are.
-        names: of unknowns and knowns.
+        Raises:
+            CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
+        """
+        if self.fmi_version == 1 or not self.capabilities.providesDirectionalDerivatives:
+            raise CouplingError(f"{self.name} gives no directional derivatives: it does not declare them.")
+        for element in (element for name in (*unknowns, *knowns) for element in self.elements(name)):
+            if element.variable.type not in FLOATING_TYPES:
+                raise CouplingError(
+                    f"{self.name}.{element.name} has no derivative: it is a {described(element.variable)}."
+                )
+        return super().derivative_call(unknowns, knowns, seed)
 
-    Raises:
-        CouplingError: the slave does not declare them, or a variable is not real.
-    """
-    if component.fmi_version == 1 or not component.capabilities.providesDirectionalDerivatives:
-        raise CouplingError(f"{component.name} gives no directional derivatives: it does not declare them.")
-    for element in (element for name in names for element in component.elements(name)):
-        if element.variable.type not in FLOATING_TYPES:
-            raise CouplingError(
-                f"{component.name}.{element.name} has no derivative: it is a {described(element.variable)}."
+    def _differentiable_inputs(self, names: Sequence[str]) -> list[ModelVariable]:
+        if self.fmi_version == 3 or not self.capabilities.canInterpolateInputs:
+            why = (
+                "FMI 3 has no input derivatives"
+                if self.fmi_version == 3
+                else "it does not declare canInterpolateInputs"
             )
+            raise CouplingError(f"{self.name} takes no derivatives of inputs: {why}.")
+        variables = [self.variable(name, "input") for name in names]
+        for variable in variables:
+            if variable.type != "Real":
+                raise CouplingError(f"{self.name}.{variable.name} has no derivative: it is a {described(variable)}.")
+        return variables

@@ -12,11 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
-from cosim.fmu_model.exchange_events import EventRun, integrated
-from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel, Way, declared_states
+from cosim.fmu_model.exchange_events import ContinuousModel, EventRun, integrated
+from cosim.fmu_model.sealed import Array, FmuModelError, Way, declared_states
 
 
-class ExchangeModel(SealedModel):
+class ExchangeModel(ContinuousModel):
     """A model exchange FMU; arguments as for `SealedModel`. Its states are those that it declares, in its own order."""
 
     way: Way = "exchange"
@@ -31,27 +31,6 @@ class ExchangeModel(SealedModel):
         """Names of the derivatives of the states, in the order of the states."""
         instance = self.instance
         return [e.name for d in instance.description.derivatives for e in instance.variables.expanded(d.variable.name)]
-
-    def derivatives(self) -> Array:
-        """Derivatives of the states where the instance stands, shape (n,)."""
-        found: Array = self.told(self.instance.derivatives)
-        return found
-
-    def move(self, t: float, x: Array, u: Array) -> None:
-        """Set time, states and inputs in Continuous-Time Mode: no event is looked for.
-
-        Args:
-            t: instant [s]. x: states, shape (n,). u: inputs, shape (m,).
-        """
-
-        def move() -> None:
-            self.instance.set_time(t)
-            self.instance.set_states(x)
-            if len(self.inputs):
-                self._inputs[:] = u
-                self._write_inputs()
-
-        self.told(move)
 
     def demand_moved(self, x: Array) -> None:
         """Refuse an FMU that does not take its states.

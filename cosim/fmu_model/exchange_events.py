@@ -5,15 +5,12 @@ FMU announced, and steps after which it asks for Event Mode. Touches one instanc
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
 
-from cosim.fmu_model.sealed import Array, FmuModelError
-
-if TYPE_CHECKING:
-    from cosim.fmu_model.exchange import ExchangeModel
+from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel
 
 TOLERANCE = 1e-10
 """Relative and absolute, of the integration: far below what a filter or a difference shows."""
@@ -23,6 +20,31 @@ MOST_EVENTS = 100
 """In one step of a filter; more is a state that chatters, or a ball that bounces faster and faster."""
 
 
+class ContinuousModel(SealedModel):
+    """A model exchange FMU in Continuous-Time Mode; arguments as for `SealedModel`."""
+
+    def derivatives(self) -> Array:
+        """Derivatives of the states where the instance stands, shape (n,)."""
+        found: Array = self.told(self.instance.derivatives)
+        return found
+
+    def move(self, t: float, x: Array, u: Array) -> None:
+        """Set time, states and inputs: no event is looked for.
+
+        Args:
+            t: instant [s]. x: states, shape (n,). u: inputs, shape (m,).
+        """
+
+        def move() -> None:
+            self.instance.set_time(t)
+            self.instance.set_states(x)
+            if len(self.inputs):
+                self._inputs[:] = u
+                self._write_inputs()
+
+        self.told(move)
+
+
 class EventRun:
     """Steps of a model exchange FMU with the events on their way.
 
@@ -30,7 +52,7 @@ class EventRun:
         model: the FMU, instantiated.
     """
 
-    def __init__(self, model: ExchangeModel) -> None:
+    def __init__(self, model: ContinuousModel) -> None:
         self._model, self._instance = model, model.instance
         self._indicators = self._instance.indicator_count > 0
         self._completes = not getattr(self._instance.capabilities, "completedIntegratorStepNotNeeded", False)

@@ -21,6 +21,7 @@ from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
 from cosim.master.events.choose import Events
+from cosim.master.events.coordinated_system import CoordinatedSystem
 from cosim.master.finite import make_finite_check
 from cosim.master.initialisation import initialise
 from cosim.master.stepper import ChooseStepper, StepperChoice, python_stepper
@@ -81,7 +82,7 @@ class Master:
         network: NetworkService | None = None,
     ) -> None:
         self.plan, self.axis, self.balises = plan, axis, balises
-        self.system = System(plan, algorithm(plan), balises, events, network)
+        self.system = CoordinatedSystem(plan, algorithm(plan), balises, network, events)
         self.control = control(self.system)
         event_rows = 0 if balises is None else balises.expected_rows(axis.start, axis.stop)
         self.recorder = recorder(plan.signals, axis.count + 1 + event_rows)

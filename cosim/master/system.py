@@ -16,7 +16,6 @@ from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
 from cosim.master.algorithms.links import downstream
-from cosim.master.events.choose import Events, make_coordinator
 from cosim.network.service import NetworkService
 
 __all__ = ["NO_ROWS", "Checkpoint", "Row", "System"]
@@ -33,8 +32,8 @@ class Checkpoint:
         balises: of the balise service, or None.
         non_numeric: the values that are no doubles, shape (m,).
         algorithm: what the algorithm remembers, or None.
-        events: what the coordinator remembers, or None.
         network: what the network remembers, or None.
+        events: what the coordinator remembers, or None.
     """
 
     states: list[Any]
@@ -43,8 +42,8 @@ class Checkpoint:
     balises: Any
     non_numeric: np.ndarray
     algorithm: Any = None
-    events: Any = None
     network: Any = None
+    events: Any = None
 
 
 class System:
@@ -54,7 +53,6 @@ class System:
         plan: prepared, components instantiated.
         algorithm: how they are brought over a step.
         balises: balise service, or None.
-        events: ``propagate`` events of the components to others, or leave them ``local``.
         network: over which measurements travel, or None.
     """
 
@@ -63,7 +61,6 @@ class System:
         plan: Plan,
         algorithm: Algorithm,
         balises: BaliseService | None = None,
-        events: Events = "propagate",
         network: NetworkService | None = None,
     ) -> None:
         self.plan, self.algorithm, self.balises, self.network = plan, algorithm, balises, network
@@ -71,29 +68,22 @@ class System:
             balises.attach(plan)
         if network is not None:
             network.attach(plan, () if balises is None else balises.receivers)
-        self.events = make_coordinator(self, events)
 
-    def start(self, t: float) -> None:
-        """All components were initialised at `t` [s]: handle what happens there already.
-
-        Raises:
-            RunError: a component failed, or events do not settle.
-        """
-        if self.events is not None:
-            self.events.start(t)
+    @property
+    def divides_steps(self) -> bool:
+        """Whether a step is divided where an event of a component lies in it."""
+        return False
 
     def advance(self, t: float, until: float) -> Sequence[Row]:
-        """Bring everything from `t` to `until` [s], events of the components on the way included.
-
-        Where a component asks for the end of the run, everybody who can stops there.
+        """Bring everything from `t` to `until` [s].
 
         Returns:
             Event rows in ``(t, until]``: before and after each event; the row of `until` itself is the plan's values.
 
         Raises:
-            RunError: a component failed, or events do not settle.
+            RunError: a component failed.
         """
-        return self.move(t, until) if self.events is None else self.events.advance(t, until)
+        return self.move(t, until)
 
     def move(self, t: float, until: float) -> Sequence[Row]:
         """Bring everything from `t` to `until` [s] without a stop; returns and raises as `advance`."""
@@ -157,7 +147,6 @@ class System:
         states = [step.component.save() if step.component.can_save or not anyway else None for step in self.plan.steps]
         interpolators = [None if step.interpolator is None else step.interpolator.save() for step in self.plan.steps]
         balises = None if self.balises is None else self.balises.save()
-        events = None if self.events is None else self.events.save()
         return Checkpoint(
             states,
             self.plan.values.copy(),
@@ -165,7 +154,6 @@ class System:
             balises,
             self.plan.non_numeric.copy(),
             self.algorithm.save(),
-            events,
             None if self.network is None else self.network.save(),
         )
 
@@ -189,8 +177,6 @@ class System:
         self.plan.values[:] = checkpoint.values
         self.plan.non_numeric[:] = checkpoint.non_numeric
         self.algorithm.restore(checkpoint.algorithm)
-        if self.events is not None:
-            self.events.restore(checkpoint.events)
         if self.network is not None:
             self.network.restore(checkpoint.network)
         if self.balises is not None and self.balises.plant in [step.component.name for step in stay]:

@@ -16,14 +16,13 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmus.fmi.derivatives import directional_derivative
-from fmus.fmi.described import Described
 from fmus.fmi.elements import layout
 from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import forget
 from fmus.fmi.ports import is_native
 from fmus.fmi.standard import FATAL, MAX_EVENT_ITERATIONS
 from fmus.fmi.types import getter_type
-from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer
+from fmus.fmi.values import ValueHolder, element_reader, element_writer, exact_reader, exact_writer
 
 INSTANTIATING = "instantiate"
 FAILURES = (RuntimeError, ValueError, OSError)
@@ -31,7 +30,7 @@ FAILURES = (RuntimeError, ValueError, OSError)
 NAMES_SHOWN = 6
 
 
-class Instance(Described):
+class Instance(ValueHolder):
     """One instance, from `instantiate` to `free`.
 
     Args:
@@ -50,9 +49,7 @@ class Instance(Described):
     """What to say of a state that cannot be had."""
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
-        super().__init__(name, description)
-        self.slave = slave
-        self.negated: frozenset[str] = frozenset()  # variables whose slave holds the value with the other sign (FMI 1)
+        super().__init__(name, slave, description)
         self.terminated = False
         self._alive = self._running = False
         self._loaded = is_native(slave)

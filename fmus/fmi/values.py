@@ -7,22 +7,37 @@ alone; where the slave holds a variable with the other sign (a negated alias of 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmus.fmi.described import Described
 from fmus.fmi.elements import Element, layout
 from fmus.fmi.exact_ports import Values, make_exact_reader, make_exact_writer
 from fmus.fmi.ports import make_reader, make_writer
 
-if TYPE_CHECKING:
-    from fmus.fmi.instance import Instance
-
 Turn = Callable[[np.ndarray, np.ndarray], None]
 
 
-def element_reader(instance: Instance, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+class ValueHolder(Described):
+    """A described instance with the slave that holds its values.
+
+    `negated` are variables whose slave holds the value with the other sign (FMI 1.0).
+
+    Args:
+        name: of the instance.
+        slave: object with fmpy's call surface.
+        description: its model description.
+    """
+
+    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
+        super().__init__(name, description)
+        self.slave = slave
+        self.negated: frozenset[str] = frozenset()
+
+
+def element_reader(instance: ValueHolder, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
     """A call that reads scalars and elements into `values`, shape (len(names),).
 
     Args:
@@ -45,7 +60,7 @@ def element_reader(instance: Instance, names: Sequence[str], values: np.ndarray)
 
 
 def element_writer(
-    instance: Instance, names: Sequence[str], values: np.ndarray | None = None
+    instance: ValueHolder, names: Sequence[str], values: np.ndarray | None = None
 ) -> tuple[Callable[[], None], np.ndarray]:
     """A call that writes scalars and elements, and the array of shape (len(names),) it writes from.
 
@@ -71,7 +86,7 @@ def element_writer(
     return place_and_write, buffer
 
 
-def exact_reader(instance: Instance, variable: ModelVariable) -> Callable[[], Values]:
+def exact_reader(instance: ValueHolder, variable: ModelVariable) -> Callable[[], Values]:
     """A call that returns the values of a whole variable as they are.
 
     Args:
@@ -83,7 +98,7 @@ def exact_reader(instance: Instance, variable: ModelVariable) -> Callable[[], Va
     return lambda: tuple(negative(variable, value) for value in read())
 
 
-def exact_writer(instance: Instance, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
+def exact_writer(instance: ValueHolder, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
     """A call that writes the values of a whole variable as they are.
 
     Args:
@@ -95,7 +110,7 @@ def exact_writer(instance: Instance, variable: ModelVariable) -> Callable[[Seque
     return lambda values: write([negative(variable, value) for value in values])
 
 
-def write_start(instance: Instance, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
+def write_start(instance: ValueHolder, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
     """Write a whole variable, or one element of it, once.
 
     Args:
@@ -111,7 +126,7 @@ def write_start(instance: Instance, variable: ModelVariable, element: Element | 
     exact_writer(instance, variable)(values)
 
 
-def signs(instance: Instance, names: Sequence[str]) -> Turn | None:
+def signs(instance: ValueHolder, names: Sequence[str]) -> Turn | None:
     """What turns values as the slave holds them into those of the variables and back, or None where nothing is negated.
 
     The call takes source and target, both of shape (len(names),), which may be the same array.

@@ -10,7 +10,7 @@ from enum import Enum
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import FunctionType, MappingProxyType, MethodType, ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -102,9 +102,9 @@ class Description:
             parts = sorted(self._texts(value, depth))
         elif not hasattr(value, "__dict__") and not is_dataclass(value):
             raise NoIdentityError(f"{type(value).__qualname__} cannot be described.")
-        names, values = _attributes(value)
+        names, attributes = _attributes(value)
         if names:
-            parts += [f"{name} = {one}" for name, one in zip(names, self._texts(values, depth), strict=True)]
+            parts += [f"{name} = {one}" for name, one in zip(names, self._texts(attributes, depth), strict=True)]
         return ", ".join(parts)
 
     def _texts(self, values: Iterable[Any], depth: int) -> list[str]:
@@ -160,8 +160,8 @@ def _is_numerical(module: str) -> bool:
 
 def _attributes(value: Any) -> tuple[tuple[str, ...], Iterable[Any]]:
     """Names and values of the attributes of an object, without those that follow from the others."""
-    held = getattr(value, "__dict__", None)
-    names = _attribute_names(type(value), None if held is None else tuple(held))
+    held, kind = getattr(value, "__dict__", None), cast("type", type(value))
+    names = _attribute_names(kind, None if held is None else tuple(held))
     return names, map(partial(getattr, value) if held is None else held.__getitem__, names)
 
 

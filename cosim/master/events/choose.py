@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from fmpy.model_description import ModelVariable
 
@@ -16,11 +16,9 @@ from cosim.coupling.connection import Connection
 from cosim.master.events.coordinator import EventCoordinator
 from cosim.master.events.gates import Gate
 from cosim.master.events.participant import Participant
+from cosim.master.system import System
 from fmus.fmi.clocks import clock_references
 from fmus.fmi.standard import OWN_TOOL
-
-if TYPE_CHECKING:
-    from cosim.master.system import System
 
 Events = Literal["propagate", "local"]
 EXACT = {"String", "Binary", "Int64", "UInt64"}

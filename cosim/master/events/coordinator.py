@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +21,9 @@ from cosim.errors import RunError
 from cosim.master.events.iteration import EventIteration
 from cosim.master.events.participant import Participant
 from cosim.master.events.stride import Span, Stride
+from cosim.master.system import Checkpoint, System
 from fmus.fmi.interruption import EventMet
 from fmus.fmi.standard import TIME_TOLERANCE
-
-if TYPE_CHECKING:
-    from cosim.master.system import Checkpoint, System
 
 MAX_EVENTS_WITHOUT_PROGRESS = 100
 
