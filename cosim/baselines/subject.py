@@ -136,7 +136,7 @@ def make_subject(
     return _scenario_subject(what, folder, {**times, **(overrides or {})}, progress, warn)
 
 
-def _fmu_recipe(what: str | Path, folder: Path, times: Mapping[str, float], chosen: Mapping[str, Any]) -> Recipe:
+def _fmu_recipe(what: str | Path, folder: Path, times: Mapping[str, Any], chosen: Mapping[str, Any]) -> Recipe:
     """How an FMU alone is run."""
     inputs = chosen.get("inputs", {})
     table = str((folder / inputs).resolve()) if isinstance(inputs, str | Path) else dict(inputs)

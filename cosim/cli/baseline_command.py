@@ -25,7 +25,7 @@ from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
 from cosim.errors import BaselineError
 from cosim.results.load_result import load_result
-from fmus.cli.commands import Action, Actions, Argument, Execute, Group, argument
+from fmus.cli.commands import Action, Actions, Argument, ArgumentGroup, Execute, argument
 from fmus.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
 
 FILE = argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
 FORCE = argument("--force", action="store_true", help="replace a baseline that is there already")
-ALLOWED = Group(TOLERANCES, "tolerances", "those in the baseline, or the usual ones, where not given")
+ALLOWED = ArgumentGroup(TOLERANCES, "tolerances", "those in the baseline, or the usual ones, where not given")
 _OUTPUT = (argument("--json", action="store_true", help="print JSON instead of text"), QUIET)
 _MAKE = (
     argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"),
@@ -238,7 +238,7 @@ def _progress(options: argparse.Namespace) -> ProgressBar:
     return simulated_time_bar(silent=options.quiet or options.json)
 
 
-def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | Group]) -> Action:
+def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | ArgumentGroup]) -> Action:
     words = {"help": text, "description": f"{text[0].upper()}{text[1:]}."}
     return Action(name, execute, words, (*_OUTPUT, *arguments))
 

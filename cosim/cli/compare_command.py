@@ -18,7 +18,7 @@ from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.tolerance import Tolerances
 from cosim.errors import ComparisonError, nearest
 from cosim.results.load_result import load_result
-from fmus.cli.commands import Group, argument, one_of
+from fmus.cli.commands import ArgumentGroup, argument, one_of
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline
@@ -43,7 +43,7 @@ PARSER = {
 ARGUMENTS = (
     argument("reference", metavar="A", help=f"what is right: {KINDS}"),
     argument("result", metavar="B", help=f"what is compared with it: {KINDS}"),
-    Group(
+    ArgumentGroup(
         (
             *TOLERANCES,
             argument(
@@ -57,7 +57,7 @@ ARGUMENTS = (
         "what is compared, and how closely",
         "tolerances that are not given are those of a baseline A, or else the usual ones",
     ),
-    Group(
+    ArgumentGroup(
         (
             argument("--json", action="store_true", help="print the comparison as JSON instead of text"),
             argument("--html", metavar="FILE", help="write a page with pictures of the signals that differ"),

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -266,7 +266,7 @@ def _draw_box(ax: Axes, structure: StructureData, part: Part, box: Box, number: 
         zorder=4,
     )
     name_at = box.x + _SIDE + 2.7 * _BADGE
-    words = {"va": "baseline", "zorder": 3}
+    words: dict[str, Any] = {"va": "baseline", "zorder": 3}
     ax.text(name_at, middle + 0.05, _plain(part.name), fontsize=NAME, fontweight="bold", color=INK, **words)
     ax.text(box.x + _SIDE, box.y + 0.385, _kind_text(part), fontsize=SMALL, color=QUIET, **words)
     _draw_ports(ax, box)

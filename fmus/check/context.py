@@ -60,7 +60,7 @@ class Context:
         """A fresh model exchange instance, not yet instantiated."""
         return make_model(self.folder, self.description, INSTANCE)
 
-    def quiet_bench(self) -> Runner:
+    def quiet_runner(self) -> Runner:
         """A runner that has not been stepped to find an excitation; the caller puts it away."""
         return Runner(
             self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step
@@ -69,11 +69,11 @@ class Context:
     @cached_property
     def runner(self) -> Runner:
         """The shared runner, excited where some input moves the outputs."""
-        runner = self.quiet_bench()
+        runner = self.quiet_runner()
         runner.excite(SHARE_OF_BUDGET * self.budget)
         return runner
 
-    def fresh_bench(self) -> Runner:
+    def fresh_runner(self) -> Runner:
         """A runner with an instance of its own, to be spoiled; the caller puts it away."""
         if self.only_once:
             self.runner.park()

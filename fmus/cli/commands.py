@@ -44,7 +44,7 @@ class Argument:
 
 
 @dataclass(frozen=True)
-class Group:
+class ArgumentGroup:
     """Arguments that the help shows together, or of which one at most is given.
 
     Args:
@@ -52,7 +52,7 @@ class Group:
             arguments exclude one another.
     """
 
-    arguments: Sequence[Argument | Group]
+    arguments: Sequence[Argument | ArgumentGroup]
     title: str | None = None
     description: str | None = None
 
@@ -93,7 +93,7 @@ class Action:
     name: str
     execute: Execute
     parser: Mapping[str, Any] = field(default_factory=dict)
-    arguments: Sequence[Argument | Group] = ()
+    arguments: Sequence[Argument | ArgumentGroup] = ()
 
 
 def argument(*names: str, **keywords: Any) -> Argument:
@@ -105,16 +105,16 @@ def argument(*names: str, **keywords: Any) -> Argument:
     return Argument(names, keywords)
 
 
-def one_of(*arguments: Argument) -> Group:
+def one_of(*arguments: Argument) -> ArgumentGroup:
     """Arguments of which one at most is given.
 
     Args:
         arguments: in the order of the help.
     """
-    return Group(arguments)
+    return ArgumentGroup(arguments)
 
 
-def _add_arguments(parser: Any, arguments: Sequence[Argument | Group | Actions]) -> None:
+def _add_arguments(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions]) -> None:
     """Add arguments to a parser or to a group of one.
 
     Args:
@@ -133,7 +133,7 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
     _fill(subparsers.add_parser(name, **module.PARSER), module.ARGUMENTS, getattr(module, "execute", None))
 
 
-def _fill(parser: Any, arguments: Sequence[Argument | Group | Actions], execute: Execute | None) -> None:
+def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None) -> None:
     _add_arguments(parser, arguments)
     if execute is not None:
         parser.set_defaults(execute=execute)

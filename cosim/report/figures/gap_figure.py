@@ -5,6 +5,7 @@ observers were off at their end. Draw on axes given, or on their own.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +24,7 @@ from cosim.results.result import Result
 
 SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
 MARKERS = "os^Dv<>p"
-_MARK_STYLE = {"linestyle": "none", "markersize": 4.5, "markeredgewidth": 1.0, "alpha": 0.75}
+_MARK_STYLE: dict[str, Any] = {"linestyle": "none", "markersize": 4.5, "markeredgewidth": 1.0, "alpha": 0.75}
 _GRANTED = "SUBSET-041 (5 m + 5 %)"
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
 

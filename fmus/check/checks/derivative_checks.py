@@ -14,36 +14,6 @@ from fmus.check.findings import CheckOutcome, skipped
 from fmus.check.runner import WARM_UP_STEPS
 
 
-def _slave_derivatives(context: Context) -> CheckOutcome:
-    """Directional derivatives of the outputs along the inputs between two steps.
-
-    Args:
-        context: what is checked.
-    """
-    if not context.description.coSimulation.providesDirectionalDerivative:
-        return skipped("does not declare providesDirectionalDerivative")
-    runner = context.runner
-    runner.begin()
-    runner.steps((runner.h,) * WARM_UP_STEPS)
-    slave = runner.component
-    inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
-    if not inputs or not outputs:
-        return skipped("has no pair of a continuous input and a continuous output")
-    values = dict(zip(inputs, slave.read(inputs).tolist(), strict=True))
-
-    def evaluate(name: str, value: float) -> np.ndarray:
-        write, buffer = slave.writer(inputs)
-        buffer[:] = [value if n == name else v for n, v in values.items()]
-        write()
-        return slave.read(outputs)
-
-    nominal = {n: nominal_of(slave.variables[n]) for n in inputs}
-    try:
-        return compare(evaluate, lambda n: slave.directional_derivative(outputs, [n], [1.0]), values, outputs, nominal)
-    finally:
-        evaluate(inputs[0], values[inputs[0]])
-
-
 def nominal_of(variable: object) -> float:
     """The nominal value of a variable, 1 where it declares none."""
     declared = getattr(variable, "nominal", None)
@@ -51,10 +21,37 @@ def nominal_of(variable: object) -> float:
 
 
 class DirectionalDerivativesCheck(Check):
-    """The check *directional derivatives*."""
+    """Directional derivatives of the outputs along the inputs between two steps."""
 
     name = "directional derivatives"
     failing = LIMIT
     advice = "do not use its derivatives"
     place = 18
-    run = staticmethod(_slave_derivatives)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if not context.description.coSimulation.providesDirectionalDerivative:
+            return skipped("does not declare providesDirectionalDerivative")
+        runner = context.runner
+        runner.begin()
+        runner.steps((runner.h,) * WARM_UP_STEPS)
+        slave = runner.component
+        inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
+        if not inputs or not outputs:
+            return skipped("has no pair of a continuous input and a continuous output")
+        values = dict(zip(inputs, slave.read(inputs).tolist(), strict=True))
+
+        def evaluate(name: str, value: float) -> np.ndarray:
+            write, buffer = slave.writer(inputs)
+            buffer[:] = [value if n == name else v for n, v in values.items()]
+            write()
+            return slave.read(outputs)
+
+        nominal = {n: nominal_of(slave.variables[n]) for n in inputs}
+        try:
+            return compare(
+                evaluate, lambda n: slave.directional_derivative(outputs, [n], [1.0]), values, outputs, nominal
+            )
+        finally:
+            evaluate(inputs[0], values[inputs[0]])

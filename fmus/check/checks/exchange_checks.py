@@ -46,158 +46,6 @@ def _start(model: FmuModel, context: Context) -> None:
     model.initialize(context.start_time)
 
 
-def loading(context: Context) -> CheckOutcome:
-    """The library can be loaded here, with all that it needs.
-
-    Args:
-        context: what is checked.
-    """
-    context.model().free()
-    return passed("the library and what it needs are loaded")
-
-
-def _model_symbols(context: Context) -> CheckOutcome:
-    """`exported_symbols` for model exchange.
-
-    Args:
-        context: what is checked.
-    """
-    return exported_symbols(context.model())
-
-
-def initialise(context: Context) -> CheckOutcome:
-    """Instantiate, initialise, reach continuous-time mode, terminate, free.
-
-    Args:
-        context: what is checked.
-    """
-    with started(context) as model:
-        return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
-
-
-def _finite_derivatives(context: Context) -> CheckOutcome:
-    """Outputs, derivatives and event indicators are finite at the start.
-
-    Args:
-        context: what is checked.
-    """
-    with started(context) as model:
-        outputs = model.names("output")
-        values = {
-            "outputs": not_finite(outputs, model.read(outputs)),
-            "derivatives": not_finite(_numbered(model.state_count), model.derivatives()) if model.state_count else [],
-            "event indicators": not_finite(_numbered(model.indicator_count), model.indicators())
-            if model.indicator_count
-            else [],
-        }
-    bad = {what: names for what, names in values.items() if names}
-    if bad:
-        return failed("not finite at the start: " + "; ".join(f"{what} {listed(names)}" for what, names in bad.items()))
-    return passed("outputs, derivatives and event indicators are finite at the start")
-
-
-def states(context: Context) -> CheckOutcome:
-    """States that are set are read back, and derivatives depend on nothing else.
-
-    Args:
-        context: what is checked.
-    """
-    with started(context) as model:
-        if not model.state_count:
-            return skipped(_NO_STATES)
-        x = model.states()
-        before = model.derivatives()
-        moved = _moved(x)
-        model.set_states(moved)
-        if not np.array_equal(model.states(), moved):
-            return failed("continuous states that were set are not what is read back")
-        model.derivatives()
-        model.set_states(x)
-        if not np.array_equal(model.derivatives(), before, equal_nan=True):
-            return failed("the derivatives at the same states differ after a visit elsewhere")
-    return passed("states are read back, derivatives at the same states are identical")
-
-
-def round_trip(context: Context) -> CheckOutcome:
-    """Save, integrate on, restore, integrate again: bit-identical.
-
-    Args:
-        context: what is checked.
-    """
-    with started(context) as model:
-        if not model.can_save:
-            return skipped("does not declare canGetAndSetFMUstate")
-        if not model.state_count:
-            return skipped(_NO_STATES)
-        state = model.save()
-        try:
-            first = _path(model, context)
-            model.restore(state)
-            second = _path(model, context)
-        finally:
-            model.release(state)
-    same = np.array_equal(first, second, equal_nan=True)
-    return by(
-        "" if same else "after a restored state the same states have other derivatives", "what follows is identical"
-    )
-
-
-def reset(context: Context) -> CheckOutcome:
-    """After a reset the same path has the identical derivatives.
-
-    Args:
-        context: what is checked.
-    """
-    with started(context) as model:
-        if not model.state_count:
-            return skipped(_NO_STATES)
-        first = _path(model, context)
-        model.terminate()
-        model.reset()
-        _start(model, context)
-        second = _path(model, context)
-    same = np.array_equal(first, second, equal_nan=True)
-    return by(
-        "" if same else "after a reset the same states have other derivatives", "the same after a reset is identical"
-    )
-
-
-def directional(context: Context) -> CheckOutcome:
-    """Directional derivatives of derivatives and outputs along states and inputs.
-
-    Args:
-        context: what is checked.
-    """
-    if not context.description.modelExchange.providesDirectionalDerivative:
-        return skipped("does not declare providesDirectionalDerivative")
-    with started(context) as model:
-        found = [(u.variable, getattr(u.variable, "derivative", None)) for u in model.description.derivatives]
-        scalar = [(rate.name, of.name) for rate, of in found if of is not None and not rate.shape]
-        inputs, outputs = real_names(model, "input"), real_names(model, "output")
-        unknowns, state_names = [*(r for r, _ in scalar), *outputs], [s for _, s in scalar]
-        if len(scalar) != model.state_count or not unknowns or not (state_names or inputs):
-            return skipped("has no pair of a scalar unknown and a scalar known")
-        x = _moved(model.states())
-        u = model.read(inputs)
-        values = dict(zip([*state_names, *inputs], [*x.tolist(), *u.tolist()], strict=True))
-        write, buffer = model.writer(inputs)
-
-        def evaluate(name: str, value: float) -> np.ndarray:
-            point = [value if n == name else v for n, v in values.items()]
-            model.set_states(np.array(point[: len(x)]))
-            buffer[:] = point[len(x) :]
-            write()
-            return model.read(unknowns)
-
-        evaluate("", 0.0)
-
-        def said(name: str) -> np.ndarray:
-            evaluate("", 0.0)
-            return model.directional_derivative(unknowns, [name], [1.0])
-
-        return compare(evaluate, said, values, unknowns, {n: nominal_of(model.variables[n]) for n in values})
-
-
 def _moved(x: np.ndarray) -> np.ndarray:
     moved: np.ndarray = x + SHIFT * np.maximum(1.0, np.abs(x))
     return moved
@@ -222,29 +70,38 @@ def _numbered(count: int) -> list[str]:
 
 
 class ModelExchangeLoadingCheck(Check):
-    """The check *model exchange: loading*."""
+    """The library can be loaded here, with all that it needs."""
 
     name = "model exchange: loading"
     failing = DISTRUST
     basis = True
     interface = MODEL_EXCHANGE
     place = 1
-    run = staticmethod(loading)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        context.model().free()
+        return passed("the library and what it needs are loaded")
 
 
 class ModelExchangeExportedSymbolsCheck(Check):
-    """The check *model exchange: exported symbols*."""
+    """`exported_symbols` for model exchange."""
 
     name = "model exchange: exported symbols"
     failing = LIMIT
     advice = MISSING
     interface = MODEL_EXCHANGE
     place = 2
-    run = staticmethod(_model_symbols)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return exported_symbols(context.model())
 
 
 class ModelExchangeInitialiseCheck(Check):
-    """The check *model exchange: initialise*."""
+    """Instantiate, initialise, reach continuous-time mode, terminate, free."""
 
     name = "model exchange: initialise"
     failing = DISTRUST
@@ -252,58 +109,166 @@ class ModelExchangeInitialiseCheck(Check):
     basis = True
     interface = MODEL_EXCHANGE
     place = 3
-    run = staticmethod(initialise)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        with started(context) as model:
+            return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
 
 
 class ModelExchangeValuesAtStartCheck(Check):
-    """The check *model exchange: values at start*."""
+    """Outputs, derivatives and event indicators are finite at the start."""
 
     name = "model exchange: values at start"
     failing = DISTRUST
     advice = "give start values"
     interface = MODEL_EXCHANGE
     place = 4
-    run = staticmethod(_finite_derivatives)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        with started(context) as model:
+            outputs = model.names("output")
+            values = {
+                "outputs": not_finite(outputs, model.read(outputs)),
+                "derivatives": not_finite(_numbered(model.state_count), model.derivatives())
+                if model.state_count
+                else [],
+                "event indicators": not_finite(_numbered(model.indicator_count), model.indicators())
+                if model.indicator_count
+                else [],
+            }
+        bad = {what: names for what, names in values.items() if names}
+        if bad:
+            return failed(
+                "not finite at the start: " + "; ".join(f"{what} {listed(names)}" for what, names in bad.items())
+            )
+        return passed("outputs, derivatives and event indicators are finite at the start")
 
 
 class ModelExchangeStatesCheck(Check):
-    """The check *model exchange: states*."""
+    """States that are set are read back, and derivatives depend on nothing else."""
 
     name = "model exchange: states"
     failing = DISTRUST
     interface = MODEL_EXCHANGE
     place = 5
-    run = staticmethod(states)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        with started(context) as model:
+            if not model.state_count:
+                return skipped(_NO_STATES)
+            x = model.states()
+            before = model.derivatives()
+            moved = _moved(x)
+            model.set_states(moved)
+            if not np.array_equal(model.states(), moved):
+                return failed("continuous states that were set are not what is read back")
+            model.derivatives()
+            model.set_states(x)
+            if not np.array_equal(model.derivatives(), before, equal_nan=True):
+                return failed("the derivatives at the same states differ after a visit elsewhere")
+        return passed("states are read back, derivatives at the same states are identical")
 
 
 class ModelExchangeResetAndReRunCheck(Check):
-    """The check *model exchange: reset and re-run*."""
+    """After a reset the same path has the identical derivatives."""
 
     name = "model exchange: reset and re-run"
     failing = LIMIT
     advice = "make a new instance for each run"
     interface = MODEL_EXCHANGE
     place = 6
-    run = staticmethod(reset)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        with started(context) as model:
+            if not model.state_count:
+                return skipped(_NO_STATES)
+            first = _path(model, context)
+            model.terminate()
+            model.reset()
+            _start(model, context)
+            second = _path(model, context)
+        same = np.array_equal(first, second, equal_nan=True)
+        return by(
+            "" if same else "after a reset the same states have other derivatives",
+            "the same after a reset is identical",
+        )
 
 
 class ModelExchangeStateRoundTripCheck(Check):
-    """The check *model exchange: state round trip*."""
+    """Save, integrate on, restore, integrate again: bit-identical."""
 
     name = "model exchange: state round trip"
     failing = LIMIT
     advice = "do not rely on saved states"
     interface = MODEL_EXCHANGE
     place = 7
-    run = staticmethod(round_trip)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        with started(context) as model:
+            if not model.can_save:
+                return skipped("does not declare canGetAndSetFMUstate")
+            if not model.state_count:
+                return skipped(_NO_STATES)
+            state = model.save()
+            try:
+                first = _path(model, context)
+                model.restore(state)
+                second = _path(model, context)
+            finally:
+                model.release(state)
+        same = np.array_equal(first, second, equal_nan=True)
+        return by(
+            "" if same else "after a restored state the same states have other derivatives", "what follows is identical"
+        )
 
 
 class ModelExchangeDirectionalDerivativesCheck(Check):
-    """The check *model exchange: directional derivatives*."""
+    """Directional derivatives of derivatives and outputs along states and inputs."""
 
     name = "model exchange: directional derivatives"
     failing = LIMIT
     advice = "do not use its derivatives"
     interface = MODEL_EXCHANGE
     place = 8
-    run = staticmethod(directional)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if not context.description.modelExchange.providesDirectionalDerivative:
+            return skipped("does not declare providesDirectionalDerivative")
+        with started(context) as model:
+            found = [(u.variable, getattr(u.variable, "derivative", None)) for u in model.description.derivatives]
+            scalar = [(rate.name, of.name) for rate, of in found if of is not None and not rate.shape]
+            inputs, outputs = real_names(model, "input"), real_names(model, "output")
+            unknowns, state_names = [*(r for r, _ in scalar), *outputs], [s for _, s in scalar]
+            if len(scalar) != model.state_count or not unknowns or not (state_names or inputs):
+                return skipped("has no pair of a scalar unknown and a scalar known")
+            x = _moved(model.states())
+            u = model.read(inputs)
+            values = dict(zip([*state_names, *inputs], [*x.tolist(), *u.tolist()], strict=True))
+            write, buffer = model.writer(inputs)
+
+            def evaluate(name: str, value: float) -> np.ndarray:
+                point = [value if n == name else v for n, v in values.items()]
+                model.set_states(np.array(point[: len(x)]))
+                buffer[:] = point[len(x) :]
+                write()
+                return model.read(unknowns)
+
+            evaluate("", 0.0)
+
+            def said(name: str) -> np.ndarray:
+                evaluate("", 0.0)
+                return model.directional_derivative(unknowns, [name], [1.0])
+
+            return compare(evaluate, said, values, unknowns, {n: nominal_of(model.variables[n]) for n in values})

@@ -24,59 +24,6 @@ _LEAK = 16 * 1024
 """Growth of memory for each instance that is taken for a leak [bytes]; a few pages each are the allocator's own."""
 
 
-def _repeated_instantiation(context: Context) -> CheckOutcome:
-    """Many instances, one after the other: memory and open files must not grow.
-
-    Args:
-        context: what is checked.
-    """
-    if context.only_once:
-        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-    slave = context.slave()
-    since, marks = perf_counter(), []
-    try:
-        for count in range(1, _INSTANCES + 1):
-            slave.instantiate()
-            slave.enter_initialization(context.start_time, end_of_experiment(context.description, context.start_time))
-            slave.exit_initialization()
-            slave.free_instance_only()
-            if count in (_FIRST_INSTANCES, _INSTANCES):
-                marks.append((count, _resident_bytes(), _open_files()))
-            elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > _FIRST_INSTANCES:
-                marks.append((count, _resident_bytes(), _open_files()))
-                break
-    finally:
-        slave.free()
-    if len(marks) < 2:
-        return skipped(f"instances take too long to make {_FIRST_INSTANCES + 1} of them; use a longer --timeout")
-    return _growth(*marks)
-
-
-def _two_instances(context: Context) -> CheckOutcome:
-    """Two instances at once, under different inputs, step by step in turn: the first one must not notice.
-
-    Args:
-        context: what is checked.
-    """
-    if context.only_once:
-        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-    runner, other = context.runner, context.fresh_bench()
-    runner.begin()
-    alone = runner.steps((runner.h,) * (2 * WARM_UP_STEPS))
-    try:
-        runner.begin()
-        other.begin()
-        other.set_inputs(elsewhere(runner.amplitude))
-        beside = []
-        for _ in alone:
-            other.steps((runner.h,))
-            beside += runner.steps((runner.h,))
-    finally:
-        other.put_away()
-    problem = difference(runner, alone, beside)
-    return by(problem and f"beside a second instance {problem}", "a second instance changes nothing in the first")
-
-
 # -- what the process holds ------------------------------------------------------------------------------------------
 
 
@@ -117,21 +64,66 @@ def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | No
 
 
 class TwoInstancesCheck(Check):
-    """The check *two instances*."""
+    """Two instances at once, under different inputs, step by step in turn: the first one must not notice."""
 
     name = "two instances"
     failing = LIMIT
     advice = ONE_INSTANCE
     compares = True
     place = 14
-    run = staticmethod(_two_instances)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if context.only_once:
+            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+        runner, other = context.runner, context.fresh_runner()
+        runner.begin()
+        alone = runner.steps((runner.h,) * (2 * WARM_UP_STEPS))
+        try:
+            runner.begin()
+            other.begin()
+            other.set_inputs(elsewhere(runner.amplitude))
+            beside = []
+            for _ in alone:
+                other.steps((runner.h,))
+                beside += runner.steps((runner.h,))
+        finally:
+            other.put_away()
+        problem = difference(runner, alone, beside)
+        return by(problem and f"beside a second instance {problem}", "a second instance changes nothing in the first")
 
 
 class RepeatedInstantiationCheck(Check):
-    """The check *repeated instantiation*."""
+    """Many instances, one after the other: memory and open files must not grow."""
 
     name = "repeated instantiation"
     failing = LIMIT
     advice = "do not make many instances in one process"
     place = 15
-    run = staticmethod(_repeated_instantiation)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if context.only_once:
+            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+        slave = context.slave()
+        since, marks = perf_counter(), []
+        try:
+            for count in range(1, _INSTANCES + 1):
+                slave.instantiate()
+                slave.enter_initialization(
+                    context.start_time, end_of_experiment(context.description, context.start_time)
+                )
+                slave.exit_initialization()
+                slave.free_instance_only()
+                if count in (_FIRST_INSTANCES, _INSTANCES):
+                    marks.append((count, _resident_bytes(), _open_files()))
+                elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > _FIRST_INSTANCES:
+                    marks.append((count, _resident_bytes(), _open_files()))
+                    break
+        finally:
+            slave.free()
+        if len(marks) < 2:
+            return skipped(f"instances take too long to make {_FIRST_INSTANCES + 1} of them; use a longer --timeout")
+        return _growth(*marks)

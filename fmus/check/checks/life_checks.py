@@ -27,16 +27,6 @@ UNSEEN = "what it does when it moves was not seen: give start values (--start) o
 NAMES_SHOWN = 4
 
 
-def loading(context: Context) -> CheckOutcome:
-    """The library can be loaded here, with all that it needs.
-
-    Args:
-        context: what is checked.
-    """
-    context.slave().free()
-    return passed("the library and what it needs are loaded")
-
-
 def exported_symbols(instance: FmuInstance) -> CheckOutcome:
     """The functions of the standard that the library exports, against what the FMU declares.
 
@@ -59,101 +49,12 @@ def exported_symbols(instance: FmuInstance) -> CheckOutcome:
     return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
 
 
-def _slave_symbols(context: Context) -> CheckOutcome:
-    """`exported_symbols` for co-simulation.
-
-    Args:
-        context: what is checked.
-    """
-    return exported_symbols(context.slave())
-
-
-def initialise(context: Context) -> CheckOutcome:
-    """Instantiate, initialise, terminate, free.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.quiet_bench()
-    try:
-        runner.begin(excited=False)
-    finally:
-        runner.put_away()
-    return passed("instantiates, initialises, terminates and is freed")
-
-
-def _values_at_start(context: Context) -> CheckOutcome:
-    """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.quiet_bench()
-    try:
-        runner.begin(excited=False)
-        slave = runner.component
-        outputs, locals_ = slave.names("output"), slave.names("local")
-        bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
-        bad_locals = not_finite(locals_, slave.read(locals_))
-    finally:
-        runner.put_away()
-    if bad_outputs:
-        return failed(f"not finite after initialisation: {listed(bad_outputs)}")
-    if bad_locals:
-        return noted(f"not finite after initialisation: the local variables {listed(bad_locals)}")
-    return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
-
-
-def getters(context: Context) -> CheckOutcome:
-    """Every variable can be read by the getter of its type.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.quiet_bench()
-    try:
-        runner.begin(excited=False)
-        slave = runner.component
-        own = [v for v in slave.description.modelVariables if v.alias is None]
-        readable = [v for v in own if v.type != "Clock" and not v.clocks]
-        problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
-    finally:
-        runner.put_away()
-    left_out = len(own) - len(readable)
-    note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
-    if problems:
-        return failed(f"{len(problems)} of {len(readable)} variables cannot be read: {problems[0]}{note}")
-    return passed(f"{len(readable)} variables are read{note}")
-
-
 def _unreadable(slave: Instance, variable: ModelVariable) -> str:
     try:
         slave.get(variable)
     except SlaveError as error:
         return str(error)
     return ""
-
-
-def stepping(context: Context) -> CheckOutcome:
-    """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
-    values.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.runner
-    try:
-        return _run(context)
-    except SlaveError as error:
-        if not runner.amplitude:
-            raise
-        broken, runner.amplitude, runner.spread, runner.excited = str(error), 0.0, 0.0, False
-    outcome = _run(context)
-    if outcome.verdict is Verdict.DISTRUST:
-        return outcome
-    return limited(
-        f"{outcome.detail}; under other inputs: {broken}", "keep its inputs in the range that it was made for"
-    )
 
 
 def _run(context: Context) -> CheckOutcome:
@@ -183,76 +84,6 @@ def _run(context: Context) -> CheckOutcome:
         f"inputs {runner.amplitude:g} above their start values" if runner.amplitude else "inputs at their start values"
     )
     return passed(f"{done}, {above}{late}")
-
-
-def repeated(context: Context) -> CheckOutcome:
-    """Two instances, one after the other, under the same inputs: identical outputs.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.runner
-    pattern = (runner.h,) * (2 * WARM_UP_STEPS)
-    runner.begin()
-    first = runner.steps(pattern)
-    runner.begin()
-    problem = difference(runner, first, runner.steps(pattern))
-    return by(problem and f"in a second run {problem}", "a second run is identical")
-
-
-def reset(context: Context) -> CheckOutcome:
-    """After a reset the same steps give the identical outputs.
-
-    Args:
-        context: what is checked.
-    """
-    return by(repeatable(context.runner), "the same run after a reset is identical")
-
-
-def logging(context: Context) -> CheckOutcome:
-    """The outputs must not depend on whether the FMU is asked to log.
-
-    Args:
-        context: what is checked.
-    """
-    if context.only_once:
-        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-    runner = context.runner
-    runner.begin()
-    quiet = runner.steps((runner.h,) * WARM_UP_STEPS)
-    talking = runner.twin(lambda: context.slave(logging=True))
-    try:
-        talking.begin()
-        loud = talking.steps((runner.h,) * WARM_UP_STEPS)
-    finally:
-        talking.put_away()
-    problem = difference(runner, quiet, loud)
-    return by(problem and f"with logging on {problem}", "logging changes no output")
-
-
-def _time_per_step(context: Context) -> CheckOutcome:
-    """Median time of one step.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.runner
-    runner.begin()
-    seconds: list[float] = []
-    advance, since = runner.component.advance, perf_counter()
-    most = min(_TIMED_STEPS, max(context.steps, 1))
-    while (
-        len(seconds) < most
-        and not runner.component.terminated
-        and perf_counter() - since < SHARE_OF_BUDGET * context.budget
-    ):
-        t = runner.t0 + len(seconds) * runner.h
-        begin = perf_counter()
-        advance(t, t + runner.h)
-        seconds.append(perf_counter() - begin)
-    return passed(
-        f"median {median(seconds) * 1e6:.3g} microseconds for a step of {runner.h:g} s, the call from Python included"
-    )
 
 
 # -- helpers
@@ -305,102 +136,221 @@ def real_names(instance: Instance, causality: str) -> list[str]:
 
 
 class LoadingCheck(Check):
-    """The check *loading*."""
+    """The library can be loaded here, with all that it needs."""
 
     name = "loading"
     failing = DISTRUST
     basis = True
     place = 1
-    run = staticmethod(loading)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        context.slave().free()
+        return passed("the library and what it needs are loaded")
 
 
 class ExportedSymbolsCheck(Check):
-    """The check *exported symbols*."""
+    """`exported_symbols` for co-simulation."""
 
     name = "exported symbols"
     failing = LIMIT
     advice = MISSING
     place = 2
-    run = staticmethod(_slave_symbols)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return exported_symbols(context.slave())
 
 
 class InitialiseCheck(Check):
-    """The check *initialise*."""
+    """Instantiate, initialise, terminate, free."""
 
     name = "initialise"
     failing = DISTRUST
     advice = "give start values, if it needs some"
     basis = True
     place = 3
-    run = staticmethod(initialise)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.quiet_runner()
+        try:
+            runner.begin(excited=False)
+        finally:
+            runner.put_away()
+        return passed("instantiates, initialises, terminates and is freed")
 
 
 class ValuesAtStartCheck(Check):
-    """The check *values at start*."""
+    """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs."""
 
     name = "values at start"
     failing = LIMIT
     advice = "give start values, so that what it feeds does not begin with these"
     place = 4
-    run = staticmethod(_values_at_start)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.quiet_runner()
+        try:
+            runner.begin(excited=False)
+            slave = runner.component
+            outputs, locals_ = slave.names("output"), slave.names("local")
+            bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
+            bad_locals = not_finite(locals_, slave.read(locals_))
+        finally:
+            runner.put_away()
+        if bad_outputs:
+            return failed(f"not finite after initialisation: {listed(bad_outputs)}")
+        if bad_locals:
+            return noted(f"not finite after initialisation: the local variables {listed(bad_locals)}")
+        return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
 
 
 class GettersCheck(Check):
-    """The check *getters*."""
+    """Every variable can be read by the getter of its type."""
 
     name = "getters"
     failing = LIMIT
     advice = "leave these variables out of connections and recordings"
     place = 5
-    run = staticmethod(getters)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.quiet_runner()
+        try:
+            runner.begin(excited=False)
+            slave = runner.component
+            own = [v for v in slave.description.modelVariables if v.alias is None]
+            readable = [v for v in own if v.type != "Clock" and not v.clocks]
+            problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
+        finally:
+            runner.put_away()
+        left_out = len(own) - len(readable)
+        note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
+        if problems:
+            return failed(f"{len(problems)} of {len(readable)} variables cannot be read: {problems[0]}{note}")
+        return passed(f"{len(readable)} variables are read{note}")
 
 
 class SteppingCheck(Check):
-    """The check *stepping*."""
+    """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
+    values.
+    """
 
     name = "stepping"
     failing = DISTRUST
     basis = True
     place = 6
-    run = staticmethod(stepping)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.runner
+        try:
+            return _run(context)
+        except SlaveError as error:
+            if not runner.amplitude:
+                raise
+            broken, runner.amplitude, runner.spread, runner.excited = str(error), 0.0, 0.0, False
+        outcome = _run(context)
+        if outcome.verdict is Verdict.DISTRUST:
+            return outcome
+        return limited(
+            f"{outcome.detail}; under other inputs: {broken}", "keep its inputs in the range that it was made for"
+        )
 
 
 class RepeatedRunCheck(Check):
-    """The check *repeated run*."""
+    """Two instances, one after the other, under the same inputs: identical outputs."""
 
     name = "repeated run"
     failing = LIMIT
     advice = "give each run a fresh process, and compare no two runs digit by digit"
     place = 7
-    run = staticmethod(repeated)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.runner
+        pattern = (runner.h,) * (2 * WARM_UP_STEPS)
+        runner.begin()
+        first = runner.steps(pattern)
+        runner.begin()
+        problem = difference(runner, first, runner.steps(pattern))
+        return by(problem and f"in a second run {problem}", "a second run is identical")
 
 
 class ResetAndReRunCheck(Check):
-    """The check *reset and re-run*."""
+    """After a reset the same steps give the identical outputs."""
 
     name = "reset and re-run"
     failing = LIMIT
     advice = "make a new instance for each run"
     compares = True
     place = 8
-    run = staticmethod(reset)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return by(repeatable(context.runner), "the same run after a reset is identical")
 
 
 class LoggingCheck(Check):
-    """The check *logging*."""
+    """The outputs must not depend on whether the FMU is asked to log."""
 
     name = "logging"
     failing = LIMIT
     advice = "leave its logging off"
     compares = True
     place = 16
-    run = staticmethod(logging)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if context.only_once:
+            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+        runner = context.runner
+        runner.begin()
+        quiet = runner.steps((runner.h,) * WARM_UP_STEPS)
+        talking = runner.twin(lambda: context.slave(logging=True))
+        try:
+            talking.begin()
+            loud = talking.steps((runner.h,) * WARM_UP_STEPS)
+        finally:
+            talking.put_away()
+        problem = difference(runner, quiet, loud)
+        return by(problem and f"with logging on {problem}", "logging changes no output")
 
 
 class TimePerStepCheck(Check):
-    """The check *time per step*."""
+    """Median time of one step."""
 
     name = "time per step"
     failing = NOTE
     place = 24
-    run = staticmethod(_time_per_step)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.runner
+        runner.begin()
+        seconds: list[float] = []
+        advance, since = runner.component.advance, perf_counter()
+        most = min(_TIMED_STEPS, max(context.steps, 1))
+        while (
+            len(seconds) < most
+            and not runner.component.terminated
+            and perf_counter() - since < SHARE_OF_BUDGET * context.budget
+        ):
+            t = runner.t0 + len(seconds) * runner.h
+            begin = perf_counter()
+            advance(t, t + runner.h)
+            seconds.append(perf_counter() - begin)
+        middle = f"median {median(seconds) * 1e6:.3g} microseconds"
+        return passed(f"{middle} for a step of {runner.h:g} s, the call from Python included")

@@ -15,42 +15,6 @@ WITHIN = "steps may be redone, and what is redone differs by as much; the master
 _NOT_SERIALISED = "does not declare canSerializeFMUstate"
 
 
-def round_trip(context: Context) -> CheckOutcome:
-    """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else.
-
-    Args:
-        context: what is checked.
-    """
-    if not context.runner.component.can_save:
-        return skipped(_NO_STATE)
-    found = restoring(context.runner)
-    if found.restores == "exact":
-        return passed("what follows a restored state is identical, bit for bit")
-    if found.restores == "within_tolerance":
-        return limited(f"{found.problem}; within the tolerance of its solver, {found.mismatch:.1g} of its size", WITHIN)
-    return failed(f"not restored: {found.problem}")
-
-
-def serialised(context: Context) -> CheckOutcome:
-    """The same through bytes, in the same instance.
-
-    Args:
-        context: what is checked.
-    """
-    return _through_bytes(context, elsewhere=False)
-
-
-def _other_instance(context: Context) -> CheckOutcome:
-    """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from.
-
-    Args:
-        context: what is checked.
-    """
-    if context.only_once:
-        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-    return _through_bytes(context, elsewhere=True)
-
-
 def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
     runner = context.runner
     slave = runner.component
@@ -61,7 +25,7 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
     runner.steps((runner.h,) * WARM_UP_STEPS)
     content, saved_at = _saved(runner.component), runner.now
     first = runner.steps(path)
-    target = context.fresh_bench() if elsewhere else runner
+    target = context.fresh_runner() if elsewhere else runner
     try:
         if elsewhere:
             target.begin()
@@ -98,33 +62,56 @@ def _restore(slave: Slave, content: bytes) -> None:
 
 
 class StateRoundTripCheck(Check):
-    """The check *state round trip*."""
+    """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else."""
 
     name = "state round trip"
     failing = LIMIT
     advice = NO_REDOING
     compares = True
     place = 11
-    run = staticmethod(round_trip)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if not context.runner.component.can_save:
+            return skipped(_NO_STATE)
+        found = restoring(context.runner)
+        if found.restores == "exact":
+            return passed("what follows a restored state is identical, bit for bit")
+        if found.restores == "within_tolerance":
+            return limited(
+                f"{found.problem}; within the tolerance of its solver, {found.mismatch:.1g} of its size", WITHIN
+            )
+        return failed(f"not restored: {found.problem}")
 
 
 class SerialisedStateCheck(Check):
-    """The check *serialised state*."""
+    """The same through bytes, in the same instance."""
 
     name = "serialised state"
     failing = LIMIT
     advice = NO_BYTES
     compares = True
     place = 12
-    run = staticmethod(serialised)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return _through_bytes(context, elsewhere=False)
 
 
 class StateInAnotherInstanceCheck(Check):
-    """The check *state in another instance*."""
+    """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from."""
 
     name = "state in another instance"
     failing = LIMIT
     advice = NO_BYTES
     compares = True
     place = 13
-    run = staticmethod(_other_instance)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if context.only_once:
+            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+        return _through_bytes(context, elsewhere=True)

@@ -21,81 +21,6 @@ _BEFORE = 3
 _NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
 
 
-def divided(context: Context) -> CheckOutcome:
-    """A step of h against 2 x h/2 and an uneven split, for several h.
-
-    Args:
-        context: what is checked.
-    """
-    runner = context.runner
-    if not runner.component.can_vary_step:
-        return skipped(_NO_VARIABLE_STEP)
-    for scale in SCALES:
-        problem = divided_steps(runner, scale)
-        if problem:
-            return failed(problem)
-    return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * runner.h:g}' for s in SCALES)} s")
-
-
-def short(context: Context) -> CheckOutcome:
-    """The first change after a short step.
-
-    Args:
-        context: what is checked.
-    """
-    if not context.runner.component.can_vary_step:
-        return skipped(_NO_VARIABLE_STEP)
-    return by(short_step(context.runner), "tiny steps after a short one move the outputs by their share")
-
-
-def tiny(context: Context) -> CheckOutcome:
-    """A step of a billionth of a second.
-
-    Args:
-        context: what is checked.
-    """
-    if not context.runner.component.can_vary_step:
-        return skipped(_NO_VARIABLE_STEP)
-    return _odd(context, lambda _h: TINY, _done_or_refused)
-
-
-def huge(context: Context) -> CheckOutcome:
-    """A step a thousand times the communication step, or to the end of the experiment.
-
-    Args:
-        context: what is checked.
-    """
-    left = context.runner.end - context.start_time - _BEFORE * context.step
-    return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
-
-
-def zero(context: Context) -> CheckOutcome:
-    """A step of length zero, which the standard does not know.
-
-    Args:
-        context: what is checked.
-    """
-    return _odd(context, lambda _h: 0.0, _still_or_refused)
-
-
-def negative(context: Context) -> CheckOutcome:
-    """A step back in time, which the standard forbids.
-
-    Args:
-        context: what is checked.
-    """
-    return _odd(context, lambda h: -h, _must_refuse)
-
-
-def _wrong_time(context: Context) -> CheckOutcome:
-    """A step from a currentCommunicationPoint where the FMU does not stand.
-
-    Args:
-        context: what is checked.
-    """
-    return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
-
-
 Judge = Callable[[str, bool, str], CheckOutcome]
 
 
@@ -103,7 +28,7 @@ def _odd(
     context: Context, size: Callable[[float], float], judge: Judge, shift: Callable[[float], float] = lambda _h: 0.0
 ) -> CheckOutcome:
     """One odd step on an instance of its own after three ordinary ones; the judge says what it thinks of it."""
-    runner = context.fresh_bench()
+    runner = context.fresh_runner()
     try:
         runner.begin()
         before = runner.steps((runner.h,) * _BEFORE)[-1]
@@ -145,72 +70,112 @@ def _must_refuse(what: str, moved: bool, bad: str) -> CheckOutcome:
 
 
 class DividedStepsCheck(Check):
-    """The check *divided steps*."""
+    """A step of h against 2 x h/2 and an uneven split, for several h."""
 
     name = "divided steps"
     failing = LIMIT
     advice = FIXED_STEP
     compares = True
     place = 9
-    run = staticmethod(divided)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        runner = context.runner
+        if not runner.component.can_vary_step:
+            return skipped(_NO_VARIABLE_STEP)
+        for scale in SCALES:
+            problem = divided_steps(runner, scale)
+            if problem:
+                return failed(problem)
+        return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * runner.h:g}' for s in SCALES)} s")
 
 
 class ShortStepCheck(Check):
-    """The check *short step*."""
+    """The first change after a short step."""
 
     name = "short step"
     failing = LIMIT
     advice = FIXED_STEP
     compares = True
     place = 10
-    run = staticmethod(short)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if not context.runner.component.can_vary_step:
+            return skipped(_NO_VARIABLE_STEP)
+        return by(short_step(context.runner), "tiny steps after a short one move the outputs by their share")
 
 
 class TinyStepCheck(Check):
-    """The check *tiny step*."""
+    """A step of a billionth of a second."""
 
     name = "tiny step"
     failing = LIMIT
     advice = "use no step far below its communication step"
     place = 19
-    run = staticmethod(tiny)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        if not context.runner.component.can_vary_step:
+            return skipped(_NO_VARIABLE_STEP)
+        return _odd(context, lambda _h: TINY, _done_or_refused)
 
 
 class HugeStepCheck(Check):
-    """The check *huge step*."""
+    """A step a thousand times the communication step, or to the end of the experiment."""
 
     name = "huge step"
     failing = NOTE
     advice = "use no step far above its communication step"
     place = 20
-    run = staticmethod(huge)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        left = context.runner.end - context.start_time - _BEFORE * context.step
+        return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
 
 
 class ZeroStepCheck(Check):
-    """The check *zero step*."""
+    """A step of length zero, which the standard does not know."""
 
     name = "zero step"
     failing = NOTE
     advice = "never send a step of length zero, as some masters do"
     place = 21
-    run = staticmethod(zero)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return _odd(context, lambda _h: 0.0, _still_or_refused)
 
 
 class NegativeStepCheck(Check):
-    """The check *negative step*."""
+    """A step back in time, which the standard forbids."""
 
     name = "negative step"
     failing = NOTE
     advice = "never send a negative step"
     place = 22
-    run = staticmethod(negative)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return _odd(context, lambda h: -h, _must_refuse)
 
 
 class StepFromElsewhereCheck(Check):
-    """The check *step from elsewhere*."""
+    """A step from a currentCommunicationPoint where the FMU does not stand."""
 
     name = "step from elsewhere"
     failing = NOTE
     advice = "never step it from where it does not stand"
     place = 23
-    run = staticmethod(_wrong_time)
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        """Make it."""
+        return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
