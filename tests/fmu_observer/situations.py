@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from observer_runner import SteadyMotion
 from scipy.integrate import solve_ivp
+from shipped import shipped
 
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
@@ -94,7 +95,7 @@ class Follower:
 
 def situation(name: str) -> Situation | None:
     """The situation of a registered observer, or None where it is no observer (a detector)."""
-    system = OBSERVERS[name]()
+    system = shipped(name)
     for kind, make in KINDS.items():
         if isinstance(system, kind):
             return make(system)

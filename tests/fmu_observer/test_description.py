@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from block_systems import SWING, Doorman, Swing
 from fmpy.model_description import ModelDescription, ModelVariable
+from shipped import shipped
 
 from fmu_observer import OBSERVERS, description
 from fmu_observer.description import STAMP_NOW, VariableTable, can_exchange, exposed_inputs, referenced
@@ -19,7 +20,7 @@ from plant_models.hybrid import CommunicationEvent, HybridSystem, output_signal,
 from plant_models.hybrid.units import parse_unit
 
 BOTH = pytest.mark.parametrize("version", [2, 3])
-SHIPPED: list[HybridSystem] = [cls() for cls in (*PLANTS.values(), *OBSERVERS.values())]
+SHIPPED: list[HybridSystem] = [shipped(name) for name in (*PLANTS, *OBSERVERS)]
 
 describe = cache(description.describe)
 """Once for each system, version and options: it traces the system."""

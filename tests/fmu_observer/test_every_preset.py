@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from observer_runner import SteadyMotion
+from shipped import shipped
 from situations import Follower, Situation, observers
 
 from fmu_observer import OBSERVERS
@@ -21,7 +22,7 @@ from fmu_observer.observers.motors.motor_filter import MotorFilter
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
-MADE: dict[str, HybridSystem] = {name: OBSERVERS[name]() for name in OBSERVERS}
+MADE: dict[str, HybridSystem] = {name: shipped(name) for name in OBSERVERS}
 CASES = [(name, preset) for name, system in MADE.items() for preset in system.presets or (None,)]
 KNOWN = observers()
 TRAINS = [c for c in CASES if ".observers.train." in type(MADE[c[0]]).__module__ and not hasattr(MADE[c[0]], "model")]

@@ -5,6 +5,7 @@ journeys.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -240,7 +241,11 @@ RULE = adaptation()
 WIDE = adaptation(
     theta_min=0.02, theta_max=8.0, acceleration=1.0, speed_tolerance=0.0, spacing_tolerance=0.0
 )  # changes decide here
-LIMIT = certify_adapting_gain(RULE, 1.0, "model").aperiodic_limit
+
+
+@cache
+def limit() -> float:
+    return certify_adapting_gain(RULE, 1.0, "model").aperiodic_limit
 
 
 @settings(max_examples=40, deadline=None)
@@ -252,10 +257,11 @@ LIMIT = certify_adapting_gain(RULE, 1.0, "model").aperiodic_limit
 def test_no_journey_contradicts_the_certificate(
     choices: list[tuple[float, float, float, float]], slope: float, share: float
 ) -> None:
-    certificate = certify_adapting_gain(RULE, share * LIMIT, "model")
+    longest = share * limit()
+    certificate = certify_adapting_gain(RULE, longest, "model")
     assert certificate.holds
-    steps = list(journey_of(RULE, share * LIMIT, choices))
-    assert max(gap for gap, _ in steps) <= share * LIMIT * (1.0 + 1e-9)
+    steps = list(journey_of(RULE, longest, choices))
+    assert max(gap for gap, _ in steps) <= longest * (1.0 + 1e-9)
     P = np.array(certificate.lyapunov_matrix)
     assert all(growth(RULE, P, gap, theta, following, slope) < 1.0 for (gap, theta), (_, following) in pairwise(steps))
 
@@ -293,12 +299,12 @@ def test_hard_braking_and_hard_acceleration_do_not_contradict_it(rule: GainAdapt
 
 
 def test_the_bounds_of_speed_times_gap_are_reached_and_no_more() -> None:
-    low, high = RULE.expected_share(np.zeros(1), np.full(1, LIMIT), LIMIT)
-    slow = RULE.slowest_speed(LIMIT)
-    assert high[0] == pytest.approx(1.05 * max(v * gap / 100.0 for v, gap in braking(RULE, LIMIT, 105.0)), rel=1e-3)
-    assert low[0] == pytest.approx(0.95 * min(slow * gap / 100.0 for _, gap in braking(RULE, LIMIT, 95.0)), rel=1e-3)
+    low, high = RULE.expected_share(np.zeros(1), np.full(1, limit()), limit())
+    slow = RULE.slowest_speed(limit())
+    assert high[0] == pytest.approx(1.05 * max(v * gap / 100.0 for v, gap in braking(RULE, limit(), 105.0)), rel=1e-3)
+    assert low[0] == pytest.approx(0.95 * min(slow * gap / 100.0 for _, gap in braking(RULE, limit(), 95.0)), rel=1e-3)
     gap = 4.0  # too short to reach the slowest speed: constant braking, constant acceleration
-    low, high = RULE.expected_share(np.full(1, gap), np.full(1, gap), LIMIT)
+    low, high = RULE.expected_share(np.full(1, gap), np.full(1, gap), limit())
     assert high[0] == pytest.approx(1.05 * (105.0 + 0.35 * gap**2) / 100.0)
     assert low[0] == pytest.approx(0.95 * (95.0 - 0.35 * gap**2) / 100.0)
 

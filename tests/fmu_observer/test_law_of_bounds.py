@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from observer_runner import SystemRunner
+from shipped import shipped
 
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.bounds.worst_case import worst_case
@@ -23,12 +24,12 @@ CERTIFIED = GapCertified.limits
 
 def bounds_of(name: str) -> dict[str, str]:
     """Outputs that are called bounds of an error, and the output that is in error."""
-    told = {s.name: s.description for s in OBSERVERS[name]().outputs if "bound" in s.name and s.unit in ("m", "m/s")}
+    told = {s.name: s.description for s in shipped(name).outputs if "bound" in s.name and s.unit in ("m", "m/s")}
     assert all(text.startswith(PREFIX) for text in told.values()), f"{name}: of what are these bounds? {told}"
     return {bound: text.removeprefix(PREFIX).split()[0] for bound, text in told.items()}
 
 
-CASES = [(name, preset) for name in OBSERVERS if bounds_of(name) for preset in OBSERVERS[name]().presets]
+CASES = [(name, preset) for name in OBSERVERS if bounds_of(name) for preset in shipped(name).presets]
 
 
 def random_motion(seed: int, rate: float) -> Callable[[float], float]:

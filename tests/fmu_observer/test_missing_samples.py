@@ -11,6 +11,7 @@ import pytest
 from filterpy.kalman import KalmanFilter as TheirFilter
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipped import shipped
 
 from fmu_observer import OBSERVERS
 from fmu_observer.models.filter_models import FilterModel, Known
@@ -28,7 +29,7 @@ PERIOD, COUNT = 0.1, 40
 
 
 def sampling_events(name: str) -> list[Any]:
-    return [e for e in OBSERVERS[name]().events if getattr(e, "samples", ())]
+    return [e for e in shipped(name).events if getattr(e, "samples", ())]
 
 
 SAMPLING = [(name, event.name) for name in NAMES for event in sampling_events(name)]

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from shipped import shipped
 
 import cosim
 from fmu_observer.models.filter_models import FilterModel, Known
@@ -56,7 +57,7 @@ def serving() -> list[str]:
     """Plants that can be the model of a filter, by the one output that is named first."""
     found = []
     for name in PLANTS:
-        system = PLANTS[name]()
+        system = shipped(name)
         names = scalar_names(system.outputs)
         try:
             model = system_model(system, names[:1]) if names and system.traceable else None

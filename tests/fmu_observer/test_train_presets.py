@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from shipped import shipped
 
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.parameter_values import parameter_values
@@ -24,7 +25,7 @@ NAMES = ("mass", "davis_a", "davis_b", "davis_c")
 
 def train_observers() -> dict[str, HybridSystem]:
     """All registered observers of a train that are told of its mass, or of its odometer."""
-    made = {name: OBSERVERS[name]() for name in OBSERVERS}
+    made = {name: shipped(name) for name in OBSERVERS}
     return {name: system for name, system in made.items() if ".observers.train." in type(system).__module__}
 
 

@@ -15,10 +15,11 @@ from exchange_importer import INSTANCE, Exchange, description_of
 from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
+from shipped import shipped
 
 from fmu_observer.description import can_exchange
 from fmu_observer.event_protocol import EventProtocol
-from fmus import RECIPES, cached_fmu, recipe
+from fmus import RECIPES, cached_fmu
 from plant_models.hybrid import (
     CommunicationEvent,
     HybridSystem,
@@ -260,7 +261,7 @@ SHIPPED = tuple(RECIPES)
 @cache
 def make_system(name: str) -> HybridSystem:
     """A small system of this file, or one that ships: one object in a process, so that it is traced once."""
-    return SMALL[name]() if name in SMALL else recipe(name)
+    return SMALL[name]() if name in SMALL else shipped(name)
 
 
 def kind(system: HybridSystem) -> tuple[object, ...]:

@@ -13,16 +13,17 @@ from exchange_importer import Exchange
 from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipped import shipped
 
 from fmu_observer.block import make_block
 from fmu_observer.description import can_exchange
-from fmus import RECIPES, recipe
+from fmus import RECIPES
 from plant_models.hybrid import HybridSystem, TracedSystem, output_signal, scalar_names, state
 
 pytestmark = pytest.mark.compiler
 
 SMALL = ("oscillator", "slider", "sampler", "tracker", "gain")
-EXCHANGED = (*SMALL, *(n for n in RECIPES if can_exchange(recipe(n))))
+EXCHANGED = (*SMALL, *(n for n in RECIPES if can_exchange(shipped(n))))
 POINTS = settings(max_examples=6, deadline=None, derandomize=True)
 RAW = {2: "Real", 3: "Float64"}
 

@@ -19,6 +19,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
+from shipped import shipped
 
 from fmu_observer.description import can_exchange
 from fmu_observer.event_protocol import EventProtocol
@@ -31,7 +32,7 @@ pytestmark = pytest.mark.compiler
 
 REPLAY, REJECT, LATE = 1, 2, 3
 DISCARD, ERROR = 2, 3
-EXCHANGED = ("oscillator", "slider", "sampler", "tracker", "gain", *(n for n in RECIPES if can_exchange(recipe(n))))
+EXCHANGED = ("oscillator", "slider", "sampler", "tracker", "gain", *(n for n in RECIPES if can_exchange(shipped(n))))
 
 
 class Root(HybridSystem):

@@ -13,6 +13,7 @@ import pytest
 from exchange_importer import Exchange, Importer, Told
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
+from shipped import shipped
 
 from fmu_observer.block import make_block
 from fmu_observer.description import can_exchange
@@ -23,7 +24,7 @@ from plant_models.railway.vehicle import Train
 pytestmark = pytest.mark.compiler
 
 SMALL = ("oscillator", "slider", "sampler", "tracker", "gain", "booster")
-EXCHANGED = (*SMALL, *(name for name in RECIPES if can_exchange(recipe(name))))
+EXCHANGED = (*SMALL, *(name for name in RECIPES if can_exchange(shipped(name))))
 """Everything that has model exchange; the balise reader, which works on communication steps, has none."""
 
 STEP, STEPS = 0.1, 10

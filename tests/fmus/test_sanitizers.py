@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from c_hosts import SANITIZE, Unpacked, compile_host, run
 from life_wirings import MODELS, life_wiring
+from shipped import shipped
 
 from fmu_observer.description import can_exchange
 from fmus import cached_fmu, recipe
@@ -71,7 +72,7 @@ def test_damaged_states_are_refused_or_harmless(
 
 
 @pytest.mark.parametrize("version", [2, 3])
-@pytest.mark.parametrize("name", [name for name in MODELS if can_exchange(recipe(name)) and name != "multirate_cdo"])
+@pytest.mark.parametrize("name", [name for name in MODELS if can_exchange(shipped(name)) and name != "multirate_cdo"])
 def test_model_exchange_is_clean(name: str, version: int, exchange: Path, sanitized: Sanitized, tmp_path: Path) -> None:
     """A run with events and directional derivatives, then damaged states."""
     fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from shipped import shipped
 
 from cosim import Scenario
 from cosim.balises.telegram import Channel, Crossing
@@ -41,9 +42,10 @@ def _drawing() -> dict[str, HybridSystem]:
     for registry in (PLANTS, OBSERVERS):
         for name in registry.usable():
             found = registry[name]
-            system = found(**OPTIONS.get(name, {})) if isinstance(found, type) else found
-            if isinstance(system, HybridSystem) and system.noises:
-                made[name] = system
+            if isinstance(found, type):
+                found = found(**OPTIONS[name]) if name in OPTIONS else shipped(name)
+            if isinstance(found, HybridSystem) and found.noises:
+                made[name] = found
     return made
 
 

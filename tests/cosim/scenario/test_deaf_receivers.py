@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
+from shipped import shipped
 
 import cosim
 from fmu_observer import OBSERVERS
@@ -20,7 +21,7 @@ def _has_position(system: GatedObserver) -> bool:
 
 @cache
 def cases() -> list[tuple[str, str | None]]:
-    systems = {name: OBSERVERS[name]() for name in OBSERVERS}
+    systems = {name: shipped(name) for name in OBSERVERS}
     told = {n: s for n, s in systems.items() if isinstance(s, GatedObserver) and s.gated and _has_position(s)}
     return [(name, preset) for name, system in told.items() for preset in system.presets or (None,)]
 

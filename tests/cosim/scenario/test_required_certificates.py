@@ -12,6 +12,7 @@ import pytest
 import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipped import shipped
 
 from cosim import Outcome, Scenario
 from cosim.errors import CertificateError
@@ -25,7 +26,7 @@ from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal
 
 CERTIFIED = [name for name, observer in OBSERVERS.items() if hasattr(observer, "certify")]
-TOLD = [name for name in CERTIFIED if OBSERVERS[name]().triggered_events]
+TOLD = [name for name in CERTIFIED if shipped(name).triggered_events]
 
 
 @cache

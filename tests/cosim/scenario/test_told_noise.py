@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from shipped import shipped
 
 import cosim
 from cosim import Scenario
@@ -16,7 +17,7 @@ from plant_models.hybrid import scalar_names
 
 NOISE, SIZE = "move readings of odometer.reading by up to", "smaller ones are noise to them"
 SHIPPED = sorted(path.stem for path in Path(cosim.__file__).parent.joinpath("scenarios").glob("*.toml"))
-JUDGES = sorted(name for name in OBSERVERS if getattr(OBSERVERS[name](), "told_bounds", {}))
+JUDGES = sorted(name for name in OBSERVERS if getattr(shipped(name), "told_bounds", {}))
 
 
 def warned(name: str, sensor: str, given: dict[str, float], **parameters: float) -> list[str]:
@@ -32,7 +33,7 @@ def warned(name: str, sensor: str, given: dict[str, float], **parameters: float)
 
 def test_those_that_judge_an_odometer_are_told_of_its_noise() -> None:
     assert JUDGES == ["jam_detector", "quasi_lpv_uio"]
-    holders = [n for n in OBSERVERS if "odometer_noise" in scalar_names(OBSERVERS[n]().parameter_signals)]
+    holders = [n for n in OBSERVERS if "odometer_noise" in scalar_names(shipped(n).parameter_signals)]
     assert sorted(holders) == JUDGES
 
 
