@@ -7,11 +7,11 @@ from __future__ import annotations
 import gc
 import os
 import re
+import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from zlib import crc32
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -19,6 +19,15 @@ from hypothesis import settings
 # Matrices here have a few rows: a second thread of BLAS makes `expm` of five rows 14 times as dear, and takes the core
 # of the other worker. It is said before NumPy is loaded, and inherited by workers and commands.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# The tests start hundreds of commands, and each of these and each collection would compile anew what it loads: where
+# byte code is not wanted beside the files it is kept in a folder of its own.
+if sys.dont_write_bytecode:
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(Path(__file__).parents[1] / "__pycache__")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+import tiers  # it loads NumPy
 
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
@@ -31,31 +40,60 @@ AS_SHIPPED = re.compile(
     r"|tests/fmus/test_batch\.py::test_a_member_is_the_fmu_alone\[(discrete_uio|locomotive)\]"
 )
 """Tests of the second tier whose FMUs are built with the flags that users get."""
-SECOND_TIER = Path(__file__).with_name("second_tier.txt")
-KEPT = "! "
+SECOND = ("slow", "foreign", "browser", "follows")
+"""Marks of tests that belong to the second tier whatever they take."""
+DECLARED = re.compile(rf"^pytestmark = .*\b({'|'.join(SECOND)})\b", re.MULTILINE)
 FIRST_TIER = "not slow"
 BEGUN = pytest.StashKey[float]()
-SPENT = "processor time [s]"
+SPENT, ALONE = "processor time [s]", "processor time alone [s]"
 ELSEWHERE: list[float] = []
-SAMPLE = 16
-"""One test in so many is in the sample, by a digest of its name."""
+PAID: list[float] = []
+SHARED: dict[int, float] = {}
+"""Processor time of each fixture that tests share [s]: the first of them pays for it."""
+SEED = "FMU_OBSERVER_TEST_SAMPLE"
+"""Variable of the environment: what draws the sample; the digest of the product unless it is set."""
+OF_FIRST, OF_SECOND, OF_UNCHANGED = 16, 4, 16
+"""One in so many is in the sample: of the tests of the first tier; of the cases of a law that the first tier has too;
+of pages and sheets that follow from nothing that changed."""
 
 
-@cache
-def second_tier() -> dict[str, bool]:
-    """Beginnings of test names, and whether what begins so belongs to the second tier."""
-    lines = [line for line in SECOND_TIER.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
-    return {line.removeprefix(KEPT): not line.startswith(KEPT) for line in lines}
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """How the tiers are made."""
+    parser.addoption("--measure", action="store_true", help="measure what the tiers follow from; all is in the first")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Workers draw the sample of their controller."""
+    if "sample" in config.option.markexpr:
+        os.environ.setdefault(SEED, tiers.change())
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """With this the same sample is drawn again."""
+    return f"sample drawn by {SEED}={os.environ[SEED]}" if "sample" in config.option.markexpr else None
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """In the first tier, leave aside the files that belong to the second as a whole: what they import, packages of
+    """In the first tier, leave aside the files that say that they belong to the second: what they import, packages of
     others most of all, is not loaded and need not be there.
     """
-    if config.option.markexpr != FIRST_TIER or any(collection_path.name in argument for argument in config.args):
+    if config.option.markexpr != FIRST_TIER or collection_path.suffix != ".py":
         return None
-    name = collection_path.relative_to(config.rootpath).as_posix()
-    return True if second_tier().get(name) and not any(line.startswith(f"{name}::") for line in second_tier()) else None
+    named = any(collection_path.name in argument for argument in config.args)
+    return True if not named and DECLARED.search(collection_path.read_text("utf-8")) else None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any]) -> Iterator[Any]:
+    """What a shared fixture takes counts for each test that uses it: if only the first went to the second tier, the
+    next one would pay.
+    """
+    begun = processor_time()
+    result = yield
+    if fixturedef.scope != "function":
+        SHARED[id(fixturedef)] = processor_time() - begun
+        PAID.append(SHARED[id(fixturedef)])
+    return result
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -73,19 +111,31 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
     """Hand the time to the controller, which knows reports only."""
     yield
-    item.user_properties.append((SPENT, processor_time() - item.stash[BEGUN]))
+    spent = processor_time() - item.stash[BEGUN]
+    used = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
+    shared = sum(SHARED.get(id(found[-1]), 0.0) for found in used)
+    item.user_properties += [(SPENT, spent), (ALONE, spent - sum(PAID) + shared)]
+    PAID.clear()
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """In continuous integration, tell which files cost most: processor time says it, however busy the machine is."""
-    spent: dict[str, float] = defaultdict(float)
-    for report in terminalreporter.stats.get("", []):
-        spent[report.nodeid.partition("::")[0]] += dict(report.user_properties).get(SPENT, 0.0)
-    if not spent or not os.environ.get("CI"):
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """In continuous integration, tell which files cost most: processor time says it, however busy the machine is. Where
+    it is asked for, write what the tiers follow from.
+    """
+    stats = terminalreporter.stats
+    found = {r.nodeid: (dict(r.user_properties), r.keywords) for r in stats.get("", [])}
+    if config.option.measure:
+        tiers.write_times({name: own[ALONE] for name, (own, marks) in found.items() if "slow" not in marks})
+        passed = {report.nodeid for report in stats.get("passed", [])}
+        repeated = [name for name, (_, marks) in found.items() if "follows" in marks and name in passed]
+        tiers.write_follows({name: found[name][0][tiers.FOLLOWS_FROM] for name in repeated})
+    if not found or not os.environ.get("CI"):
         return
-    dearest = sorted(spent, key=lambda file: -spent[file])[:12]
+    spent: dict[str, float] = defaultdict(float)
+    for name, (own, _) in found.items():
+        spent[tiers.parts(name)[0]] += own.get(SPENT, 0.0)
     terminalreporter.section(f"processor time of tests: {sum(spent.values()):.0f} s, most of it in")
-    for file in dearest:
+    for file in sorted(spent, key=lambda file: -spent[file])[:12]:
         terminalreporter.write_line(f"{spent[file]:7.1f} s  {file}")
 
 
@@ -121,27 +171,39 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the second tier as slow, and what opens a browser; mark a sample, of each file one at least: not the first,
-    which pays for what the others share. In whole files a line that fits none of the tests is an error.
-    """
-    lines, by_file = second_tier(), defaultdict(list)
-    for line in lines:
-        by_file[line.partition("::")[0]].append(line)
-    used, digests = set(), defaultdict(list)
+    """Mark as slow what says so and what takes long, and draw the sample where it is asked for."""
     for item in items:
-        name = item.nodeid
-        file = name.partition("::")[0]
-        digests[file].append((crc32(name.encode()), item))
-        fitting = [beginning for beginning in by_file[file] if name.startswith(beginning)]
-        used |= set(fitting)
-        if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
+        declared = any(mark.name in SECOND for mark in item.iter_markers())
+        if declared or (not config.option.measure and tiers.is_dear(item.nodeid)):
             item.add_marker(pytest.mark.slow)
-    for of_a_file in digests.values():
-        drawn = [item for digest, item in of_a_file if digest % SAMPLE == 0]
-        for item in drawn or [min(of_a_file, key=lambda pair: pair[0])[1]]:
+    if "sample" in config.option.markexpr:
+        for item in _sample(items, os.environ[SEED]):
             item.add_marker(pytest.mark.sample)
     # pages and gallery, the longest tests, come first, so that no worker waits for one at the end
     items.sort(key=lambda item: not item.nodeid.startswith("tests/project/"))
-    idle = [line for line in lines if line not in used and line.partition("::")[0] in digests]
-    if idle and not any("::" in argument for argument in config.args):
-        raise pytest.UsageError(f"{SECOND_TIER.name}: no test begins with: {'; '.join(idle)}")
+
+
+def _sample(items: Iterable[pytest.Item], seed: str) -> Iterator[pytest.Item]:
+    """Of the first tier some tests, of each file one at least. Of the second what has no part in the first, some of
+    what has, with all laws of the systems drawn, and the pages and sheets that follow from something that changed.
+    """
+    first, second = defaultdict(list), []
+    for item in items:
+        slow = item.get_closest_marker("slow")
+        second.append(item) if slow else first[tiers.parts(item.nodeid)[0]].append(item)
+    for of_a_file in first.values():
+        drawn = [item for item in of_a_file if tiers.is_drawn(item.nodeid, seed, OF_FIRST)]
+        yield from drawn or of_a_file[-1:]  # the first of a file pays for what the others share
+    laws = {tiers.parts(item.nodeid)[:2] for of_a_file in first.values() for item in of_a_file}
+    for item in second:
+        if item.get_closest_marker("follows"):
+            if tiers.has_changed(item.nodeid) or tiers.is_drawn(item.nodeid, seed, OF_UNCHANGED):
+                yield item
+        elif tiers.parts(item.nodeid)[:2] not in laws or tiers.is_drawn(_system(item), seed, OF_SECOND):
+            yield item
+
+
+def _system(item: pytest.Item) -> str:
+    """Name of the system that a case of a law is about, or of the test."""
+    parameters = getattr(getattr(item, "callspec", None), "params", {})
+    return str(parameters.get("system_name", parameters.get("name", item.nodeid)))

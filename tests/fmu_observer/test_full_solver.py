@@ -208,6 +208,7 @@ def test_a_search_that_is_cut_short_keeps_the_last_feasible_answer():
     assert late.states == pytest.approx(whole.states, abs=1e-9)
 
 
+@pytest.mark.foreign
 def test_a_factor_graph_of_others_comes_to_the_same():
     gtsam = pytest.importorskip("gtsam", reason="there are wheels for Linux on x86-64 only")
     rows, problem = _rows(25, seed=12), _problem(moved=_shaken)

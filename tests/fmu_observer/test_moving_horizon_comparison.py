@@ -18,6 +18,8 @@ from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMov
 from fmu_observer.observers.train.balise_odometer_ekf import ORDER
 from plant_models.hybrid import vector
 
+pytestmark = pytest.mark.foreign
+
 STUDIES = Path(__file__).parents[2] / "docs" / "studies"
 START, SPREAD = np.array([0.0, 20.0, 0.0, 0.0]), np.diag([4.0, 1.0, 0.01, 0.1])
 

@@ -10,6 +10,8 @@ import pytest
 
 from fmu_observer.detection.train_isolation import isolability
 
+pytestmark = pytest.mark.foreign
+
 pytest.importorskip("faultdiagnosistoolbox")
 STUDY = Path(__file__).parents[2] / "docs" / "studies" / "train_isolability.py"
 # One of them acts at a time, which a structure does not know.

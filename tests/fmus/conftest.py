@@ -286,28 +286,22 @@ OF_EACH_KIND = {
 """Of each kind the shipped system of the fewest states. The runtime in C is one for all, so the first tier builds these
 and the small systems of this file; the second tier builds every system that ships as FMI 3.0, and these as FMI 2.0 too.
 """
-KEPT = tuple(
-    line.removeprefix("! ")
-    for line in Path(__file__).parents[1].joinpath("second_tier.txt").read_text(encoding="utf-8").splitlines()
-    if line.startswith("! ")
-)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Shipped systems that are none of `OF_EACH_KIND` belong to the second tier. Leave them out in FMI 2.0, which
-    belongs there too, and in laws of ``each_kind``, where those stay that the list of the second tier names.
+    belongs there too, and in laws of ``each_kind``.
     """
     kinds = set(OF_EACH_KIND.values())
-    shipped = {item: _shipped(item) for item in items}
     beside = set()
-    for item, names in shipped.items():
+    for item in items:
+        names = _shipped(item)
         as_fmi2 = names and item.callspec.params.get("version") == 2  # type: ignore[attr-defined]
-        kept = item.nodeid.startswith(KEPT)
         other = names and not names & kinds
-        if other and (as_fmi2 or (item.get_closest_marker("each_kind") and not kept)):
+        if other and (as_fmi2 or item.get_closest_marker("each_kind")):
             beside.add(item)
-        elif as_fmi2 or (other and not kept):
+        elif as_fmi2 or other:
             item.add_marker(pytest.mark.slow)
     if beside:
         config.hook.pytest_deselected(items=list(beside))

@@ -40,7 +40,7 @@ ALLOWED_LIBRARIES = re.compile(
 )
 """Those of the system: glibc, the C runtime that is part of Windows 10, macOS."""
 
-pytestmark = pytest.mark.compiler
+pytestmark = [pytest.mark.compiler, pytest.mark.foreign]
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tiers
 from forked import Done, Forked, Run
 
 
@@ -20,12 +21,21 @@ def server(charge: Callable[[float], None]) -> Iterator[Forked]:
 
 
 @pytest.fixture
-def run_forked(server: Forked, tmp_path: Path, charge: Callable[[float], None]) -> Run:
+def follows(request: pytest.FixtureRequest) -> list[str]:
+    """What the test follows from: folders of modules and files of this project. Commands add to it what they load."""
+    found: list[str] = []
+    request.node.user_properties.append((tiers.FOLLOWS_FROM, found))
+    return found
+
+
+@pytest.fixture
+def run_forked(server: Forked, tmp_path: Path, charge: Callable[[float], None], follows: list[str]) -> Run:
     """Runs a command line to its end; see `Forked.run`, which is told of the file for the output here."""
 
     def run(words: Sequence[str], **where: Any) -> Done:
         done = server.run(words, tmp_path / "written.txt", **where)
         charge(done.spent)
+        follows.extend(done.loaded)
         return done
 
     return run

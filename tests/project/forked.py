@@ -1,5 +1,5 @@
-"""Scripts and commands in processes of their own that need not import the packages anew: a server imports them once,
-and forks for each.
+"""Scripts and commands in processes of their own that need not import the packages of others anew: a server imports
+them once, and forks for each. The modules of this project each loads itself, which tells what its result follows from.
 
 As a script this file is the server; as a module it is the handle on it. A script finds modules loaded that it does not
 import itself, but no name of them: what it uses it must import. That commands start alone, the tests of commands show.
@@ -25,14 +25,10 @@ from typing import Any
 
 LOADED = (
     "casadi",
-    "cosim.cli",
-    "cosim.drawing.style",
-    "cosim.report",
-    "cosim.simulation.scenario",
     "fmpy.fmi2",
     "fmpy.fmi3",
-    "fmus.batch",
-    "fmus.text_table",
+    "fmpy.validation",
+    "jinja2",
     "matplotlib.backends.backend_agg",
     "matplotlib.pyplot",
     "PIL.PngImagePlugin",
@@ -42,16 +38,21 @@ LOADED = (
     "scipy.signal",
     "scipy.stats",
 )
-ROOMS = (("plant_models", "PLANTS"), ("fmu_observer", "OBSERVERS"))
+ROOT = Path(__file__).parents[2]
+LOADED_BY = ".loaded"
+"""Behind the name of the file for the output of a command, one for what it loaded."""
 
 
 @dataclass(frozen=True)
 class Done:
-    """What a command left behind: its exit code, all that it wrote, and its processor time [s]."""
+    """What a command left behind: its exit code, all that it wrote, its processor time [s], and what it loaded of this
+    project: folders of modules, and single files.
+    """
 
     returncode: int
     output: str
     spent: float
+    loaded: Sequence[str]
 
 
 Run = Callable[..., Done]
@@ -103,17 +104,14 @@ class Forked:
         answer = json.loads(self._server.stdout.readline())
         self.spent += answer["spent"]
         written = Path(order["output"]).read_text(encoding="utf-8", errors="replace")
-        return Done(answer["returncode"], written, answer["spent"])
+        loaded = Path(order["output"] + LOADED_BY).read_text(encoding="utf-8").splitlines()
+        return Done(answer["returncode"], written, answer["spent"], loaded)
 
 
 def serve() -> None:
     """Load what scripts use, then run one command a line, each in a child."""
     for name in LOADED:
         import_module(name)
-    for module, room in ROOMS:
-        registry = getattr(import_module(module), room)
-        for name in registry:
-            registry[name]
     import_module("matplotlib.pyplot").figure().savefig(BytesIO())  # finds its fonts
     import_module("matplotlib.pyplot").close("all")
     for line in sys.stdin:
@@ -144,10 +142,19 @@ def run(order: Mapping[str, Any]) -> None:
     except BaseException:
         traceback.print_exc()
         code = 1
+    Path(order["output"] + LOADED_BY).write_text("\n".join(sorted(loaded())), encoding="utf-8")
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def loaded() -> set[str]:
+    """Folders of modules of this project that this process has loaded, and files of it that are in none."""
+    files = {Path(module.__file__) for module in [*sys.modules.values()] if getattr(module, "__file__", None)}
+    own = {file for file in files if file.is_relative_to(ROOT) and "site-packages" not in file.parts}
+    found = {file.parent if (file.parent / "__init__.py").exists() else file for file in own}
+    return {path.relative_to(ROOT).as_posix() for path in found}
 
 
 def obey(words: Sequence[str]) -> None:

@@ -34,13 +34,18 @@ def module_of(name: str) -> ModuleType:
     return module
 
 
+@pytest.mark.follows
 @pytest.mark.compiler
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda s: f"{s.parent.name}/{s.stem}")
-def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path, run_forked: Run) -> None:
+def test_a_script_gives_the_numbers_of_the_page(
+    script: Path, tmp_path: Path, run_forked: Run, follows: list[str]
+) -> None:
+    numbers = script.parent / "numbers" / f"{script.stem}.json"
+    follows += [path.relative_to(ROOT).as_posix() for path in (script, numbers)]
     done = run_forked(["python", str(script), "--out", str(tmp_path)])
     assert done.returncode == 0, done.output
     fresh = json.loads((tmp_path / f"{script.stem}.json").read_text())
-    kept = json.loads((script.parent / "numbers" / f"{script.stem}.json").read_text())
+    kept = json.loads(numbers.read_text())
     assert [line["quantity"] for line in fresh["lines"]] == [line["quantity"] for line in kept["lines"]]
     for now, then in zip(fresh["lines"], kept["lines"], strict=True):
         if isinstance(then["measured"], str):

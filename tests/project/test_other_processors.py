@@ -37,6 +37,7 @@ NUMERICAL = (
 """Files of `tests/fmu_observer` whose results come from decompositions, solvers and ranks."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kernel", ["Prescott", "Sandybridge", "SkylakeX"])
 def test_numerical_tests_pass_with_the_kernels_of_other_processors(kernel: str) -> None:
     rooms = ROOT / "tests" / "fmu_observer"

@@ -13,6 +13,7 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+import tiers
 from forked import Done, Run
 from pages import TUTORIALS, Block, blocks
 
@@ -41,11 +42,15 @@ def environment(folder: Path) -> dict[str, str]:
     return inherited | own | {"MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"}
 
 
+def is_forked(line: str) -> bool:
+    """Whether a line is run without a shell."""
+    return shlex.split(line)[0] in FORKED and not set("|&;<>$*`") & set(line)
+
+
 def run_line(line: str, folder: Path, run_forked: Run) -> Done:
     """Run a line of a shell. Programs of the package and Python are forked from a process that has imported it."""
-    words = shlex.split(line)
-    if words[0] in FORKED and not set("|&;<>$*`") & set(line):
-        return run_forked(words, folder=folder, environment=environment(folder))
+    if is_forked(line):
+        return run_forked(shlex.split(line), folder=folder, environment=environment(folder))
     done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", line],
         cwd=folder,
@@ -55,7 +60,7 @@ def run_line(line: str, folder: Path, run_forked: Run) -> Done:
         text=True,
         check=False,
     )
-    return Done(done.returncode, done.stdout, 0.0)
+    return Done(done.returncode, done.stdout, 0.0, ())
 
 
 def follow(page: Path, folder: Path, run_forked: Run) -> None:
@@ -74,9 +79,12 @@ def follow(page: Path, folder: Path, run_forked: Run) -> None:
                 assert done.returncode == exits(page, block), f"{place}: {line}\n{done.output}"
 
 
+@pytest.mark.follows
 @pytest.mark.compiler
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda p: p.stem)
-def test_a_tutorial_from_start_to_end(page: Path, tmp_path: Path, run_forked: Run) -> None:
+def test_a_tutorial_from_start_to_end(page: Path, tmp_path: Path, run_forked: Run, follows: list[str]) -> None:
+    lines = [line for block in blocks(page) if block.language == "sh" for line in block.code.splitlines()]
+    follows += [page.relative_to(tiers.ROOT).as_posix(), *([] if all(map(is_forked, lines)) else tiers.product())]
     folder = tmp_path / "reader"
     folder.mkdir()
     follow(page, folder, run_forked)

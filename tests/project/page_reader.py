@@ -1,0 +1,93 @@
+"""Does what a page tells the reader to type, where it is started: Python blocks, scenario files, commands.
+
+python page_reader.py PAGE
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pages import Block, blocks
+
+import cosim.cli
+import fmus.cli
+import plant_models
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+
+PROGRAMS = {"cosim": cosim.cli.main, "fmus": fmus.cli.main}
+
+
+class Engine(HybridSystem):
+    """Its torque falls with the speed of the shaft."""
+
+    name = "engine"
+    description = "An engine"
+    source = "tests"
+    inputs = (input_signal("speed", "rad/s"),)
+    outputs = (output_signal("torque", "N.m"),)
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"torque": 100.0 - 2.0 * u.speed}
+
+
+class Load(HybridSystem):
+    """A mass that turns."""
+
+    name = "load"
+    description = "A load"
+    source = "tests"
+    states = (state("turning", "rad/s"),)
+    inputs = (input_signal("torque", "N.m"),)
+    outputs = (output_signal("speed", "rad/s"),)
+    parameters = (parameter("inertia", "kg.m2", 1.0, min=1e-3),)
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"turning": u.torque / p.inertia}
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"speed": x.turning}
+
+
+OF_THE_READER: dict[str, Callable[[str], Any]] = {
+    "vendor.fmu": lambda path: fmus.build_fmu(plant_models.Locomotive(), path, preset="chapter_3_four_axles"),
+    "engine.fmu": lambda path: fmus.build_fmu(Engine(), path, fmi_version=2),
+    "load.fmu": lambda path: fmus.build_fmu(Load(), path, fmi_version=3),
+}
+"""FMUs that the pages take for granted, built where a page names them and does not build them itself."""
+
+
+def run_commands(page: Path, block: Block) -> None:
+    for number, line in enumerate(block.code.splitlines()):
+        program, *arguments = shlex.split(line)
+        assert PROGRAMS[program](arguments) == 0, f"{page.name}, line {block.line + number}: {line}"
+
+
+def run_python(page: Path, block: Block, names: dict[str, Any]) -> None:
+    code = "\n" * (block.line - 1) + block.code  # line numbers of a failure are those of the page
+    exec(compile(code, str(page), "exec", dont_inherit=True), names)  # a page has no __future__ imports of ours
+
+
+def read(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for name, build in OF_THE_READER.items():
+        if name in text and f"fmus build locomotive -o {name}" not in text:
+            build(name)
+    names: dict[str, Any] = {"__name__": "page"}
+    for block in blocks(page):
+        if block.command is not None:
+            continue  # installs; the CI script runs these
+        if block.language == "python":
+            run_python(page, block, names)
+        elif block.language == "toml":
+            first, _, rest = block.code.partition("\n")
+            Path(first.removeprefix("# ")).write_text(rest, encoding="utf-8")
+        elif block.language == "sh":
+            run_commands(page, block)
+
+
+if __name__ == "__main__":
+    read(Path(sys.argv[1]))
