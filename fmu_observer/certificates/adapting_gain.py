@@ -20,7 +20,7 @@ import numpy as np
 from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
     common_quadratic_form,
@@ -151,7 +151,7 @@ def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_mode
         quadratic_margin=margin,
         holds=holds,
         error_model=error_model,
-        lyapunov_matrix=() if P is None else tuple(tuple(map(float, row)) for row in P),
+        lyapunov_matrix=rows_of(P),
     )
 
 

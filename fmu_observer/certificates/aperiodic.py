@@ -14,7 +14,7 @@ import numpy as np
 
 from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
+from fmu_observer.certificates.gap_error import GapError, first_unstable_gap, rows_of
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
     common_quadratic_form,
@@ -45,13 +45,11 @@ class Decrease:
 def certify_sampled_error(
     vertices: tuple[GapError, ...], max_gap: float, error_model: str, *, switching: bool = False
 ) -> Certificate:
-    """Certificate of an observer whose error is that of one of the vertices over each gap, or at any time one between
-    them.
+    """Certificate of an observer whose error is that of one of the vertices over each gap, or always between them.
 
     Args:
-        vertices: error equations, one for each corner of what is uncertain, all of one size.
-        max_gap: longest gap asked for [s].
-        error_model: the error equations in words, and what they leave out.
+        vertices: error equations, one for each corner of what is uncertain, all of one size. max_gap: longest gap asked
+            for [s]. error_model: the error equations in words, and what they leave out.
         switching: the error equations may change at any time within a gap, to any of the vertices' hull; what is
             certified holds for that. Otherwise they change from gap to gap only.
 
@@ -59,13 +57,9 @@ def certify_sampled_error(
         The certificate, without observer and preset.
 
     Raises:
-        ValueError: the vertices are errors of different components; they are `switching` and do not share one linear
-        reset.
+        ValueError: the vertices are errors of different components, or switch and do not share one linear reset.
     """
-    if not all(vertices[0].comparable(vertex) for vertex in vertices):
-        raise ValueError(
-            "Certificate: the vertices must be errors of the same components, reset in the same way; they are not."
-        )
+    _require_comparable(vertices)
     horizon = max(_SHORTEST_HORIZON, 4.0 * max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
     found = common_decrease(vertices, max_gap, switching)
@@ -81,8 +75,15 @@ def certify_sampled_error(
         holds=holds,
         error_model=error_model,
         notes=_left_out(vertices[0], max_gap),
-        lyapunov_matrix=() if found.P is None else tuple(tuple(map(float, row)) for row in found.P),
+        lyapunov_matrix=rows_of(found.P),
     )
+
+
+def _require_comparable(vertices: tuple[GapError, ...]) -> None:
+    if not all(vertices[0].comparable(vertex) for vertex in vertices):
+        raise ValueError(
+            "Certificate: the vertices must be errors of the same components, reset in the same way; they are not."
+        )
 
 
 def _left_out(vertex: GapError, max_gap: float) -> tuple[str, ...]:

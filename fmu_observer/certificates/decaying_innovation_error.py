@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from fmu_observer.certificates.gap_error import GapError, matrix_powers
-from fmu_observer.certificates.impulsive_error import ImpulsiveError, Rows, rows_of
+from fmu_observer.certificates.gap_error import GapError, Rows, matrix_powers, rows_of
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
 _TERMS = 80

@@ -21,6 +21,8 @@ _DECADES, _DECADE_POINTS = (1000.0, 100.0, 10.0), 400  # parts of the horizon th
 _SURELY = 1e-6  # growth over a short gap that is no rounding
 _BISECTIONS = 40
 
+Rows = tuple[tuple[float, ...], ...]
+
 
 class GapError(ABC):
     """Error equations of a sampled observer as seen from sample to sample; subclasses are hashable values."""
@@ -112,6 +114,11 @@ class GeneratorError(GapError):
         powers = matrix_powers(small_exponential(self.generator * (longest / count)), count)
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
             return longest / count * np.arange(1, count + 1), self.close(powers)
+
+
+def rows_of(matrix: np.ndarray | None) -> Rows:
+    """A matrix as a hashable value; empty where there is none."""
+    return () if matrix is None else tuple(tuple(map(float, row)) for row in matrix)
 
 
 def matrix_powers(step: np.ndarray, count: int) -> np.ndarray:

@@ -12,12 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix_powers
+from fmu_observer.certificates.gap_error import GapError, GeneratorError, Rows, matrix_powers, rows_of
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
 _NEGLIGIBLE = 1e-12  # relative: a smaller pivot of the reset is rounding
-
-Rows = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -187,8 +185,3 @@ def row_echelon(matrix: np.ndarray) -> tuple[np.ndarray, list[int]]:
         rows[others] -= np.outer(rows[others, column], rows[first])
         pivots.append(column)
     return rows[: len(pivots)], pivots
-
-
-def rows_of(matrix: np.ndarray) -> Rows:
-    """A matrix as a hashable value."""
-    return tuple(tuple(map(float, row)) for row in matrix)

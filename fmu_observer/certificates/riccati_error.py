@@ -10,8 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.gap_error import GapError, matrix_powers
-from fmu_observer.certificates.impulsive_error import Rows, rows_of
+from fmu_observer.certificates.gap_error import GapError, Rows, matrix_powers, rows_of
 from fmu_observer.certificates.matrix_exponential import small_exponential
 
 _DOUBLINGS = 40

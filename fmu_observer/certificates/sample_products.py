@@ -15,6 +15,7 @@ import scipy
 
 from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import rows_of
 from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
@@ -105,7 +106,7 @@ def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str
         holds=margin > MARGIN,
         error_model=error_model,
         notes=("at most one balise in an odometer period",),
-        lyapunov_matrix=() if P is None else tuple(tuple(map(float, row)) for row in P),
+        lyapunov_matrix=rows_of(P),
     )
 
 

@@ -67,10 +67,6 @@ def recovery_bounds(
 ) -> RecoveryBounds:
     """The bounds for the gains and parameters in use, the innovation held between samples.
 
-    Noise, curvature and start are taken at their worst (sums of absolute values), and so is the speed of the
-    scheduling, which may be another one in each period: the error over a period is that at the middle of the vertices
-    and at most a `spread` beside it, element by element, and what the spread does is summed up too.
-
     Args:
         drifts: ``A_1``, ``A_2`` of speed, disturbance and its rate, shape (2, 3, 3). gains: ``K_1``, ``K_2``, shape (2,
             3, 1).
@@ -80,21 +76,22 @@ def recovery_bounds(
         rate_error: bound of the error of its rate then [m/s3].
         curvature: bound of the second derivative of the true disturbance [m/s4].
         aggregated: readings are means over a period, so that the first of a rolling wheel comes a period later.
-
-    Returns:
-        The bounds.
     """
+    corners = np.array([float(p.odometer_noise), disturbance_error, rate_error])
+    settling = _settling(_over_a_period(drifts, gains, float(p.odometer_period)), p, corners, curvature)
+    return _recovery(p, onset_error, settling, float(p.odometer_period) if aggregated else 0.0)
+
+
+def _recovery(p: Any, onset_error: float, settling: tuple[float, float, float], late: float) -> RecoveryBounds:
+    """The bounds of an estimate that settles so, with readings that come so much later [s]."""
     period, noise, theta = float(p.odometer_period), float(p.odometer_noise), float(doubt_limit(p) / p.residual_gain)
-    samples, late = float(p.recover_samples), period if aggregated else 0.0
-    error = _over_a_period(drifts, gains, period)
-    corners = np.array([noise, disturbance_error, rate_error])
-    steady, settle, radius = _settling(error, p, corners, curvature)
+    steady, settle, radius = settling
     quiet = settle + float(p.settle_samples) * period
     hold = period * ceil(float(p.hold_limit) / period - 1e-9) + period
     trust = max(quiet, settle + float(p.trust_time) + period)
     return RecoveryBounds(
         agrees=onset_error + noise <= theta,
-        agreement=samples * period + late,
+        agreement=float(p.recover_samples) * period + late,
         settles=settle < inf,
         settle_time=settle,
         any_state=late + float(p.fault_limit) * (hold + quiet) + hold + trust,
@@ -118,6 +115,10 @@ def estimate_noise(drifts: np.ndarray, gains: np.ndarray, p: Any) -> float:
 def _settling(error: _PeriodError, p: Any, corners: np.ndarray, curvature: float) -> tuple[float, float, float]:
     """Bound of the steady speed error [m/s], time until the residual of any start within the corners is small from then
     on [s], and the spectral radius at the middle of the vertices.
+
+    Noise, curvature and start are taken at their worst (sums of absolute values), and so is the speed of the
+    scheduling, which may be another one in each period: the error over a period is that at the middle of the vertices
+    and at most a `spread` beside it, element by element, and what the spread does is summed up too.
     """
     period, noise, small = float(p.odometer_period), float(p.odometer_noise), float(settled_limit(p) / p.residual_gain)
     radius = float(np.abs(np.linalg.eigvals(error.middle)).max())

@@ -20,8 +20,7 @@ def observer_gain(
 ) -> np.ndarray:
     """Gain L such that ``A - L C`` has the given poles.
 
-    With one measurement by Ackermann's formula, which allows poles of any multiplicity; with several by SciPy's robust
-    placement.
+    With one measurement by Ackermann's formula, for poles of any multiplicity; with several SciPy's robust placement.
 
     Args:
         A: shape (n, n). C: shape (q, n), (A, C) observable. poles: n of them [1/s], real or in conjugate pairs; with
@@ -46,11 +45,15 @@ def observer_gain(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # poles as asked, only their conditioning is not yet the best
             return np.asarray(scipy.signal.place_poles(A.T, C.T, wanted).gain_matrix.T)
+    return _by_ackermann(A, C, wanted)
+
+
+def _by_ackermann(A: np.ndarray, C: np.ndarray, poles: np.ndarray) -> np.ndarray:
+    """Gain of one measurement, shape (n, 1)."""
     n = len(A)
     matrix = observability_matrix(A, C)
-    polynomial = np.real(np.poly(wanted))
     value = np.zeros((n, n))
-    for coefficient in polynomial:  # Horner
+    for coefficient in np.real(np.poly(poles)):  # Horner
         value = value @ A + coefficient * np.eye(n)
     return np.asarray(value @ np.linalg.solve(matrix, np.eye(n)[:, -1:]))
 

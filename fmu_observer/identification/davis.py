@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple, TypedDict, Unpack
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -22,15 +24,37 @@ _GRAVITY = 9.81
 _FASTEST_PROPOSAL, _PROPOSAL_STEP = 100.0, 2.5  # [m/s], of a run that would do
 
 
+class DavisOptions(TypedDict, total=False):
+    """What an identification may be asked.
+
+    Attributes:
+        minimum_speed: slower samples are left out [m/s], 5 as printed in (5.2).
+        level: probability with which an interval covers, between 0 and 1, 0.95.
+        resolution: widest half of an interval that counts as identified, as acceleration at the highest speed [m/s2],
+            0.05.
+    """
+
+    minimum_speed: float
+    level: float
+    resolution: float
+
+
+class _Asked(NamedTuple):
+    """Options, checked, and the mass [kg]."""
+
+    mass: float | None
+    minimum_speed: float
+    level: float
+    resolution: float
+
+
 def identify_davis(
     time: ArrayLike,
     speed: ArrayLike,
     *,
     effort: ArrayLike | None = None,
     mass: float | None = None,
-    minimum_speed: float = MINIMUM_SPEED,
-    level: float = LEVEL,
-    resolution: float = RESOLUTION,
+    **options: Unpack[DavisOptions],
 ) -> DavisEstimate:
     """Davis coefficients from the measured speed of a run under constant, or known, effort.
 
@@ -39,36 +63,36 @@ def identify_davis(
     nearly for one of first order. The longest part of the run above `minimum_speed` is used.
 
     Args:
-        time: of the samples [s], shape (n,), increasing.
-        speed: measured [m/s], shape (n,), without slip.
+        time: of the samples [s], shape (n,), increasing. speed: measured [m/s], shape (n,), without slip.
         effort: traction positive [N], one number; or shape (n,), on lines between samples; or at begin and end of each
             interval between samples, shape (2, n - 1), for one that is held. None where it is constant and not known:
             w0 cannot be told from it then.
         mass: with rotating parts [kg]; 1 where efforts are by mass. None: coefficients by mass, effort not known.
-        minimum_speed: slower samples are left out [m/s].
-        level: probability with which an interval covers, between 0 and 1.
-        resolution: widest half of an interval that counts as identified, as acceleration at the highest speed [m/s2].
-
-    Returns:
-        The estimate.
+        options: see `DavisOptions`.
 
     Raises:
         IdentificationError: too few samples, nothing above `minimum_speed`, no acceleration, numbers that are not
             finite, a time that does not increase, an effort without a mass.
     """
-    times, speeds = _samples(time, speed, level, resolution)
+    asked = _asked(mass, options)
+    times, speeds = _samples(time, speed)
     forcing, constant = _efforts(effort, mass, len(times))
-    chosen = _part(times, speeds, minimum_speed)
+    chosen = _part(times, speeds, asked.minimum_speed)
     forcing = None if forcing is None else forcing[:, chosen.start : chosen.stop - 1]
     times, speeds = times[chosen], speeds[chosen]
+    fits = _fitted(times, speeds, forcing)
+    remarks = _limitations(fits, forcing is None and constant is None)
+    return _estimate(fits, times, speeds, constant, forcing is not None, asked, remarks)
+
+
+def _fitted(times: Array, speeds: Array, forcing: Array | None) -> RunFits:
     fits = fit_runs(times, speeds[None, :], forcing)
     if not (fits.converged[0] and np.all(np.isfinite(fits.parameters))):
         raise IdentificationError(
             f"The fit of {len(times)} samples from {speeds.min():.3g} to {speeds.max():.3g} m/s does not come to rest: "
             "the run does not follow v' = a - w1 v - w2 v^2. Give a part of it with one constant effort."
         )
-    remarks = _doubts(fits, forcing is None and constant is None)
-    return _estimate(fits, times, speeds, constant, forcing is not None, mass, level, resolution, remarks)
+    return fits
 
 
 def identify_davis_from_acceleration(
@@ -77,9 +101,7 @@ def identify_davis_from_acceleration(
     *,
     effort: float | None = None,
     mass: float | None = None,
-    minimum_speed: float = MINIMUM_SPEED,
-    level: float = LEVEL,
-    resolution: float = RESOLUTION,
+    **options: Unpack[DavisOptions],
 ) -> DavisEstimate:
     """Davis coefficients by regression of a measured acceleration on 1, v and v^2, as the thesis does in (5.2).
 
@@ -88,12 +110,8 @@ def identify_davis_from_acceleration(
 
     Args:
         speed: [m/s], shape (n,), known much better than the acceleration.
-        acceleration: measured [m/s2], shape (n,).
-        effort: constant, traction positive [N]; None where it is not known.
-        mass: with rotating parts [kg]; 1 where the effort is by mass.
-        minimum_speed: slower samples are left out [m/s].
-        level: probability with which an interval covers, between 0 and 1.
-        resolution: as for `identify_davis` [m/s2].
+        acceleration: measured [m/s2], shape (n,). effort: constant, traction positive [N]; None where it is not known.
+        mass: with rotating parts [kg]; 1 where the effort is by mass. options: see `DavisOptions`.
 
     Returns:
         The estimate; its `time` holds speeds, and `measured` accelerations.
@@ -101,33 +119,48 @@ def identify_davis_from_acceleration(
     Raises:
         IdentificationError: as for `identify_davis`.
     """
-    speeds, rates = _samples(speed, acceleration, level, resolution, increasing=False)
+    asked = _asked(mass, options)
+    speeds, rates = _samples(speed, acceleration, increasing=False)
     forcing, constant = _efforts(effort, mass, len(speeds))
     if forcing is not None:
         raise IdentificationError("A regression on accelerations takes one constant effort, not a series.")
-    fast = speeds > minimum_speed
+    fast = speeds > asked.minimum_speed
     speeds, rates = speeds[fast], rates[fast]
-    _check_part(speeds, minimum_speed)
+    _check_part(speeds, asked.minimum_speed)
+    return _estimate(_regression(speeds, rates), speeds, rates, constant, False, asked, [])
+
+
+def _regression(speeds: Array, rates: Array) -> RunFits:
+    """Accelerations on 1, v and v^2."""
     columns = np.stack([np.ones_like(speeds), -speeds, -(speeds**2)], axis=1)
     lengths = np.linalg.norm(columns, axis=0)
     scaled = columns / lengths
     found, _, _, singular = np.linalg.lstsq(scaled, rates, rcond=None)
     inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True) / np.outer(lengths, lengths)
     condition = np.array([singular[0] / max(singular[-1], 1e-300)])
-    fits = with_covariance(
+    return with_covariance(
         (found / lengths)[:, None], inverse[None], (rates - scaled @ found)[None], condition, np.array([True])
     )
-    return _estimate(fits, speeds, rates, constant, False, mass, level, resolution, [])
 
 
-def _samples(
-    first: ArrayLike, second: ArrayLike, level: float, resolution: float, *, increasing: bool = True
-) -> tuple[Array, Array]:
+def _asked(mass: float | None, options: DavisOptions) -> _Asked:
+    asked = _Asked(
+        mass,
+        options.pop("minimum_speed", MINIMUM_SPEED),
+        options.pop("level", LEVEL),
+        options.pop("resolution", RESOLUTION),
+    )
+    if options:
+        raise TypeError(f"unknown option {', '.join(options)}; there are {', '.join(DavisOptions.__annotations__)}.")
+    if not 0.0 < asked.level < 1.0:
+        raise IdentificationError(f"level {asked.level!r}: expected a probability between 0 and 1, for instance 0.95.")
+    if not asked.resolution > 0.0:
+        raise IdentificationError(f"resolution {asked.resolution!r} m/s2: expected a number above 0.")
+    return asked
+
+
+def _samples(first: ArrayLike, second: ArrayLike, *, increasing: bool = True) -> tuple[Array, Array]:
     """Both series as arrays of finite numbers."""
-    if not 0.0 < level < 1.0:
-        raise IdentificationError(f"level {level!r}: expected a probability between 0 and 1, for instance 0.95.")
-    if not resolution > 0.0:
-        raise IdentificationError(f"resolution {resolution!r} m/s2: expected a number above 0.")
     one, other = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     names = ("time", "speed") if increasing else ("speed", "acceleration")
     if one.ndim != 1 or one.shape != other.shape:
@@ -175,7 +208,7 @@ def _part(times: Array, speeds: Array, minimum_speed: float) -> slice:
     if not len(edges):
         most = f", the highest speed is {speeds.max():.3g} m/s" if len(speeds) else ""
         raise IdentificationError(
-            f"No sample is above {minimum_speed:g} m/s{most}: a standstill or a crawl tells nothing of w1 and w2. "
+            f"No sample is above {minimum_speed:g} m/s{most}: a standstill or a crawl shows nothing of w1 and w2. "
             "Give a run that accelerates, or a lower minimum speed."
         )
     begin, end = max(edges, key=lambda edge: times[edge[1] - 1] - times[edge[0]])
@@ -196,7 +229,7 @@ def _check_part(speeds: Array, minimum_speed: float) -> None:
         )
 
 
-def _doubts(fits: RunFits, unknown: bool) -> list[str]:
+def _limitations(fits: RunFits, unknown: bool) -> list[str]:
     """What the residuals say against the model."""
     alike = float(fits.correlation[0])
     if alike < _ALIKE or fits.noise[0] < 1e-5:
@@ -216,49 +249,52 @@ def _estimate(
     measured: Array,
     constant: float | None,
     forced: bool,
-    mass: float | None,
-    level: float,
-    resolution: float,
+    asked: _Asked,
     remarks: list[str],
 ) -> DavisEstimate:
     """The estimate of one run, in the units of the mass."""
     regression = len(fits.parameters) == 3
     speeds = times if regression else measured
     low, high = float(speeds.min()), float(speeds.max())
-    values, widths = fits.parameters[:3, 0], fits.half_widths(level)[:3, 0]
-    powers = np.array([1.0, high, high**2])
-    known = widths * powers <= resolution
-    factor = 1.0 if mass is None else mass
-    units = ("m/s2", "1/s", "1/m") if mass is None else ("N", "N.s/m", "N.s2/m2")
-
-    def made(name: str, unit: str, value: float, width: float, meaning: str, weight: float, sure: bool) -> Coefficient:
-        return Coefficient(name, unit, value, value - width, value + width, meaning, weight, sure)
-
-    meant = "-w0: the constant resistance, negative" if forced else "effort less w0, by mass"
-    net = made("net_acceleration", "m/s2", float(values[0]), float(widths[0]), meant, 1.0, bool(known[0]))
-    a = None
-    if forced or constant is not None:
-        w0 = (0.0 if constant is None else constant) - float(values[0])
-        a = made("davis_a", units[0], factor * w0, factor * float(widths[0]), "w0", 1.0 / factor, bool(known[0]))
-    b, c = (
-        made(name, unit, factor * float(v), factor * float(h), meaning, float(power) / factor, bool(sure))
-        for name, unit, v, h, meaning, power, sure in zip(
-            ("davis_b", "davis_c"), units[1:], values[1:], widths[1:], ("w1", "w2"), powers[1:], known[1:], strict=True
-        )
-    )
+    changes = fits.half_widths(asked.level)[:3, 0] * np.array([1.0, high, high**2])
+    known = changes <= asked.resolution
+    net, a, b, c = _coefficients(fits, constant, forced, asked, high)
     covariance = fits.covariance[0]
     confusion = float(covariance[1, 2] / np.sqrt(covariance[1, 1] * covariance[2, 2]))
     span = float(times[-1] - times[0])
     rate = float((measured[-1] - measured[0]) / span) if not regression else float("nan")
-    told = [*_constant_part(a, net, mass), *remarks]
+    words = [*_constant_part(a, net, asked.mass), *remarks]
     if not known.all():
-        sought = None if regression else _speed_that_would_do(covariance, fits, times, measured, level, resolution)
-        told.append(_in_words(known, widths * powers, (low, high), confusion, resolution, sought, rate))
+        sought = None if regression else _speed_that_would_do(fits, times, measured, asked)
+        words.append(_in_words(known, changes, (low, high), confusion, asked.resolution, sought, rate))
     return DavisEstimate(
-        net, a, b, c, mass, level, resolution, float(fits.noise[0]), len(measured), (low, high),
+        net, a, b, c, asked.mass, asked.level, asked.resolution, float(fits.noise[0]), len(measured), (low, high),
         float("nan") if regression else span, float(fits.condition[0]), confusion, float(fits.correlation[0]),
-        tuple(told), times, measured, fits.residuals[0],
+        tuple(words), times, measured, fits.residuals[0],
     )  # fmt: skip
+
+
+def _coefficients(
+    fits: RunFits, constant: float | None, forced: bool, asked: _Asked, fastest: float
+) -> tuple[Coefficient, Coefficient | None, Coefficient, Coefficient]:
+    """The net acceleration, and a, b and c in the units of the mass; a only where the effort is known."""
+    values, widths = fits.parameters[:3, 0], fits.half_widths(asked.level)[:3, 0]
+    powers = np.array([1.0, fastest, fastest**2])
+    known = widths * powers <= asked.resolution
+    factor = 1.0 if asked.mass is None else asked.mass
+    units = ("m/s2", "1/s", "1/m") if asked.mass is None else ("N", "N.s/m", "N.s2/m2")
+
+    def made(name: str, unit: str, meaning: str, value: float, i: int, factor: float) -> Coefficient:
+        width, weight = factor * float(widths[i]), float(powers[i]) / factor
+        return Coefficient(name, unit, value, value - width, value + width, meaning, weight, bool(known[i]))
+
+    meant = "-w0: the constant resistance, negative" if forced else "effort less w0, by mass"
+    net, a = made("net_acceleration", "m/s2", meant, float(values[0]), 0, 1.0), None
+    if forced or constant is not None:
+        w0 = (0.0 if constant is None else constant) - float(values[0])
+        a = made("davis_a", units[0], "w0", factor * w0, 0, factor)
+    b = made("davis_b", units[1], "w1", factor * float(values[1]), 1, factor)
+    return net, a, b, made("davis_c", units[2], "w2", factor * float(values[2]), 2, factor)
 
 
 def _constant_part(a: Coefficient | None, net: Coefficient, mass: float | None) -> list[str]:
@@ -307,9 +343,7 @@ def _in_words(
     return text
 
 
-def _speed_that_would_do(
-    covariance: Array, fits: RunFits, times: Array, measured: Array, level: float, resolution: float
-) -> float | None:
+def _speed_that_would_do(fits: RunFits, times: Array, measured: Array, asked: _Asked) -> float | None:
     """How fast [m/s] a run from the minimum speed, of the same mean acceleration, period and noise, must end to
     identify everything; None where none does.
     """
@@ -319,7 +353,7 @@ def _speed_that_would_do(
         return None
     alike = max(float(fits.correlation[0]), 0.0)
     noise = float(fits.noise[0]) * np.sqrt((1.0 + min(alike, 0.999)) / (1.0 - min(alike, 0.999)))
-    quantile = fits.half_widths(level)[0, 0] / np.sqrt(covariance[0, 0])
+    quantile = fits.half_widths(asked.level)[0, 0] / np.sqrt(fits.covariance[0][0, 0])
     for highest in np.arange(
         np.ceil(measured.max() / _PROPOSAL_STEP) * _PROPOSAL_STEP, _FASTEST_PROPOSAL, _PROPOSAL_STEP
     ):
@@ -330,6 +364,6 @@ def _speed_that_would_do(
         lengths = np.linalg.norm(columns, axis=0)
         inverse = np.linalg.inv((columns / lengths).T @ (columns / lengths))
         deviations = noise * np.sqrt(np.diag(inverse)[:3] * len(t) / (span / period)) / lengths[:3]
-        if np.all(quantile * deviations * np.array([1.0, highest, highest**2]) <= resolution):
+        if np.all(quantile * deviations * np.array([1.0, highest, highest**2]) <= asked.resolution):
             return float(highest)
     return None

@@ -114,59 +114,74 @@ def fit(
         sizes: typical sizes of the parameters, shape (p,), all positive; None for those of the start, 1 where that is
             0. low, high: bounds, shape (p,); None for none.
 
-    Returns:
-        The fit.
-
     Raises:
         ValueError: the simulation at the start gives no finite number.
     """
     sizes = np.where(start != 0.0, np.abs(start), 1.0) if sizes is None else sizes
-    known, runs = np.isfinite(measured), [0]
-    bounds = (
-        np.full(len(start), -np.inf) if low is None else low / sizes,
-        np.full(len(start), np.inf) if high is None else high / sizes,
-    )
-
-    def residuals(parameters: Array) -> Array:
-        runs[0] += 1
-        with np.errstate(all="ignore"):
-            return np.where(known, measured - simulate(parameters), 0.0)
-
-    def jacobian(parameters: Array) -> Array:
-        return _differences(residuals, parameters, sizes, low, high)
-
-    first = residuals(start)
-    if not np.isfinite(first).all():
+    residuals = _Residuals(simulate, measured, sizes, low, high)
+    if not np.isfinite(residuals(start)).all():
         raise ValueError("the simulation at the start of the fit gives values that are no finite numbers")
-    spreads = np.array([np.std(row[k]) if k.any() else 1.0 for row, k in zip(measured, known, strict=True)])
+    return _fit(residuals, start, noise)
+
+
+class _Residuals:
+    """Measured less simulated signals by the parameters, shape (q, n), zero where nothing was measured; counts runs."""
+
+    def __init__(
+        self, simulate: Simulation, measured: Array, sizes: Array, low: Array | None, high: Array | None
+    ) -> None:
+        self._simulate, self._measured, self.sizes, self._low, self._high = simulate, measured, sizes, low, high
+        self.known, self.runs = np.isfinite(measured), 0
+
+    def __call__(self, parameters: Array) -> Array:
+        self.runs += 1
+        with np.errstate(all="ignore"):
+            return np.where(self.known, self._measured - self._simulate(parameters), 0.0)
+
+    def jacobian(self, parameters: Array) -> Array:
+        return _differences(self, parameters, self.sizes, self._low, self._high)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """In sizes of the parameters, shape (p,) each."""
+        count = len(self.sizes)
+        return (
+            np.full(count, -np.inf) if self._low is None else self._low / self.sizes,
+            np.full(count, np.inf) if self._high is None else self._high / self.sizes,
+        )
+
+    @property
+    def spreads(self) -> Array:
+        """Standard deviations of the measured signals, shape (q,)."""
+        rows = zip(self._measured, self.known, strict=True)
+        return np.array([np.std(row[k]) if k.any() else 1.0 for row, k in rows])
+
+
+def _fit(residuals: _Residuals, start: Array, noise: Array | None) -> Fit:
+    known, sizes, spreads = residuals.known, residuals.sizes, residuals.spreads
     weights = 1.0 / (np.where(spreads > 0.0, spreads, 1.0) if noise is None else noise)
     found, converged = start / sizes, False
-    for _ in range(1 if noise is not None or len(measured) == 1 else _REPEATS):
-        found, converged = _weighted(residuals, jacobian, found, weights, sizes, bounds)
+    for _ in range(1 if noise is not None or len(known) == 1 else _REPEATS):
+        found, converged = _weighted(residuals, found, weights)
         left = residuals(found * sizes)
         seen = _deviations(left, known, 0)
         weights = weights if noise is not None else 1.0 / np.maximum(seen, 1e-12 * np.maximum(spreads, 1e-300))
-    left, slopes = residuals(parameters := found * sizes), -jacobian(parameters)
+    left, slopes = residuals(parameters := found * sizes), -residuals.jacobian(parameters)
     freedom = max(1, int(known.sum()) - len(start))
     seen = _deviations(left, known, len(start) / max(1, int(known.sum())))
     covariance = _covariance(slopes, weights, seen**2 * serial_enlargement(left), sizes)
-    return Fit(parameters, covariance, sizes, left, seen, serial_correlation(left), slopes, freedom, runs[0], converged)
+    correlation = serial_correlation(left)
+    return Fit(parameters, covariance, sizes, left, seen, correlation, slopes, freedom, residuals.runs, converged)
 
 
-def _weighted(
-    residuals: Callable[[Array], Array],
-    jacobian: Callable[[Array], Array],
-    found: Array,
-    weights: Array,
-    sizes: Array,
-    bounds: tuple[Array, Array],
-) -> tuple[Array, bool]:
+def _weighted(residuals: _Residuals, found: Array, weights: Array) -> tuple[Array, bool]:
     """Parameters in their sizes for the least weighted squares, from a guess on, shape (p,); whether it converged."""
+    sizes = residuals.sizes
     result = scipy.optimize.least_squares(
         lambda z: np.nan_to_num((residuals(z * sizes) * weights[:, None]).ravel(), nan=1e9),
-        np.clip(found, *bounds),
-        jac=lambda z: (jacobian(z * sizes) * weights[:, None, None] * sizes).reshape(-1, len(found)),
-        bounds=bounds,
+        np.clip(found, *residuals.bounds),
+        jac=lambda z: (residuals.jacobian(z * sizes) * weights[:, None, None] * sizes).reshape(-1, len(found)),
+        bounds=residuals.bounds,
         x_scale="jac",
         xtol=1e-10,
     )
@@ -229,8 +244,8 @@ class Direction:
         text = f"a common change of {changes} is hardly seen (uncertain by {100.0 * self.uncertainty:.3g} %)"
         if len(names) == 2 and abs(abs(self.shares[names[1]] / self.shares[names[0]]) - 1.0) < _RATIO:
             one, other = names
-            same = self.shares[one] * self.shares[other] > 0.0
-            text += f": only the {'ratio' if same else 'product'} of {one} and {other} is identified"
+            alike = self.shares[one] * self.shares[other] > 0.0
+            text += f": only the {'ratio' if alike else 'product'} of {one} and {other} is identified"
         return text
 
 

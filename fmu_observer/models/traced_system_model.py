@@ -1,5 +1,12 @@
 """Any hybrid system as the model of a filter: its own flow over a period, or its own periodic jump. It knows no filter.
 
+1. Continuous states are estimated. They move by the system's own method (dry friction and switches included) in equal
+   steps, none longer than the system's own internal step unless `Steps` says how many; memory stays at its start,
+   triggered events do not occur, and periodic ones must leave the continuous states alone.
+2. A system without continuous states that jumps at one periodic event moves by this jump; all its memory is estimated,
+   and the period of the event is that of the filter.
+3. Its parameters become parameters of the filter. Vectors are taken apart, ``x[1]`` as ``x_1``.
+
 What does not flow and does not jump at one period only has no transition that a filter could differentiate; it is
 refused in words.
 """
@@ -28,14 +35,14 @@ from plant_models.interop.continuous_part import known as known_name
 from plant_models.user_file import Expected, load_class, names_code
 
 _SUBSTEPS = 4
-"""Internal steps of the system in the period of a filter that is told no other period."""
+"""Internal steps of the system in the period of a filter for which no other is stated."""
 UNROLLED = 8
 """Steps that are written out; more of them are a loop in the generated code."""
 _MOST_STEPS = 100_000
 
 _USERS = Expected("subclass of HybridSystem", lambda found: isinstance(found, type) and issubclass(found, HybridSystem))
 
-_SAME = 1e-9  # share by which a period may exceed its steps: rounding
+_ROUNDING = 1e-9  # share by which a period may exceed its steps: rounding
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,7 @@ class Steps:
         if self.substeps is not None:
             require_whole(where, substeps=self.substeps)
             return self.substeps
-        count = _SUBSTEPS if self.period is None else ceil(self.period / system.internal_step * (1.0 - _SAME))
+        count = _SUBSTEPS if self.period is None else ceil(self.period / system.internal_step * (1.0 - _ROUNDING))
         if count > _MOST_STEPS:
             raise ValueError(
                 f"{where}: a period of {self.period:g} s has {count} internal steps of {system.internal_step:g} s, "
@@ -87,14 +94,7 @@ def system_model(
     steps: Steps = Steps(),
     preset: str | None = None,
 ) -> FilterModel:
-    """A hybrid system as the model of a filter.
-
-    1. Continuous states are estimated. They move by the system's own method (dry friction and switches included) in
-       equal steps, none longer than the system's own internal step unless `steps` says how many; memory stays at its
-       start, triggered events do not occur, and periodic ones must leave the continuous states alone.
-    2. A system without continuous states that jumps at one periodic event moves by this jump; all its memory is
-       estimated, and the period of the event is that of the filter.
-    3. Its parameters become parameters of the filter. Vectors are taken apart, ``x[1]`` as ``x_1``.
+    """A hybrid system as the model of a filter; how it moves then stands at the head of this module.
 
     Args:
         system: traceable. outputs: scalar names of what is measured. inputs: names of the inputs that the filter knows,
@@ -110,9 +110,21 @@ def system_model(
     _require_list(system, outputs)
     moving = _Moving(system, steps.of(system), preset, steps.period)
     noisy = (*process_noises, *measurement_noises)
-    signals = {name: s for s in system.input_signals for name in s.scalar_names}
     names = [n for n in scalar_names(system.inputs) if n not in noisy] if inputs is None else list(inputs)
-    for name in (*names, *noisy):
+    return _model(moving, steps, outputs, names, process_noises, measurement_noises)
+
+
+def _model(
+    moving: _Moving,
+    steps: Steps,
+    outputs: Sequence[str],
+    names: Sequence[str],
+    process_noises: Sequence[str],
+    measurement_noises: Sequence[str],
+) -> FilterModel:
+    system = moving.system
+    signals = {name: s for s in system.input_signals for name in s.scalar_names}
+    for name in (*names, *process_noises, *measurement_noises):
         known_name(name, signals, f"{system.name}: input")
     every = {name: s for s in system.outputs for name in s.scalar_names}
     measured = [every[known_name(name, every, f"{system.name}: output")] for name in outputs]
@@ -164,23 +176,17 @@ def find_filter_model(
     Raises:
         ValueError: the name is unknown, or something is asked for that the model has not.
     """
-    options = {"inputs": inputs, "process_noises": process_noises, "measurement_noises": measurement_noises}
+    noises = {"process_noises": process_noises, "measurement_noises": measurement_noises}
     if isinstance(model, FilterModel | ObserverModel) or (model in MODELS and not outputs):
-        given = [name for name, value in ({"outputs": outputs} | options).items() if value]
-        if given:
+        asked = [name for name, value in ({"outputs": outputs, "inputs": inputs} | noises).items() if value]
+        if asked:
             raise ValueError(
-                f"{', '.join(given)}: what an observer model measures and knows stands in the model; leave it out, or "
+                f"{', '.join(asked)}: what an observer model measures and knows stands in the model; leave it out, or "
                 "name a plant."
             )
         return model if isinstance(model, FilterModel) else filter_model(find_model(model))
-    return system_model(
-        _found(model),
-        outputs,
-        inputs,
-        process_noises=process_noises,
-        measurement_noises=measurement_noises,
-        steps=steps,
-    )
+    noises = {"process_noises": process_noises, "measurement_noises": measurement_noises}
+    return system_model(_found(model), outputs, inputs, **noises, steps=steps)
 
 
 def _found(model: object) -> HybridSystem:
@@ -299,7 +305,7 @@ class _Moving:
     def longest_period(self, steps: Steps) -> float:
         """The longest period in which no step is longer than the system's own [s]; none where the steps were given."""
         own = self.event is not None or steps.substeps is not None
-        return inf if own else float(self.substeps * self.system.internal_step) * (1.0 + _SAME)
+        return inf if own else float(self.substeps * self.system.internal_step) * (1.0 + _ROUNDING)
 
     def deviates(
         self, names: Sequence[str], noises: Sequence[str], readings: Sequence[str], rows: Sequence[int]
@@ -308,19 +314,20 @@ class _Moving:
         if self.substeps <= UNROLLED:
             return None
         one = replace(self, substeps=1)
-        kept, k = (len(self.states), len(names)), width(self.parameters)
+        n, m, k = len(self.states), len(names), width(self.parameters)
+
+        def known(flat: Array) -> Known:
+            return Known(flat[0], flat[1 : 1 + m], flat[1 + m : 1 + m + k])
 
         def moved(xw: Array, flat: Array) -> Array:
-            known = Known(flat[0], flat[1 : 1 + kept[1]], flat[1 + kept[1] : 1 + kept[1] + k])
-            return one.transition(names, noises)(xw[: kept[0]], xw[kept[0] :], known, flat[-1])
+            return one.transition(names, noises)(xw[:n], xw[n:], known(flat), flat[-1])
 
         def seen(xv: Array, flat: Array) -> Array:
-            known = Known(flat[0], flat[1 : 1 + kept[1]], flat[1 + kept[1] : 1 + kept[1] + k])
-            return self.measured(names, readings, rows)(xv[: kept[0]], xv[kept[0] :], known)
+            return self.measured(names, readings, rows)(xv[:n], xv[n:], known(flat))
 
-        told = 2 + kept[1] + k
-        affine = is_affine(moved, kept[0] + len(noises), told) and is_affine(seen, kept[0] + len(readings), told)
-        return not affine
+        width_of_flat = 2 + m + k
+        affine = is_affine(moved, n + len(noises), width_of_flat)
+        return not (affine and is_affine(seen, n + len(readings), width_of_flat))
 
     def transition(self, names: Sequence[str], noises: Sequence[str]) -> Transition:
         """The state a period later."""
@@ -388,8 +395,8 @@ class _Moving:
     def _inputs(self, names: Sequence[str], values: Array) -> Array:
         starts = self.system.start_inputs()
         places = scalar_names(self.system.input_signals)
-        given = {name: values[i] for i, name in enumerate(names)}
-        return vector(*(given.get(n, s) for n, s in zip(places, map(float, starts), strict=True))) if places else starts
+        known = {name: values[i] for i, name in enumerate(names)}
+        return vector(*(known.get(n, s) for n, s in zip(places, map(float, starts), strict=True))) if places else starts
 
     def _parameters(self, p: Array, period: Array) -> Array:
         """All parameters of the system: those of the filter, its period, and those of the runtime."""

@@ -13,7 +13,7 @@ from plant_models.hybrid.system import Array
 
 
 def with_unknown(model: FilterModel, names: Sequence[str]) -> FilterModel:
-    """A model with parameters or inputs among its states, behind the others.
+    """A model of order n + k, parameters or inputs behind its own states; they start at their start values.
 
     An unknown parameter is a state whose noise is zero, an unknown input one that walks with its noise: which it is, is
     a matter of the process noise that a filter is given. Where noise enters the model through inputs, each unknown
@@ -22,25 +22,13 @@ def with_unknown(model: FilterModel, names: Sequence[str]) -> FilterModel:
     Args:
         model: the model. names: of scalar parameters or inputs of it.
 
-    Returns:
-        The model of order n + k; the unknown values start at their start values.
-
     Raises:
         ValueError: a name is none of a scalar parameter or an input, or stands twice.
     """
-    inputs, parameters = {s.name: s for s in model.inputs}, {s.name: s for s in model.parameters if s.size is None}
-    found = [inputs.get(name) or parameters.get(name) for name in names]
-    if None in found or len(set(names)) != len(names):
-        raise ValueError(
-            f"Model {model.name!r}: unknown = {list(names)!r}; expected names of its inputs "
-            f"({', '.join(inputs) or 'none'}) or of its scalar parameters ({', '.join(parameters) or 'none'}), each "
-            "once."
-        )
-    signals = [s for s in found if s is not None]
+    signals = _found(model, names)
     n, r = model.order, len(model.process_noises)
 
     def split(x: Array, known: Known) -> Known:
-        """Inputs and parameters in the model's order, the unknown ones from the state."""
         values = dict(zip(names, x[n:], strict=True))
         return Known(known.t, _filled(model.inputs, known.u, values), _filled(model.parameters, known.p, values))
 
@@ -59,6 +47,19 @@ def with_unknown(model: FilterModel, names: Sequence[str]) -> FilterModel:
         measured=lambda x, v, known: model.measured(x[:n], v, split(x, known)),
         deviates=None,
     )
+
+
+def _found(model: FilterModel, names: Sequence[str]) -> list[Signal]:
+    """The signals of these names."""
+    inputs, parameters = {s.name: s for s in model.inputs}, {s.name: s for s in model.parameters if s.size is None}
+    found = [inputs.get(name) or parameters.get(name) for name in names]
+    if None in found or len(set(names)) != len(names):
+        raise ValueError(
+            f"Model {model.name!r}: unknown = {list(names)!r}; expected names of its inputs "
+            f"({', '.join(inputs) or 'none'}) or of its scalar parameters ({', '.join(parameters) or 'none'}), each "
+            "once."
+        )
+    return [s for s in found if s is not None]
 
 
 def _filled(signals: Sequence[Signal], known: Array, values: dict[str, Array]) -> Array:

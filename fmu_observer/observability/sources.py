@@ -28,9 +28,7 @@ def measured_plant(
     scales: Mapping[str, float] | None = None,
     t: float = 0.0,
 ) -> MeasuredSystem:
-    """A hybrid system, linearised, with outputs of its own as measurements.
-
-    `plant_models.interop.operating_point` finds a point to linearise about.
+    """A hybrid system, linearised about a point (`plant_models.interop.operating_point`), its outputs measured.
 
     Args:
         system: a traceable hybrid system, a plant or an observer; events do not enter.
@@ -47,9 +45,8 @@ def measured_plant(
     A, _, C, _ = jacobians(part, x, u, t)
 
     def rows(names: Sequence[str]) -> np.ndarray:
-        return np.asarray(
-            C[[part.outputs.index(known(name, part.outputs, f"{system.name}: output")) for name in names]]
-        )
+        places = [part.outputs.index(known(name, part.outputs, f"{system.name}: output")) for name in names]
+        return np.asarray(C[places])
 
     sizes = filled(dict.fromkeys(part.states, 1.0), scales, f"{system.name}: scale of")
     return MeasuredSystem(A, rows(continuous), rows(sampled), part.states, sizes, system.name)

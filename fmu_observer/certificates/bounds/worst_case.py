@@ -70,6 +70,14 @@ def worst_case(
         ValueError: F is not Hurwitz, or a number is not legal.
     """
     gap = period if since_sample is None else since_sample
+    decay = _checked_decay(F, rate, period, gap)
+    count = int(np.ceil(_FORGOTTEN / (decay * period))) if periods is None else periods
+    ages, weights, total = _response(F, np.asarray(K, dtype=float), period, gap, count)
+    return WorstCase(rate * total, ages, weights, rate)
+
+
+def _checked_decay(F: np.ndarray, rate: float, period: float, gap: float) -> float:
+    """Decay of the slowest pole [1/s], of numbers that are legal."""
     for name, value in (("period", period), ("time since the sample", gap)):
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"Worst case: the {name} must be a positive number, got {value!r}.")
@@ -78,8 +86,16 @@ def worst_case(
     decay = -float(np.linalg.eigvals(F).real.max())
     if not decay > 0.0:
         raise ValueError(f"Worst case: the error matrix is not stable, its slowest pole is at {-decay:+.4g} 1/s.")
-    count = int(np.ceil(_FORGOTTEN / (decay * period))) if periods is None else periods
-    gain, shape = np.asarray(K, dtype=float), max(_FEWEST, min(_POINTS, _TOTAL // max(count, 1)))
+    return decay
+
+
+def _response(
+    F: np.ndarray, gain: np.ndarray, period: float, gap: float, count: int
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Ages [s] and weights of a unit of acceleration over a gap and `count` periods before it, shape (k,), and the
+    integral of their sizes.
+    """
+    shape = max(_FEWEST, min(_POINTS, _TOTAL // max(count, 1)))
     last_ages, last = _weights(F, gap, max(_FEWEST, round(shape * min(gap / period, _POINTS))))
     past_ages, past = _weights(F, period, shape)
     before = small_exponential(F * gap) @ gain
@@ -90,7 +106,7 @@ def worst_case(
     weights = np.concatenate([last @ gain, (states @ past.T).ravel()])
     total = np.trapezoid(np.abs(last @ gain), last_ages)
     total += np.trapezoid(np.abs(states @ past.T), past_ages, axis=1).sum()
-    return WorstCase(rate * float(total), ages, weights, rate)
+    return ages, weights, float(total)
 
 
 def _weights(F: np.ndarray, length: float, points: int) -> tuple[np.ndarray, np.ndarray]:

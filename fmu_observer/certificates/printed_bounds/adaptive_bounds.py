@@ -84,29 +84,12 @@ def adaptive_bounds(model: StateAffineModel, mu: float, window: float = 1.0, beg
         model: state-affine. mu: decay of S [1/s]. window: T [s]. begin: of the window [s]; lambda starts at 0 and S at
             identity at time 0, as in the published observer.
     """
-    u = np.array([float(s.start_values[0]) for s in model.inputs])
-    n, m = model.order, len(model.unknowns)
-    L, Z, Phi = np.zeros((n, m)), np.eye(n), np.eye(n)
-    told, observed = np.zeros((m, m)), np.zeros((n, n))
-    largest = np.zeros(3)
-    C, end = model.C, begin + max(window, _SETTLING / mu)
-    for k in range(round(end / _STEP)):
-        t = k * _STEP
-        A, regressor = np.asarray(model.drift(t, u)), np.asarray(model.regressor(t, u))
-        if begin <= t < begin + window:
-            seen, shown = C @ L, C @ Phi
-            told += _STEP * seen.T @ seen
-            observed += _STEP * shown.T @ shown
-            Phi = Phi + _STEP * A @ (Phi + 0.5 * _STEP * A @ Phi)
-        norms = (np.abs(regressor).max(), np.abs(C @ A).sum(axis=1).max(), np.abs(C @ regressor).sum(axis=1).max())
-        largest = np.maximum(largest, norms)
-        L, Z = _moved(model, u, mu, t, L, Z)
-    settled = np.linalg.eigvalsh(Z)
+    excited, observed, largest, settled = _window_sums(model, mu, window, begin)
     return AdaptiveBounds(
         window=window,
         mu=mu,
-        unknowns=m,
-        alpha0=max(float(np.linalg.eigvalsh(told)[0]), 0.0),
+        unknowns=len(model.unknowns),
+        alpha0=max(float(np.linalg.eigvalsh(excited)[0]), 0.0),
         alpha1=float(np.linalg.eigvalsh(observed)[0]),
         s_min=1.0 / float(settled[-1]),
         s_max=1.0 / float(settled[0]),
@@ -114,6 +97,32 @@ def adaptive_bounds(model: StateAffineModel, mu: float, window: float = 1.0, beg
         drift=float(largest[1]),
         driven=float(largest[2]),
     )
+
+
+def _window_sums(
+    model: StateAffineModel, mu: float, window: float, begin: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Gramians of ``C lambda`` and of observability over the window, shapes (m, m) and (n, n), suprema of ``|Phi|``,
+    ``|C A|_1`` and ``|C Phi|_1``, shape (3,), and eigenvalues of inv(S) at the end, shape (n,).
+    """
+    u = np.array([float(s.start_values[0]) for s in model.inputs])
+    n, m = model.order, len(model.unknowns)
+    L, Z, Phi = np.zeros((n, m)), np.eye(n), np.eye(n)
+    excited, observed = np.zeros((m, m)), np.zeros((n, n))
+    largest = np.zeros(3)
+    C, end = model.C, begin + max(window, _SETTLING / mu)
+    for k in range(round(end / _STEP)):
+        t = k * _STEP
+        A, regressor = np.asarray(model.drift(t, u)), np.asarray(model.regressor(t, u))
+        if begin <= t < begin + window:
+            seen, shown = C @ L, C @ Phi
+            excited += _STEP * seen.T @ seen
+            observed += _STEP * shown.T @ shown
+            Phi = Phi + _STEP * A @ (Phi + 0.5 * _STEP * A @ Phi)
+        norms = (np.abs(regressor).max(), np.abs(C @ A).sum(axis=1).max(), np.abs(C @ regressor).sum(axis=1).max())
+        largest = np.maximum(largest, norms)
+        L, Z = _moved(model, u, mu, t, L, Z)
+    return excited, observed, largest, np.linalg.eigvalsh(Z)
 
 
 def settled_gain(model: StateAffineModel, mu: float) -> np.ndarray:

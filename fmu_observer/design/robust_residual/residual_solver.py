@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -43,11 +43,8 @@ def candidates(
 ) -> Iterator[ResidualCandidate]:
     """Seek values for the unknowns of (3.56) and (3.58).
 
-    In the scaled problem M and the size of D are 1: P, L and alpha are divided by M^2, lambda by M and that size.
-
     Args:
-        problem: the question.
-        least: what is minimised, lambda or the bound alpha, which then is no condition.
+        problem: the question. least: what is minimised, lambda or the bound alpha, which then is no condition.
         gains: K_i of shape (N, n, q) to keep; None to seek them.
         attenuation: lambda at most; None for no limit. sized: with (3.58); False leaves the size of the gains free.
 
@@ -60,25 +57,48 @@ def candidates(
     cp = load_cvxpy("Design of a robust residual")
     M, size = problem.residual_gain, float(np.linalg.norm(problem.disturbance, 2))
     scaled = replace(problem, disturbance=problem.disturbance / size, residual_gain=1.0)
+    x = _unknowns(cp, problem, gains)
+    constraints = _negative(cp, robustness(scaled, x.P, x.L, x.lambda2, x.alpha, sized), x.strict)
+    constraints.append(x.P >> x.strict * np.eye(problem.order))
+    if least != "alpha":
+        constraints.append(x.alpha == problem.alpha / M**2)
+    if attenuation is not None:
+        constraints.append(x.lambda2 <= (attenuation / (M * size)) ** 2)
+    question = cp.Problem(cp.Minimize(x.lambda2 if least == "attenuation" else x.alpha), constraints)
+    for status in attempts(cp, question, x.strict, _STRICT):
+        P = symmetric_value(x.P)
+        if np.all(np.isfinite(P)) and np.linalg.eigvalsh(P)[0] > 0.0:
+            yield _candidate(P, x, gains, (M, size), status)
+
+
+class _Unknowns(NamedTuple):
+    """Unknowns of (3.56) and (3.58), and what every inequality is kept by.
+
+    In the scaled problem M and the size of D are 1: P, L and alpha are divided by M^2, lambda by M and that size.
+    """
+
+    P: Any
+    L: list[Any]
+    lambda2: Any
+    alpha: Any
+    strict: Any
+
+
+def _unknowns(cp: Any, problem: ResidualProblem, gains: np.ndarray | None) -> _Unknowns:
     n, q = problem.order, len(problem.C)
     P, lambda2, alpha = cp.Variable((n, n), symmetric=True), cp.Variable(), cp.Variable()
     L = [cp.Variable((n, q)) for _ in problem.vertices] if gains is None else [P @ K for K in gains]
-    strict = cp.Parameter(nonneg=True)
-    constraints = _negative(cp, robustness(scaled, P, L, lambda2, alpha, sized), strict)
-    constraints.append(P >> strict * np.eye(n))
-    if least != "alpha":
-        constraints.append(alpha == problem.alpha / M**2)
-    if attenuation is not None:
-        constraints.append(lambda2 <= (attenuation / (M * size)) ** 2)
-    question = cp.Problem(cp.Minimize(lambda2 if least == "attenuation" else alpha), constraints)
-    for status in attempts(cp, question, strict, _STRICT):
-        value = symmetric_value(P)
-        if not np.all(np.isfinite(value)) or np.linalg.eigvalsh(value)[0] <= 0.0:
-            continue
-        found = np.stack([np.linalg.solve(value, part.value) for part in L]) if gains is None else gains
-        yield ResidualCandidate(
-            value * M**2, found, M * size * sqrt(float(lambda2.value)), float(alpha.value) * M**2, status
-        )
+    return _Unknowns(P, L, lambda2, alpha, cp.Parameter(nonneg=True))
+
+
+def _candidate(
+    P: np.ndarray, x: _Unknowns, gains: np.ndarray | None, sizes: tuple[float, float], status: str
+) -> ResidualCandidate:
+    """Numbers in the units of the problem; `sizes` are M and that of D."""
+    M, size = sizes
+    found = np.stack([np.linalg.solve(P, part.value) for part in x.L]) if gains is None else gains
+    attenuation = M * size * sqrt(float(x.lambda2.value))
+    return ResidualCandidate(P * M**2, found, attenuation, float(x.alpha.value) * M**2, status)
 
 
 def sensitivity_candidates(problem: ResidualProblem, gains: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:

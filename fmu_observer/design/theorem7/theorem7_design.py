@@ -104,34 +104,41 @@ def design_theorem7(
 
     Raises:
         InfeasibleDesign: there is no solution; the message says what was tried and the nearest feasible eta and gap.
-        UnobservableError: there is none because a vertex has a mode that does not decay and is not measured; it is
-        named.
+        UnobservableError: a vertex has a mode that does not decay and is not measured; it is named.
         ValueError: an argument is not legal, or the gains have another shape.
         ImportError: cvxpy (extra `lmi`) is not installed.
     """
     chosen = find_takagi_sugeno_model(model)
     problem = Theorem7Problem.of(chosen, gap, eta, **options)
+    kept = {name: options.get(name, value) for name, value in _DEFAULTS.items()} | {"performance": performance}
+    return _designed(chosen, problem, None if gains is None else _scaled(chosen, problem, gains), kept)
+
+
+def _designed(
+    model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains | None, options: Mapping[str, Any]
+) -> Theorem7Design:
+    """The design in the model's own states, of gains in scaled coordinates or free ones."""
+    performance = bool(options["performance"])
     if performance and not (problem.noises or problem.channel):
         raise ValueError(
-            f"Theorem 7: {chosen.name} has neither noise nor disturbance to attenuate; ask with performance=False."
+            f"Theorem 7: {model.name} has neither noise nor disturbance to attenuate; ask with performance=False."
         )
-    scaled = None if gains is None else _scaled(chosen, problem, gains)
-    found = _proven(problem, performance, scaled)
+    found = _proven(problem, performance, gains)
     if found is None:
-        raise _infeasible(chosen, problem, performance, scaled)
+        raise _infeasible(model, problem, performance, gains)
     candidate, proof = found
     T = problem.T[None, :, None]
     return Theorem7Design(
         margins=proof,
         status=candidate.status,
-        model=chosen.name,
-        gap=gap,
-        eta=eta,
+        model=model.name,
+        gap=problem.gap,
+        eta=problem.eta,
         mu=problem.mu,
         gamma=sqrt(candidate.unknowns.gamma2) if performance else inf,
         sampled_gain=candidate.sampled_gain / T,
         continuous_gain=candidate.continuous_gain / T,
-        options={name: options.get(name, value) for name, value in _DEFAULTS.items()} | {"performance": performance},
+        options=options,
         lyapunov_matrix=candidate.unknowns.P,
     )
 

@@ -44,18 +44,13 @@ def identified_actuator(
     Raises:
         ValueError: recordings are not of one length, or the actuator does not move enough to tell both.
     """
-    reading, given = np.asarray(measured, dtype=float), np.asarray(reference, dtype=float)
-    if reading.shape != given.shape or given.ndim != 1 or given.size < 4:
-        raise ValueError(
-            f"identified_actuator: expected recordings of one length, at least 4 samples; got {reading.shape} and "
-            f"{given.shape}."
-        )
+    reading, asked = _recordings(measured, reference)
     filters = residual_filter(time_constant, sample_period)
     settled = int(10.0 * time_constant / sample_period)
-    rows = _terms(filters, reading, given)[:, settled:]
+    rows = _terms(filters, reading, asked)[:, settled:]
     instruments = rows
     if nominal is not None:
-        instruments = _terms(filters, _response(nominal, given, sample_period), given)[:, settled:]
+        instruments = _terms(filters, _response(nominal, asked, sample_period), asked)[:, settled:]
     moments = instruments[:2] @ rows[:2].T
     if not np.linalg.cond(moments) < 1e12:
         raise ValueError("identified_actuator: the actuator does not move enough to tell frequency and damping.")
@@ -63,6 +58,16 @@ def identified_actuator(
     if square <= 0.0:
         raise ValueError(f"identified_actuator: wn^2 comes out as {square:g}: too much noise, or too little motion.")
     return ActuatorParameters(float(np.sqrt(square)), float(slope / (2.0 * np.sqrt(square))))
+
+
+def _recordings(measured: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    reading, asked = np.asarray(measured, dtype=float), np.asarray(reference, dtype=float)
+    if reading.shape != asked.shape or asked.ndim != 1 or asked.size < 4:
+        raise ValueError(
+            f"identified_actuator: expected recordings of one length, at least 4 samples; got {reading.shape} and "
+            f"{asked.shape}."
+        )
+    return reading, asked
 
 
 def _response(actuator: ActuatorParameters, reference: np.ndarray, sample_period: float) -> np.ndarray:

@@ -4,6 +4,7 @@ memory of anything before. Gains are computed here; a detector multiplies by the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -73,7 +74,7 @@ def finite_window_observer(
     Raises:
         ValueError: the window has no sample, or the shapes do not fit.
     """
-    n, m, p = len(A), B.shape[1], len(C)
+    n, m = len(A), B.shape[1]
     if samples < 1:
         raise ValueError(f"A window of {samples} samples shows nothing; expected at least 1.")
     if A.shape != (n, n) or B.shape[0] != n or C.shape[1] != n:
@@ -81,11 +82,7 @@ def finite_window_observer(
     powers = [np.eye(n)]
     for _ in range(samples - 1):
         powers.append(A @ powers[-1])
-    observed = np.vstack([C @ power for power in powers])
-    M = np.zeros((samples * p, samples * m))
-    for row in range(samples):
-        for column in range(row):
-            M[row * p : (row + 1) * p, column * m : (column + 1) * m] = C @ powers[row - 1 - column] @ B
+    observed, M = np.vstack([C @ power for power in powers]), _impulse_responses(powers, B, C)
     left, values, right = np.linalg.svd(observed, full_matrices=True)
     values = np.concatenate([values, np.zeros(n - len(values))])
     rank = int(np.sum(values > max(observed.shape) * np.finfo(float).eps * values[0]))
@@ -95,3 +92,13 @@ def finite_window_observer(
         driven = np.hstack([powers[samples - 2 - i] @ B for i in range(samples - 1)] + [np.zeros((n, m))])
         gain_y, gain_u = powers[-1] @ gain_y, powers[-1] @ gain_u + driven
     return FiniteWindowObserver(gain_y, gain_u, values, right[rank:].T, at)
+
+
+def _impulse_responses(powers: Sequence[np.ndarray], B: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """M: what each input of the window does to each of its measurements, shape (N p, N m)."""
+    samples, m, p = len(powers), B.shape[1], len(C)
+    M = np.zeros((samples * p, samples * m))
+    for row in range(samples):
+        for column in range(row):
+            M[row * p : (row + 1) * p, column * m : (column + 1) * m] = C @ powers[row - 1 - column] @ B
+    return M

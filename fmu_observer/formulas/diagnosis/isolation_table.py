@@ -82,34 +82,47 @@ class IsolationTable:
                 does not explain it, although it may move it at other times.
         """
         counted = [alarm * there for alarm, there in zip(alarms, available, strict=True)]
-        any_alarm = largest(counted)
-        covers, missing, seen_of_must = [], [], []
-        for fault, there in zip(self.faults, possible, strict=True):
-            moved = {*self.must[fault], *self.may.get(fault, ())}
-            cover = any_alarm * there
-            for name, alarm in zip(self.residuals, counted, strict=True):
-                cover = cover * (1.0 - alarm * (apart.get(name, {}).get(fault, 0.0) if name in moved else 1.0))
-            covers.append(cover)
-            named = zip(self.residuals, counted, strict=True)
-            seen_of_must.append(largest([alarm for name, alarm in named if name in self.must[fault]]))
-            every = zip(self.residuals, counted, available, strict=True)
-            quiet = {name: seen - alarm for name, alarm, seen in every if name in self.must[fault]}
-            groups = [[quiet.pop(name) for name in group if name in quiet] for group in self.together]
-            missing.append(sum(quiet.values(), 0.0) + sum((largest(group) for group in groups if group), 0.0))
+        any_alarm, raised = largest(counted), dict(zip(self.residuals, counted, strict=True))
+        silent = {name: there - raised[name] for name, there in zip(self.residuals, available, strict=True)}
+        covers = [
+            self._cover(fault, any_alarm * there, raised, apart)
+            for fault, there in zip(self.faults, possible, strict=True)
+        ]
+        missing = [self._missing(fault, silent) for fault in self.faults]
+        of_must = [largest([raised[n] for n in self.residuals if n in self.must[fault]]) for fault in self.faults]
+        bests = self._bests(covers, missing)
+        alone = np.where(sum(bests) < 1.5, 1.0, 0.0)
+        only = np.where(sum(covers) < 1.5, 1.0, 0.0)
+        sure = [alone * np.maximum(only, seen) for seen in of_must]
+        return IsolationVerdict(
+            [one * certain for one, certain in zip(bests, sure, strict=True)],
+            [one * (1.0 - certain) for one, certain in zip(bests, sure, strict=True)],
+            covers,
+            any_alarm * (1.0 - largest(covers)),
+        )
+
+    def _bests(self, covers: Sequence[Array], missing: Sequence[Array]) -> list[Array]:
+        """Of the faults that explain the alarms those of which the fewest residuals are missing."""
         none = len(self.residuals) + 1.0
         best: Array = none
         for cover, lacking in zip(covers, missing, strict=True):
             best = np.minimum(best, np.where(cover > 0.5, lacking, none))
-        bests = [c * np.where(lacking < best + 0.5, 1.0, 0.0) for c, lacking in zip(covers, missing, strict=True)]
-        alone = np.where(sum(bests) < 1.5, 1.0, 0.0)
-        only = np.where(sum(covers) < 1.5, 1.0, 0.0)
-        sure = [alone * np.maximum(only, seen) for seen in seen_of_must]
-        return IsolationVerdict(
-            [one * told for one, told in zip(bests, sure, strict=True)],
-            [one * (1.0 - told) for one, told in zip(bests, sure, strict=True)],
-            covers,
-            any_alarm * (1.0 - largest(covers)),
-        )
+        return [c * np.where(lacking < best + 0.5, 1.0, 0.0) for c, lacking in zip(covers, missing, strict=True)]
+
+    def _cover(
+        self, fault: str, cover: Array, raised: Mapping[str, Array], apart: Mapping[str, Mapping[str, Array]]
+    ) -> Array:
+        """Whether a fault explains every alarm, beginning with whether there is any and it can be there."""
+        moved = {*self.must[fault], *self.may.get(fault, ())}
+        for name, alarm in raised.items():
+            cover = cover * (1.0 - alarm * (apart.get(name, {}).get(fault, 0.0) if name in moved else 1.0))
+        return cover
+
+    def _missing(self, fault: str, silent: Mapping[str, Array]) -> Array:
+        """How many residuals are quiet that it must move, those of a group counted once."""
+        quiet = {name: value for name, value in silent.items() if name in self.must[fault]}
+        groups = [[quiet.pop(name) for name in group if name in quiet] for group in self.together]
+        return sum(quiet.values(), 0.0) + sum((largest(group) for group in groups if group), 0.0)
 
     def detectable(self, available: Collection[str]) -> tuple[str, ...]:
         """Faults that must move a residual.

@@ -50,7 +50,7 @@ def invert(grid: Sequence[Array], differences: Sequence[Array], previous: Array)
     """The value of the parameter at which the difference is zero, linear between two values of the grid.
 
     The print takes the two values with the smallest differences (7.7.8), which may lie on one side: then it
-    extrapolates. Here a change of sign decides, and a grid without one is told.
+    extrapolates. Here a change of sign decides, and a grid without one is reported.
 
     Args:
         grid: values, rising. differences: at each value what was simulated at the end of the window minus what was
@@ -72,9 +72,7 @@ def invert(grid: Sequence[Array], differences: Sequence[Array], previous: Array)
     distance, crossings = 0.0 * ends + np.inf, 0.0 * ends
     for i in range(len(grid) - 1):
         d0, d1 = differences[i], differences[i + 1]
-        # A zero belongs to the interval on its left; that at the first value to the first.
-        left = np.where(d0 * d1 < 0.0, 1.0, np.where(d1 == 0.0, np.where(d0 == 0.0, 0.0, 1.0), 0.0))
-        inside = np.maximum(left, np.where(d0 == 0.0, 1.0, 0.0)) if i == 0 else left
+        inside = _crosses(d0, d1, first=i == 0)
         apart = np.where(inside > 0.0, d1 - d0, 1.0)
         here = grid[i] - np.where(inside > 0.0, d0 * (grid[i + 1] - grid[i]) / np.where(apart == 0.0, 1.0, apart), 0.0)
         gap = np.abs(here - previous)
@@ -83,6 +81,14 @@ def invert(grid: Sequence[Array], differences: Sequence[Array], previous: Array)
         distance = np.where(nearer > 0.0, gap, distance)
         crossings = crossings + inside
     return Inverted(value, crossings)
+
+
+def _crosses(before: Array, after: Array, *, first: bool) -> Array:
+    """1 where an interval holds a zero: one at its end belongs to the interval on its left, at the very first value to
+    the first.
+    """
+    left = np.where(before * after < 0.0, 1.0, np.where(after == 0.0, np.where(before == 0.0, 0.0, 1.0), 0.0))
+    return np.maximum(left, np.where(before == 0.0, 1.0, 0.0)) if first else left
 
 
 def smoothed(previous: Array, raw: Array, gamma: Array = 0.2) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 
 from fmu_observer.formulas.filtering import unscented
 from fmu_observer.formulas.filtering.kalman import (
+    Corrected,
     correct,
     log_likelihood,
     normalised_square,
@@ -25,6 +26,9 @@ Transition = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """(number k of the step, state of shape (n,)) -> state one step later, and its Jacobian of shape (n, n)."""
 Measured = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """(number k of the sample, state of shape (n,)) -> measurements of shape (q,), and their Jacobian of shape (q, n)."""
+
+_Predicted = tuple[np.ndarray, np.ndarray, np.ndarray]
+_Updated = tuple[np.ndarray, np.ndarray, float, int, float]
 
 
 @dataclass(frozen=True)
@@ -109,30 +113,36 @@ def extended_pass(
         samples: measurements, shape (N, q); NaN where one is missing.
         gate: a measurement more than so many standard deviations off its prediction is left out; one number, or one a
             measurement, shape (q,). limit: the same in the unit of the measurement.
-
-    Returns:
-        The pass.
     """
     Q, R = np.asarray(QN), np.asarray(RN)
 
-    def predict(k: int, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def predict(k: int, x: np.ndarray, covariance: np.ndarray) -> _Predicted:
         moved, F = transition(k, x)
         ahead = predicted_covariance(covariance, F, Q[k] if Q.ndim == 3 else Q)
         return moved, np.asarray(ahead), covariance @ F.T
 
-    def update(k: int, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int, float]:
-        expected, H = measured(k, x)
+    def update(k: int, x: np.ndarray, covariance: np.ndarray) -> _Updated:
         noise = R[k] if R.ndim == 3 else R
-        used = _used(samples[k] - expected, np.diag(H @ covariance @ H.T + noise), gate, limit)
-        if not used.any():
-            return x, covariance, np.nan, 0, 0.0
-        innovation = (samples[k] - expected)[used]
-        after = correct(x, covariance, innovation, H[used], noise[np.ix_(used, used)])
-        S = after.innovation_covariance
-        square, likelihood = normalised_square(innovation, S), log_likelihood(innovation, S)
-        return after.estimate, after.covariance, float(square), int(used.sum()), float(likelihood)
+        return _extended_update(x, covariance, samples[k], measured(k, x), noise, (gate, limit))
 
     return _passed(start, P, predict, update, len(samples))
+
+
+def _extended_update(
+    x: np.ndarray,
+    covariance: np.ndarray,
+    sample: np.ndarray,
+    expected: tuple[np.ndarray, np.ndarray],
+    noise: np.ndarray,
+    limits: tuple[float | np.ndarray, float | np.ndarray],
+) -> _Updated:
+    """After a sample, of what was expected of it with its Jacobian, and with gate and limit."""
+    y, H = expected
+    used = _used(sample - y, np.diag(H @ covariance @ H.T + noise), *limits)
+    if not used.any():
+        return _unchanged(x, covariance)
+    innovation = (sample - y)[used]
+    return _updated(correct(x, covariance, innovation, H[used], noise[np.ix_(used, used)]), innovation)
 
 
 def unscented_pass(
@@ -161,32 +171,55 @@ def unscented_pass(
     """
     w = unscented.weights(len(start), alpha, beta, kappa)
 
-    def predict(k: int, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        points = unscented.sigma_points(x, factor(covariance), w.spread)
-        before = unscented.scattered(lambda at: at, points)
-        after = unscented.scattered(lambda at: transition(k, at), points)
+    def predict(k: int, x: np.ndarray, covariance: np.ndarray) -> _Predicted:
+        before, after = _scattered(x, covariance, lambda at: transition(k, at), w)
         ahead = symmetric(unscented.covariance(after, after, w)) + QN
         return unscented.mean(after, w), ahead, unscented.covariance(before, after, w)
 
-    def update(k: int, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int, float]:
-        if not np.isfinite(samples[k]).all():
-            return x, covariance, np.nan, 0, 0.0
-        points = unscented.sigma_points(x, factor(covariance), w.spread)
-        states = unscented.scattered(lambda at: at, points)
-        seen = unscented.scattered(lambda at: measured(k, at), points)
-        after = unscented.correct(x, covariance, states, seen, samples[k], RN, w)
-        innovation, S = samples[k] - unscented.mean(seen, w), after.innovation_covariance
-        square, likelihood = normalised_square(innovation, S), log_likelihood(innovation, S)
-        return after.estimate, after.covariance, float(square), samples.shape[1], float(likelihood)
+    def update(k: int, x: np.ndarray, covariance: np.ndarray) -> _Updated:
+        return _unscented_update(x, covariance, samples[k], lambda at: measured(k, at), RN, w)
 
     return _passed(start, P, predict, update, len(samples))
 
 
-_Predict = Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
-_Update = Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, float, int, float]]
+def _unscented_update(
+    x: np.ndarray,
+    covariance: np.ndarray,
+    sample: np.ndarray,
+    measured: Callable[[np.ndarray], np.ndarray],
+    noise: np.ndarray,
+    w: unscented.Weights,
+) -> _Updated:
+    if not np.isfinite(sample).all():
+        return _unchanged(x, covariance)
+    states, seen = _scattered(x, covariance, measured, w)
+    after = unscented.correct(x, covariance, states, seen, sample, noise, w)
+    return _updated(after, sample - unscented.mean(seen, w))
 
 
-def _passed(start: np.ndarray, P: np.ndarray, predict: _Predict, update: _Update, count: int) -> FilterPass:
+def _scattered(
+    x: np.ndarray, covariance: np.ndarray, function: Callable[[np.ndarray], np.ndarray], w: unscented.Weights
+) -> tuple[unscented.Scattered, unscented.Scattered]:
+    """Sigma points of an estimate, and a function at them."""
+    points = unscented.sigma_points(x, factor(covariance), w.spread)
+    return unscented.scattered(lambda at: at, points), unscented.scattered(function, points)
+
+
+def _unchanged(x: np.ndarray, covariance: np.ndarray) -> _Updated:
+    """Where nothing was measured."""
+    return x, covariance, np.nan, 0, 0.0
+
+
+def _updated(after: Corrected, innovation: np.ndarray) -> _Updated:
+    """What a correction leaves, with the measures of its innovation."""
+    S = after.innovation_covariance
+    square, likelihood = normalised_square(innovation, S), log_likelihood(innovation, S)
+    return after.estimate, after.covariance, float(square), len(innovation), float(likelihood)
+
+
+def _passed(
+    start: np.ndarray, P: np.ndarray, predict: Callable[..., _Predicted], update: Callable[..., _Updated], count: int
+) -> FilterPass:
     n = len(start)
     estimates, predictions = np.empty((count, n)), np.empty((count, n))
     covariances, predicted, crosses = (np.zeros((count, n, n)) for _ in range(3))

@@ -49,6 +49,16 @@ class Effort:
     max_iterations: int = 50
     deadline: float = inf
 
+    def exhausted(self, iterations: int, size: float, seconds: float) -> str:
+        """Why another step is one too many; empty where it is not.
+
+        Args:
+            iterations: steps done. size: of the last one, in standard deviations. seconds: after another step.
+        """
+        if iterations >= self.max_iterations:
+            return f"not converged in {iterations} steps, the last of {size:.3g} standard deviations"
+        return f"deadline of {self.deadline:g} s after {iterations} steps" if seconds > self.deadline else ""
+
 
 @dataclass(frozen=True, eq=False)
 class FullSolution:
@@ -134,14 +144,14 @@ class FullSolver:
             WindowError: bounds contradict one another, a number is not finite, or no trajectory of the model keeps the
                 bounds; the message says which.
         """
-        problem, given, start = self.problem, np.asarray(rows), np.asarray(points, dtype=float)
+        problem, window, start = self.problem, np.asarray(rows), np.asarray(points, dtype=float)
         if not problem.disturbed:
-            program = self._program(len(given), problem.order)
-            return _Search(problem, self._stages, program, arrival, given, np.asarray(shared)).solve(start, effort)
+            program = self._program(len(window), problem.order)
+            return _Search(problem, self._stages, program, arrival, window, np.asarray(shared)).solve(start, effort)
         # the disturbance into the first row is a noise of its own where the state before it has an empty row
-        given = np.vstack([np.zeros(problem.layout.width), given])
-        program = self._program(len(given), problem.order, problem.disturbed)
-        search = _Search(problem, self._stages, program, arrival, given, np.asarray(shared))
+        window = np.vstack([np.zeros(problem.layout.width), window])
+        program = self._program(len(window), problem.order, problem.disturbed)
+        search = _Search(problem, self._stages, program, arrival, window, np.asarray(shared))
         found = search.solve(np.vstack([np.reshape(arrival.point, (1, -1)), start]), effort)
         return replace(found, states=found.states[1:], noises=found.noises[1:], weights=found.weights[1:])
 
@@ -164,7 +174,7 @@ class _Search:
             if not np.isfinite(value).all():
                 raise WindowError(f"the window holds a number in its {name} that is not finite.")
         robust = any(loss != "squares" for loss in problem.losses)
-        self.doubts = problem.loss_scale(shared) if robust else 1.0  # deviations at which the losses doubt
+        self.loss_scale = problem.loss_scale(shared) if robust else 1.0  # deviations from which losses grow less
         q, n = problem.layout.measurements, problem.order
         self.used, self.measured = rows[:, -q:], rows[:, -2 * q : -q]
         self.lower, self.upper = np.full((len(rows), n), -inf), np.full((len(rows), n), inf)
@@ -182,33 +192,26 @@ class _Search:
             self.lower[first:, list(problem.bounded)], self.upper[first:, list(problem.bounded)] = low, high
 
     def solve(self, start: np.ndarray, effort: Effort) -> FullSolution:
-        """The solution.
-
-        Args:
-            start: shape (N, n). effort: what it may cost.
-        """
+        """The solution from a first guess of shape (N, n), for as much as it may cost."""
         began = perf_counter()
         states = np.clip(start, self.lower, self.upper)
         point = self.at(states, None)
-        doubt, after = self.spread(point)  # doubt of the newest row: nothing has smoothed it yet
+        believed, after = self.spread(point)  # of the newest row: nothing has smoothed it yet
         self.scale = np.sqrt(np.maximum(after.diagonal(), 1e-300))
         kept, feasible = point, self.keeps(point)
         iterations, size, lasted, reason = 0, inf, 0.0, ""
         while size > effort.tolerance:
             spent = perf_counter() - began
-            if iterations >= effort.max_iterations:
-                reason = f"not converged in {iterations} steps, the last of {size:.3g} standard deviations"
-            elif spent + lasted > effort.deadline:
-                reason = f"deadline of {effort.deadline:g} s after {iterations} steps"
+            reason = effort.exhausted(iterations, size, spent + lasted)
             if reason:
                 break
-            step = self.programmed(point, doubt if iterations == 0 else None)
+            step = self.programmed(point, believed if iterations == 0 else None)
             if not step.solved and iterations == 0:
                 raise WindowError(f"no trajectory of the model keeps all bounds{self.broken(start)}.")
             if not step.solved:
                 reason = f"the quadratic programme ended with {step.status}"
                 break
-            before, weights = point.stages, self.weights(point, doubt if iterations == 0 else None)
+            before, weights = point.stages, self.weights(point, believed if iterations == 0 else None)
             point, share = self.searched(point, step, free=iterations == 0)
             linear = share == 1.0 and self.unchanged(before, point, weights)  # the programme was the problem itself
             size = float(np.abs(share * step.change / self.scale).max())
@@ -221,7 +224,7 @@ class _Search:
             if share <= _SMALLEST_SHARE and size > effort.tolerance:
                 reason = "no part of the last step makes the cost smaller"
                 break
-        return self.told(kept if reason else point, size, iterations, began, reason)
+        return self.solution(kept if reason else point, size, iterations, began, reason)
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -234,14 +237,14 @@ class _Search:
         squares = self.used * (self.measured - stages.measured) ** 2 / np.where(self.used > 0.0, stages.variances, 1.0)
         return _Point(states, noises, stages, squares)
 
-    def weights(self, point: _Point, doubt: np.ndarray | None = None) -> np.ndarray:
-        """How much each measurement counts; the newest row judged with the doubt [covariance] of its prediction."""
+    def weights(self, point: _Point, believed: np.ndarray | None = None) -> np.ndarray:
+        """How much each measurement counts; the newest row judged with the covariance of its prediction."""
         squares = point.squares.copy()
-        if doubt is not None:
-            spread = np.einsum("qi,ij,qj->q", point.stages.H[-1], doubt, point.stages.H[-1])
+        if believed is not None:
+            spread = np.einsum("qi,ij,qj->q", point.stages.H[-1], believed, point.stages.H[-1])
             variances = np.where(self.used[-1] > 0.0, point.stages.variances[-1], 1.0)
             squares[-1] *= variances / (variances + spread)
-        found = [robust_loss.weight(loss, squares[:, j], self.doubts) for j, loss in enumerate(self.problem.losses)]
+        found = [robust_loss.weight(loss, squares[:, j], self.loss_scale) for j, loss in enumerate(self.problem.losses)]
         return np.asarray(self.used * np.stack(found, axis=1))
 
     def curvatures(self, point: _Point) -> np.ndarray:
@@ -252,7 +255,7 @@ class _Search:
         weights = self.weights(point)
         for j, loss in enumerate(self.problem.losses):
             if loss == "geman_mcclure":
-                share = point.squares[:, j] / self.doubts**2
+                share = point.squares[:, j] / self.loss_scale**2
                 exact = self.used[:, j] * (1.0 - 3.0 * share) / (1.0 + share) ** 3
                 weights[:, j] = np.maximum(exact, _LEAST_CURVATURE * weights[:, j])
         return weights
@@ -263,21 +266,21 @@ class _Search:
         residuals = np.einsum("kpq,kq->kp", point.stages.whitening, roots * (self.measured - point.stages.measured))
         return residuals, np.einsum("kpq,kqn->kpn", point.stages.whitening, roots[:, :, None] * point.stages.H)
 
-    def programmed(self, point: _Point, doubt: np.ndarray | None) -> Step:
+    def programmed(self, point: _Point, believed: np.ndarray | None) -> Step:
         """The quadratic programme of a step: first without bounds, and with them where it would break one."""
-        weights = self.weights(point, doubt)
+        weights = self.weights(point, believed)
         residuals, H = self.whitened(point, weights)
-        _, bent = self.whitened(point, weights if doubt is not None else self.curvatures(point))
+        _, bent = self.whitened(point, weights if believed is not None else self.curvatures(point))
         A = np.einsum("kqi,kqj->kij", bent, bent)
         b = -np.einsum("kqi,kq->ki", H, residuals)
         stages = point.stages
-        given = (A, b, stages.F, stages.G, stages.moved - point.states)
+        quadratic = (A, b, stages.F, stages.G, stages.moved - point.states)
         lower, upper = self.lower - point.states, self.upper - point.states
         if self.active(point.states) == 0 and not self.disturbed:
-            found = self.program.solve_free(*given)
+            found = self.program.solve_free(*quadratic)
             if found.solved and ((found.change >= lower) & (found.change <= upper)).all():
                 return found
-        found = self.program.solve(*given, lower, upper, self.noise_limits)
+        found = self.program.solve(*quadratic, lower, upper, self.noise_limits)
         return found._replace(change=np.clip(found.change, lower, upper))
 
     def searched(self, point: _Point, step: Step, *, free: bool) -> tuple[_Point, float]:
@@ -310,11 +313,11 @@ class _Search:
     def cost(self, point: _Point) -> float:
         """Half the squares of the noises, and the losses."""
         losses = [
-            robust_loss.cost(loss, point.squares[:, j], self.doubts) for j, loss in enumerate(self.problem.losses)
+            robust_loss.cost(loss, point.squares[:, j], self.loss_scale) for j, loss in enumerate(self.problem.losses)
         ]
         return float(0.5 * (point.noises**2).sum() + sum(loss.sum() for loss in losses))
 
-    # -- what is told -----------------------------------------------------------------------------------------------
+    # -- what is reported -------------------------------------------------------------------------------------------
 
     def spread(self, point: _Point) -> tuple[np.ndarray, np.ndarray]:
         """Covariance of the last row before and after its measurements, shapes (n, n)."""
@@ -373,7 +376,7 @@ class _Search:
         ]
         return "; the first guess breaks them: " + "; ".join(parts) if parts else ""
 
-    def told(self, point: _Point, size: float, iterations: int, began: float, reason: str) -> FullSolution:
+    def solution(self, point: _Point, size: float, iterations: int, began: float, reason: str) -> FullSolution:
         """The solution in full."""
         weights = self.weights(point)
         residuals, _ = self.whitened(point, weights)

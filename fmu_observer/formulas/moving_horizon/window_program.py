@@ -41,18 +41,18 @@ class Step(NamedTuple):
 
 
 class Programme(NamedTuple):
-    """``min z' H z / 2 + g' z`` with ``A z`` between two sides, and bounds of z.
+    """``min z' H z / 2 + g' z`` with ``A z`` between two limits, and bounds of z.
 
     Attributes:
         h: nonzeros of H as in `WindowProgram.cost`. g: shape (2 N n,). a: nonzeros of A as in its `transitions`.
-        sides: of the transitions, equal, then of the noises with bounds, shape (N n + N d,).
+        limits: of the transitions, equal, then of the noises with bounds, shape (N n + N d,).
         lower, upper: bounds of z, shape (2 N n,).
     """
 
     h: np.ndarray
     g: np.ndarray
     a: np.ndarray
-    sides: tuple[np.ndarray, np.ndarray]
+    limits: tuple[np.ndarray, np.ndarray]
     lower: np.ndarray
     upper: np.ndarray
 
@@ -92,8 +92,8 @@ class WindowProgram:
             [place.ravel()[self._kept], np.repeat(of_noise, order, axis=0).ravel()],
             size + count * len(disturbed),
         )
-        told: dict[str, Any] = {"print_time": False, "error_on_fail": False, solver: dict(options)}
-        self._solver = ca.conic("window", solver, {"h": self.cost, "a": self.transitions}, told)
+        settings: dict[str, Any] = {"print_time": False, "error_on_fail": False, solver: dict(options)}
+        self._solver = ca.conic("window", solver, {"h": self.cost, "a": self.transitions}, settings)
         self._call = BufferedCall(self._solver)
         self._rest = [np.zeros(self._solver.nnz_in(i)) for i in range(10, self._solver.n_in())]
 
@@ -118,25 +118,28 @@ class WindowProgram:
             noise: bounds of ``G w`` where it has some, infinite for none, shape (N, d) each; None for none.
         """
         N, n = self.count, self.order
-        columns = np.empty((N, n, n + 1))
-        columns[:, :, 0] = -1.0
-        columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
-        of_noise = np.concatenate([G, G[:, self.disturbed]], axis=1).transpose(0, 2, 1)
-        coupling = np.concatenate([columns.ravel()[self._kept], of_noise.ravel()])
-        none = _FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without sides
+        none = _FREE * (1.0 + np.linalg.norm(G[:, self.disturbed], axis=2))  # PIQP warns of rows without limits
         low, high = (-none, none) if noise is None else (np.maximum(noise[0], -none), np.minimum(noise[1], none))
         free, zero = np.full(N * n, np.inf), np.zeros(N * n)
-        given = Programme(
+        programme = Programme(
             h=np.concatenate([A.ravel(), zero + 1.0]),
             g=np.concatenate([b.ravel(), zero]),
-            a=coupling,
-            sides=(np.concatenate([-c.ravel(), low.ravel()]), np.concatenate([-c.ravel(), high.ravel()])),
+            a=self._coupling(F, G),
+            limits=(np.concatenate([-c.ravel(), low.ravel()]), np.concatenate([-c.ravel(), high.ravel()])),
             lower=np.concatenate([lower.ravel(), -free]),
             upper=np.concatenate([upper.ravel(), free]),
         )
-        found, prices, status = self.handed(given)
+        found, prices, status = self.handed(programme)
         changes, noises = found.reshape(2, N, n)
         return Step(changes, noises, prices[: N * n].reshape(N, n), status)
+
+    def _coupling(self, F: np.ndarray, G: np.ndarray) -> np.ndarray:
+        """Nonzeros of the transitions' matrix."""
+        columns = np.empty((self.count, self.order, self.order + 1))
+        columns[:, :, 0] = -1.0
+        columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
+        of_noise = np.concatenate([G, G[:, self.disturbed]], axis=1).transpose(0, 2, 1)
+        return np.concatenate([columns.ravel()[self._kept], of_noise.ravel()])
 
     def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
         """Solve one without bounds.
@@ -147,20 +150,20 @@ class WindowProgram:
         free = np.full((self.count, self.order), np.inf)
         return self.solve(A, b, F, G, c, -free, free)
 
-    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, programme: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """What the solver finds.
 
         Args:
-            given: the programme.
+            programme: with numbers.
 
         Returns:
             z, the multipliers of the rows of A, and the solver's status.
         """
-        h, g, a, (least, most), lower, upper = given
+        h, g, a, (least, most), lower, upper = programme
         nothing, none = np.zeros(len(g)), np.zeros(len(least))
-        told = self._call(h, g, a, least, most, lower, upper, nothing, nothing, none, *self._rest)
+        found = self._call(h, g, a, least, most, lower, upper, nothing, nothing, none, *self._rest)
         status = str(self._solver.stats(self._call.memory)["unified_return_status"])
-        return told[0].copy(), told[2].copy(), status
+        return found[0].copy(), found[2].copy(), status
 
 
 class SweptProgram(WindowProgram):

@@ -166,11 +166,7 @@ def train_classifier(
         best = max(found, key=lambda pair: max(found[pair].values()))
         ranked = sorted(found[best], key=lambda label: -found[best][label])
         if found[best][ranked[0]] < space.margin and not overlap:
-            raise SeparationError(
-                f"no pair of {space.draws} draws holds one of the classes {_listed(left)} apart from the others by "
-                f"{space.margin:g} of the range; the best strip is {found[best][ranked[0]]:.3g}. Draw more, offer "
-                f"other orders or properties, ask for a smaller margin, or accept overlap=True."
-            )
+            raise _not_separable(space, left, found[best][ranked[0]])
         for label in ranked[: len(left) - 1]:
             rivals = {rival: s for rival, s in drawn[best][label].items() if rival in left}
             margin = min(s.margin for s in rivals.values())
@@ -178,6 +174,14 @@ def train_classifier(
                 stages.append(SearchStage(label, _plane(best, values), rivals, margin))
                 left.remove(label)
     return SignatureClassifier(tuple(stages), next(iter(left)), tuple(groups))
+
+
+def _not_separable(space: PencilSpace, left: Iterable[Hashable], widest: float) -> SeparationError:
+    return SeparationError(
+        f"no pair of {space.draws} draws holds one of the classes {_listed(left)} apart from the others by "
+        f"{space.margin:g} of the range; the best strip is {widest:.3g}. Draw more, offer other orders or properties, "
+        f"ask for a smaller margin, or accept overlap=True."
+    )
 
 
 class Drawn(NamedTuple):

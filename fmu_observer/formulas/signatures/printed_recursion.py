@@ -48,9 +48,6 @@ def next_printed(
     bend = short_point[1] - 2.0 * x.short_ordinate + x.short_earlier
     sharper = bend > x.bend
     best, best_at = np.where(sharper, bend, x.bend), np.where(sharper, x.short_abscissa, x.bend_at)
-    top = np.maximum(x.abscissa_before, x.last_tip)
-    nearest = np.minimum(near, x.near_before)
-    low = np.minimum(x.lowest, x.lowest_before)
     at_bend = np.where(best > x.bend_before, best_at, x.bend_at_before)
     return tips | {
         "ordinate_before": long_point[1],
@@ -64,6 +61,16 @@ def next_printed(
         "bend_at": np.where(tip, x.short_abscissa, best_at),
         "bend_before": np.where(tip, best, x.bend_before),
         "bend_at_before": np.where(tip, best_at, x.bend_at_before),
+        **_properties(x, tip, near, at_bend),
+    }
+
+
+def _properties(x: Any, tip: Array, near: Array, at_bend: Array) -> dict[str, Array]:
+    """Properties, new at a tip, by the smallest abscissa at its ordinate and the abscissa of the sharpest bend."""
+    top = np.maximum(x.abscissa_before, x.last_tip)
+    nearest = np.minimum(near, x.near_before)
+    low = np.minimum(x.lowest, x.lowest_before)
+    return {
         "held_length": np.where(tip, 0.5 * (top + nearest) - low, x.held_length),
         "held_short_tip": np.where(tip, at_bend, x.held_short_tip),
         "held_gap": np.where(tip, top - nearest, x.held_gap),

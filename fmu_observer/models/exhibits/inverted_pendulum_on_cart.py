@@ -24,20 +24,7 @@ def inverted_pendulum_cart() -> ObserverModel:
     ``dv = -(m g / M) a + f / M``, ``dq = ((M + m) g / (M l)) a - f / (M l)``, ``di = (u - R i - (k / r) v) / L``,
     ``dp = v``, ``da = q``. The pendulum falls with the time constant ``sqrt(M l / ((M + m) g))`` = 0.68 s.
     """
-    force = _MOTOR / _ROLLER
-    fall = (_CART + _BOB) * _GRAVITY / (_CART * _LENGTH)
-    A = np.zeros((5, 5))
-    A[0, 2], A[0, 4] = force / _CART, -_BOB * _GRAVITY / _CART
-    A[1, 2], A[1, 4] = -force / (_CART * _LENGTH), fall
-    A[2, 0], A[2, 2] = -force / _INDUCTANCE, -_RESISTANCE / _INDUCTANCE
-    A[3, 0], A[4, 1] = 1.0, 1.0
-    B = np.zeros((5, 1))
-    B[2, 0] = 1.0 / _INDUCTANCE
-    measured = (
-        input_signal("current", "A", 0.0, "Motor current"),
-        input_signal("position", "m", 0.0, "Position of the cart at a mark"),
-        input_signal("angle", "rad", 0.0, "Angle of the pendulum in a picture"),
-    )
+    A, B = _matrices()
     return ObserverModel(
         name="inverted_pendulum_cart",
         description="Inverted pendulum on a cart: current measured always, position and angle at samples",
@@ -50,10 +37,28 @@ def inverted_pendulum_cart() -> ObserverModel:
             state("angle", "rad", 0.0, "Angle of the pendulum from upright"),
         ),
         inputs=(input_signal("voltage", "V", 0.0, "Voltage of the motor"),),
-        measurements=measured,
+        measurements=(
+            input_signal("current", "A", 0.0, "Motor current"),
+            input_signal("position", "m", 0.0, "Position of the cart at a mark"),
+            input_signal("angle", "rad", 0.0, "Angle of the pendulum in a picture"),
+        ),
         A=A,
         B=B,
         C=np.eye(5)[2:],
         event="sample",
         sample_period=0.1,
     )
+
+
+def _matrices() -> tuple[np.ndarray, np.ndarray]:
+    """A and B about the upright rest."""
+    force = _MOTOR / _ROLLER
+    fall = (_CART + _BOB) * _GRAVITY / (_CART * _LENGTH)
+    A = np.zeros((5, 5))
+    A[0, 2], A[0, 4] = force / _CART, -_BOB * _GRAVITY / _CART
+    A[1, 2], A[1, 4] = -force / (_CART * _LENGTH), fall
+    A[2, 0], A[2, 2] = -force / _INDUCTANCE, -_RESISTANCE / _INDUCTANCE
+    A[3, 0], A[4, 1] = 1.0, 1.0
+    B = np.zeros((5, 1))
+    B[2, 0] = 1.0 / _INDUCTANCE
+    return A, B

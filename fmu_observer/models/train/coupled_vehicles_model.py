@@ -13,6 +13,12 @@ from plant_models.hybrid import input_signal, state
 _LOCOMOTIVE, _WAGON = 90e3, 60e3  # [kg]
 _STIFFNESS, _DAMPING = 2.5e6, 5e4  # of the coupler [N/m], [N.s/m]
 DRAG = 2e-3  # slope of the running resistance per mass [1/s]
+_BEYOND = "Acceleration by effort beyond the one that was told"
+_STATES = (
+    state("elongation", "m", 0.0, "Elongation of the coupler"),
+    state("speed", "m/s", 10.0, "Speed of the locomotive"),
+    state("wagon_speed", "m/s", 10.0, "Speed of the wagon"),
+)
 
 
 def coupled_vehicles(
@@ -27,40 +33,26 @@ def coupled_vehicles(
 
     Both speeds are measured; the elongation e of the coupler is not, and the effort differs from the command u by an
     unknown ``m1 d``, a wheel that slides or a brake that fails. The smallest train on which decoupling shows
-    something: the coupler is told from the wagon's speed, whatever the locomotive's wheels do.
+    something: the coupler is known from the wagon's speed, whatever the locomotive's wheels do.
 
     Args:
         mass: m1 [kg]. wagon_mass: m2 [kg]. drag: r, slope of the resistance per mass [1/s]. effort: force per effort, b
             [1]. stiffness: K [N/m]. damping: D [N.s/m].
     """
     require_mass("coupled_vehicles", mass=mass, wagon_mass=wagon_mass)
-    A = np.array(
-        [
-            [0.0, 1.0, -1.0],
-            [-stiffness / mass, -damping / mass - drag, damping / mass],
-            [stiffness / wagon_mass, damping / wagon_mass, -damping / wagon_mass - drag],
-        ]
-    )
+    first = [-stiffness / mass, -damping / mass - drag, damping / mass]
+    second = [stiffness / wagon_mass, damping / wagon_mass, -damping / wagon_mass - drag]
     return ObserverModel(
         name="coupled_vehicles",
         description="Locomotive and wagon behind a coupler, both speeds measured, the effort not quite known",
         source="ours, for Aguiar Cota 2019, (2.11)",
-        states=(
-            state("elongation", "m", 0.0, "Elongation of the coupler"),
-            state("speed", "m/s", 10.0, "Speed of the locomotive"),
-            state("wagon_speed", "m/s", 10.0, "Speed of the wagon"),
-        ),
+        states=_STATES,
         inputs=(input_signal("effort", "N", 0.0, "Effort that the locomotive was told: traction > 0, brake < 0"),),
-        measurements=(
-            input_signal("speed", "m/s", 10.0, "Speed of the locomotive"),
-            input_signal("wagon_speed", "m/s", 10.0, "Speed of the wagon"),
-        ),
-        A=A,
+        measurements=tuple(input_signal(s.name, s.unit, s.start, s.description) for s in _STATES[1:]),
+        A=np.array([[0.0, 1.0, -1.0], first, second]),
         B=np.array([[0.0], [effort / mass], [0.0]]),
         C=np.eye(3)[1:],
         sample_period=0.1,
-        unknown_inputs=(
-            input_signal("acceleration_error", "m/s2", 0.0, "Acceleration by effort beyond the one that was told"),
-        ),
+        unknown_inputs=(input_signal("acceleration_error", "m/s2", 0.0, _BEYOND),),
         H=np.array([[0.0], [1.0], [0.0]]),
     )

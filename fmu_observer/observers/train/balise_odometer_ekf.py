@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import rows_of
 from fmu_observer.formulas.filtering.kalman import (
     correct,
     integrated_noise,
@@ -300,7 +301,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "creeping as much as they may, readings at their period and a balise at the end of each gap; readings that "
             "are refused, and standstill, are left out",
             notes=("the filter's own function e' inv(P) e grows over no sequence of gaps, whatever they are",),
-            lyapunov_matrix=tuple(tuple(map(float, row)) for row in np.linalg.inv(asked.covariance)),
+            lyapunov_matrix=rows_of(np.linalg.inv(asked.covariance)),
         )
 
     def deciding_parameters(self) -> tuple[Signal, ...]:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.periodic import PeriodicStability, periodic_stability
 from fmu_observer.certificates.polytope import polytope_stability
@@ -264,7 +264,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             holds=holds,
             error_model=model,
             notes=(note,),
-            lyapunov_matrix=tuple(tuple(map(float, row)) for row in P),
+            lyapunov_matrix=rows_of(P),
         )
 
     def working_point(self, p: Any) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import rows_of
 from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,
@@ -213,7 +214,7 @@ class StoppingUio(GatedObserver, GapCertified):
             scaled = rate @ transition @ np.linalg.inv(rate)
             form = scipy.linalg.solve_discrete_lyapunov(scaled.T, np.eye(3))
             margin = float(np.linalg.eigvalsh(form - scaled.T @ form @ scaled).min() / np.linalg.eigvalsh(form).max())
-            rows = tuple(tuple(map(float, row)) for row in rate @ form @ rate)
+            rows = rows_of(rate @ form @ rate)
         return Certificate(
             max_gap=max_gap,
             horizon=inf,
