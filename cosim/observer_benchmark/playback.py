@@ -18,7 +18,7 @@ from cosim.errors import ScenarioError
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.run.component_models import make_declared, make_system
 from cosim.run.connections import parse_connections
-from cosim.run.scenario_structure import describe_component
+from cosim.run.described_components import describe_component
 from cosim.run.signal_roles import ROLES, roles_of_balises
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable

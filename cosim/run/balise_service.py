@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from cosim.balises.delivery import Receiver
@@ -36,7 +36,7 @@ UNTOUCHED = ("early-return", "interpolate")
 PLAYED_BACK = "the plant is a recording, which goes to any time and back"
 
 
-@dataclass
+@dataclass(frozen=True)
 class Choice:
     """The localisation method of a run.
 
@@ -48,7 +48,7 @@ class Choice:
     method: Method
     reason: str
     probe: ProbeReport | None = None
-    warnings: list[str] = field(default_factory=list)
+    warnings: Sequence[str] = ()
     error: PlantError = NO_ERROR
 
     def to_dict(self) -> dict[str, str]:
@@ -58,7 +58,34 @@ class Choice:
         )
 
 
-def find_receivers(table: BalisesTable, components: Mapping[str, Component], plant: str, where: str) -> list[str]:
+@dataclass(frozen=True)
+class BaliseRoles:
+    """Who has to do with balises.
+
+    Args:
+        plant: component that passes them; empty without balises. receivers: components that take telegrams.
+    """
+
+    plant: str = ""
+    receivers: Sequence[str] = ()
+
+
+def balise_roles(table: BalisesTable | None, components: Mapping[str, Component], where: str) -> BaliseRoles:
+    """Who passes the balises of a scenario, and who takes telegrams.
+
+    Args:
+        table: of the balises, None without. components: by name. where: name of the scenario, for messages.
+
+    Raises:
+        ScenarioError: a signal or a receiver that cannot be.
+    """
+    if table is None:
+        return BaliseRoles()
+    plant = _watched_plant(table, components, where)
+    return BaliseRoles(plant, _receivers(table, components, plant, where))
+
+
+def _receivers(table: BalisesTable, components: Mapping[str, Component], plant: str, where: str) -> list[str]:
     """Names of the components that are told of balises: those listed, or all but the plant that declare the event.
 
     Args:
@@ -79,7 +106,7 @@ def find_receivers(table: BalisesTable, components: Mapping[str, Component], pla
     return table.receivers
 
 
-def watched_plant(table: BalisesTable, components: Mapping[str, Component], where: str) -> str:
+def _watched_plant(table: BalisesTable, components: Mapping[str, Component], where: str) -> str:
     """Name of the component whose position finds the balises; of recorded telegrams, for which none is needed, of a
     recording.
 
@@ -145,14 +172,14 @@ def choose_method(
     report = known_probe(make, starts, start, step)
     chosen, reason = choose(report.honest_step, report.restores, table.clock)
     method, why = (chosen, reason) if asked is None else (asked, ASKED_FOR)
-    choice = Choice(method, why, report, error=plant_error(table, method, component, start, report))
-    if asked is not None and choice.error.unknown:
-        choice.warnings.append(
+    error = plant_error(table, method, component, start, report)
+    warnings = []
+    if asked is not None and error.unknown:
+        warnings.append(
             f"balises.method = '{asked}' although the probe of '{component.name}' advises '{chosen}': {reason}. How "
-            f"far the "
-            f"instants are off is unknown (time_bound = nan): {choice.error.unknown}."
+            f"far the instants are off is unknown (time_bound = nan): {error.unknown}."
         )
-    return choice
+    return Choice(method, why, report, tuple(warnings), error)
 
 
 def known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start: float, step: float) -> ProbeReport:
@@ -207,17 +234,14 @@ def _why_unknown(method: Method, report: ProbeReport | None, position: str, tole
     return "" if seen else "the position is no output, and the probe looks at outputs only"
 
 
-def make_service(
-    table: BalisesTable, layout: Layout, plan: Plan, plant: str, receivers: Sequence[str], choice: Choice
-) -> BaliseService:
+def make_service(table: BalisesTable, layout: Layout, plan: Plan, roles: BaliseRoles, choice: Choice) -> BaliseService:
     """Everything about balises for the master.
 
     Args:
         table: of the scenario. layout: of the balises. plan: prepared, components instantiated.
-        plant: component whose position is watched. receivers: components that take telegrams.
-        choice: how crossings are found, and why.
+        roles: who passes them and who takes telegrams. choice: how crossings are found, and why.
     """
-    planned = plan.find(plant)
+    planned = plan.find(roles.plant)
     first = planned.columns.start
     watch = PlantMonitor(planned, 0, 0)  # where telegrams are recorded nobody looks at them
     if table.position is not None and table.speed is not None:
@@ -226,9 +250,9 @@ def make_service(
         watch = PlantMonitor(planned, position, speed, *scales)
     watch.error = choice.error
     localiser, channel = _sources(table, layout, watch, choice.method)
-    told = [Receiver(plan.find(name), BALISE_EVENT, table.timing) for name in receivers]
+    receivers = [Receiver(plan.find(name), BALISE_EVENT, table.timing) for name in roles.receivers]
     odometer = None if table.odometer is None else plan.column(table.odometer)
-    return BaliseService(localiser, channel, told, odometer, first + watch.position_column)
+    return BaliseService(localiser, channel, receivers, odometer, first + watch.position_column)
 
 
 def _sources(table: BalisesTable, layout: Layout, watch: PlantMonitor, method: Method) -> tuple[Localiser, Channel]:

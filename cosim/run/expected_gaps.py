@@ -20,7 +20,8 @@ from cosim.network.settings import NetworkSettings
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.run.component_models import make_system, values_in_use
 from cosim.run.layouts import Layout
-from cosim.run.network import READINGS, ROUNDING, Network, is_wired
+from cosim.run.network import Network, is_wired
+from cosim.run.network_connections import READINGS, ROUNDING
 from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from cosim.scenario.schema import ScenarioTable
 

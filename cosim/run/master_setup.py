@@ -1,18 +1,12 @@
-"""The master of a scenario: from its tables to order, algorithm, step control and master."""
+"""From plan and services to the master that a scenario asks for: algorithm, step control, rates, stepper, recorder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
-from cosim.balises.service import BaliseService
 from cosim.compiled.choice import choose_stepper
-from cosim.components.component import Component
-from cosim.coupling.connection import Connection
-from cosim.coupling.graph import Group, execution_groups
-from cosim.coupling.instants import recorded_order
 from cosim.coupling.plan import Plan
-from cosim.coupling.strong import topological
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
 from cosim.master.algorithms.choose import AlgorithmChoice
@@ -27,50 +21,62 @@ from cosim.master.control.fixed import FixedStep
 from cosim.master.control.multirate import set_rates
 from cosim.master.master import Master
 from cosim.master.system import System
-from cosim.network.service import NetworkService
 from cosim.results.recorder import Recorder
 from cosim.results.result_data import SignalInfo
 from cosim.results.stream import Stream
+from cosim.run.services import Services
 from cosim.run.signal_roles import switching_signals
+from cosim.run.task import Task
 from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
 
 
 def make_master(
-    table: ScenarioTable,
-    plan: Plan,
-    axis: TimeAxis,
-    balises: BaliseService | None,
-    progress: Callable[[float], None] | None,
-    choice: AlgorithmChoice,
-    network: NetworkService | None = None,
+    task: Task, plan: Plan, services: Services, choice: AlgorithmChoice, progress: Callable[[float, float], None] | None
 ) -> Master:
     """The master that a scenario asks for.
 
     Args:
-        table: the scenario. plan: prepared, components instantiated. axis: communication points.
-        balises: balise service, or None. progress: called now and then with the time reached [s].
-        choice: the algorithm, and what it iterates. network: over which measurements travel, or None.
+        task: of the run. plan: prepared, components instantiated. services: of the run.
+        choice: the algorithm, and what it iterates. progress: called now and then with the time reached and the end
+            [s].
 
     Raises:
         CouplingError: the components cannot do what is asked for; they are named.
     """
+    table, axis = task.table, task.axis
     master = Master(
         plan,
         axis,
-        balises,
-        progress,
+        services.balises,
+        None if progress is None else lambda t: progress(t, axis.stop),
         algorithm=lambda plan: make_algorithm(table.master, plan, choice),
         control=_control(table.master),
         stepper=partial(choose_stepper, table.master.stepper),
         recorder=partial(make_recorder, table),
         events=table.master.events,
-        network=network,
+        network=services.packets,
     )
     _check_rates(table, choice)
-    _set_rates(table, plan, axis, balises, network)
+    _set_rates(table, plan, axis, services)
     master.choose_stepper()
     return master
+
+
+def master_notes(master: Master) -> list[str]:
+    """What the choice of the stepper and of what is done at events explains.
+
+    Args:
+        master: of the run.
+    """
+    events, network = master.system.events, master.system.network
+    notes = [*([] if events is None else events.notes), *master.stepper.notes]
+    if network is not None and master.stepper.compiled is not None:
+        notes.append(
+            "Packets are sent and delivered by Python: the compiled stepper halts at points with one, "
+            "and leaves steps with one inside to it."
+        )
+    return notes
 
 
 def make_recorder(
@@ -109,57 +115,6 @@ def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> A
     return algorithm
 
 
-def stepping_groups(
-    table: ScenarioTable,
-    components: Mapping[str, Component],
-    connections: Sequence[Connection],
-    plant: str,
-    receivers: Iterable[str],
-) -> list[Group]:
-    """The components in the groups and the order in which a scenario steps them.
-
-    Before the receivers of telegrams must come the plant, and the odometer whose reading the telegrams carry; what was
-    fresh in a run of which a part is played back stays so. First
-    where that is free comes the train: the watched plant, else what the report holds observers against; last come those
-    with `every`, so that they find the newest inputs.
-
-    Args:
-        table: the scenario. components: by name. connections: checked. plant: watched for balises, or empty.
-        receivers: of telegrams.
-
-    Raises:
-        CouplingError: as for `execution_groups`.
-    """
-    odometer = None if table.balises is None else table.balises.odometer
-    sources = {plant} | (set() if odometer is None else {odometer.partition(".")[0]})
-    before = [(source, name) for source in sorted(sources) for name in receivers if source != name]
-    recorded = recorded_order(components, connections)
-    if topological(list(components), {*before, *recorded}) is not None:
-        before += recorded  # else it contradicts what must be: this is not the run that was recorded
-    truth = (table.report.true_position or table.report.true_speed or "").partition(".")[0]
-    train = [name for name in (plant or truth,) if name in components]
-    slow = [name for name, component in table.components.items() if component.every > 1]
-    return execution_groups(components, connections, before, train, slow)
-
-
-def idle_settings(table: MasterTable) -> list[str]:
-    """What the user set that has no effect beside the other settings, in words.
-
-    Args:
-        table: of the scenario.
-    """
-    needs = {
-        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
-        "tolerance": ("control", "doubling", table.control == "doubling"),
-        "smallest_step": ("control", "doubling", table.control == "doubling"),
-    }
-    return [
-        f"master.{key} has no effect without master.{other} = '{value}'."
-        for key, (other, value, works) in needs.items()
-        if key in table.model_fields_set and not works
-    ]
-
-
 def _check_rates(table: ScenarioTable, choice: AlgorithmChoice) -> None:
     for name in (name for loop in choice.iterated for name in loop):
         if table.components[name].every != 1:
@@ -170,9 +125,8 @@ def _check_rates(table: ScenarioTable, choice: AlgorithmChoice) -> None:
             )
 
 
-def _set_rates(
-    table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: BaliseService | None, network: NetworkService | None
-) -> None:
+def _set_rates(table: ScenarioTable, plan: Plan, axis: TimeAxis, services: Services) -> None:
+    balises, network = services.balises, services.packets
     every = {name: component.every for name, component in table.components.items() if component.every != 1}
     substeps = {name: component.substeps for name, component in table.components.items() if component.substeps != 1}
     if every and table.master.control != "fixed":

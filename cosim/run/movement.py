@@ -1,4 +1,4 @@
-"""How the components of a scenario will move over a step, told before the run: the chains of `cosim.coupling.chain`.
+"""From what is coupled to how each component will move over a step, in words: the chains of `cosim.coupling.chain`.
 
 The master builds the chains themselves. Both ask the same functions who takes part in events and what a stage is
 called.
@@ -6,13 +6,13 @@ called.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
 
 from cosim.balises.service import localiser_stage_text, receiver_stage_text
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.chain import COMPILED_STAGE_TEXT, plain_way
-from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.coupling.instants import followed
 from cosim.master.algorithms.choose import AlgorithmChoice
@@ -21,6 +21,7 @@ from cosim.master.events.choose import taking_part
 from cosim.master.events.participant import interrupts
 from cosim.master.events.stride import event_stage_text
 from cosim.network.service import PACKET_STAGE_TEXT
+from cosim.run.coupled import Coupled
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.structure_data import Balises
 
@@ -28,48 +29,71 @@ AT_SET_UP = "chosen at set-up"
 COMPILED = f"{COMPILED_STAGE_TEXT} (where the run can use it)"
 
 
+@dataclass(frozen=True, slots=True)
+class _Steps:
+    """How components are brought over a step.
+
+    Args:
+        part: which take part in events, and whether each gives some. divided: whether others halt within steps.
+        returns: whether a component may end a step early, so that others must go back.
+        lines: components with inputs that follow lines. compiled: whether the compiled stepper may take them.
+    """
+
+    part: Mapping[str, bool]
+    divided: bool
+    returns: bool
+    lines: Set[str]
+    compiled: bool
+
+
 def movement_chains(
-    table: ScenarioTable,
-    components: Mapping[str, Component],
-    connections: Sequence[Connection],
-    clocks: Sequence[ClockConnection],
-    choice: AlgorithmChoice,
-    balises: Balises | None,
-    listeners: Collection[str] | None = None,
+    table: ScenarioTable, coupled: Coupled, order: Sequence[str], choice: AlgorithmChoice, balises: Balises | None
 ) -> dict[str, tuple[str, ...]]:
     """The chain of each component in words, outermost stage first; what a probe decides is named as such.
 
     Args:
-        table: the scenario. components: by name, in execution order. connections: checked.
-        clocks: connections between clocks. choice: of the algorithm.
+        table: the scenario. coupled: its components and connections. order: of execution. choice: of the algorithm.
         balises: who finds the balises and who receives the telegrams, or None.
-        listeners: who is told of packets by events; None where there is no network.
     """
-    part = taking_part(components, connections, clocks, table.master.events, _alone(table, balises))
-    propagated = bool(part) and table.master.events == "propagate"
-    divided = propagated or listeners is not None
-    back = propagated and any(
+    steps = _steps(table, coupled, order, choice, balises)
+    connected = {c.target[0] for c in coupled.routed}
+    listeners = [] if coupled.network is None else [listener.component for listener in coupled.network.listeners]
+    chains = {}
+    for name in order:
+        own = table.components[name]
+        stages = [rate_stage_text(own.every)] if own.every > 1 else []
+        stages += _event_stage(coupled.components[name], steps)
+        stages += _balise_stage(name, balises) or ([PACKET_STAGE_TEXT] if name in listeners else [])
+        stages += [COMPILED] if steps.compiled else []
+        interpolator = AT_SET_UP if name in steps.lines else None
+        chains[name] = (
+            *stages,
+            plain_way(interpolator, own.substeps, inputs=name in connected, gated=name in steps.part),
+        )
+    return chains
+
+
+def _steps(
+    table: ScenarioTable, coupled: Coupled, order: Sequence[str], choice: AlgorithmChoice, balises: Balises | None
+) -> _Steps:
+    components, events = {name: coupled.components[name] for name in order}, table.master.events
+    part = taking_part(components, coupled.routed, coupled.clocks, events, _alone(table, balises))
+    propagated = bool(part) and events == "propagate"
+    returns = propagated and any(
         isinstance(c, FMI3Component) and interrupts(c, gives=part[name])
         for name, c in components.items()
         if name in part
     )
-    connected = {c.target[0] for c in connections}
-    ahead = followed(components, connections)
-    lines = {c.target[0] for c in connections if c.source_variable in ahead}
+    ahead = followed(components, coupled.routed)
     every_line = table.master.inputs != "hold"
-    compiled = not part and not every_line and not lines and _may_compile(table, components, connections, choice)
-    chains = {}
-    for name, component in components.items():
-        every, whole = table.components[name].every, not component.can_vary_step
-        stages = [rate_stage_text(every)] if every > 1 else []
-        stages += [event_stage_text(whole=whole)] if divided and (back or whole) else []
-        told = _balise_stage(name, balises)
-        stages += told or ([PACKET_STAGE_TEXT] if name in (listeners or ()) else [])
-        stages += [COMPILED] if compiled else []
-        interpolator = AT_SET_UP if every_line or name in lines else None
-        inputs, substeps = name in connected, table.components[name].substeps
-        chains[name] = *stages, plain_way(interpolator, substeps, inputs=inputs, gated=name in part)
-    return chains
+    lines = set(order) if every_line else {c.target[0] for c in coupled.routed if c.source_variable in ahead}
+    compiled = not part and not lines and _may_compile(table, components, coupled.routed, choice)
+    return _Steps(part, propagated or coupled.network is not None, returns, lines, compiled)
+
+
+def _event_stage(component: Component, steps: _Steps) -> list[str]:
+    whole = not component.can_vary_step
+    return [event_stage_text(whole=whole)] if steps.divided and (steps.returns or whole) else []
 
 
 def _balise_stage(name: str, balises: Balises | None) -> list[str]:

@@ -1,4 +1,4 @@
-"""Start values: from the parameters of a component's table to variables, elements and arrays."""
+"""From the parameters in the tables of components to start values of variables, elements and arrays."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from cosim.components.component import Component
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.structure import STRUCTURAL
 from cosim.errors import CouplingError
+from cosim.run.component_models import protocol_parameters
+from cosim.run.run_seeds import component_seed
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from fmus.fmi.types import NUMERIC_TYPES, enumeration_items
 
@@ -22,6 +25,27 @@ def given_values(table: ScenarioTable) -> dict[str, list[str]]:
         table: of the scenario.
     """
     return {name: list(component.parameters) for name, component in table.components.items()}
+
+
+def all_start_values(table: ScenarioTable, components: Mapping[str, Component]) -> dict[str, dict[str, StartValue]]:
+    """Start values of a run by component and name: parameters, what is done with late events, and seeds.
+
+    Args:
+        table: the scenario. components: by name, loaded.
+
+    Raises:
+        ScenarioError, CouplingError: as for `start_values`; a component without a parameter that its table sets.
+    """
+    return {
+        name: _start_values(table.components[name], component, table.seed) for name, component in components.items()
+    }
+
+
+def _start_values(table: ComponentTable, component: Component, run_seed: int) -> dict[str, StartValue]:
+    if table.filter is not None:
+        return {}  # they are those of its FMU, which has taken them
+    late = protocol_parameters(table, component, f"components.{component.name}")
+    return start_values(component, late | table.parameters | component_seed(component, table.parameters, run_seed))
 
 
 def start_values(component: Component, parameters: Mapping[str, Any]) -> dict[str, StartValue]:

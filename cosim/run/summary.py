@@ -15,21 +15,22 @@ from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
 from cosim.results.result import Result
+from cosim.run.task import Task
 from cosim.scenario.scenario_tables import ComponentTable
-from cosim.scenario.schema import ScenarioTable
 from fmus.versions import versions
 
 MESSAGES_SHOWN = 20
 
 
-def first_summary(name: str, table: ScenarioTable, plan: Plan) -> dict[str, Any]:
-    """What is known before the first step; arguments as for `run_summary`.
+def first_summary(task: Task, plan: Plan) -> dict[str, Any]:
+    """What is known before the first step.
 
     Args:
-        name: of the scenario. table: of the scenario. plan: prepared, components instantiated.
+        task: of the run. plan: prepared, components instantiated.
     """
+    table = task.table
     return {
-        "scenario": name,
+        "scenario": task.name,
         "title": table.title,
         "description": " ".join(table.description.split()),
         "source": table.source,
@@ -45,19 +46,18 @@ def first_summary(name: str, table: ScenarioTable, plan: Plan) -> dict[str, Any]
     }
 
 
-def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, setup_seconds: float) -> dict[str, Any]:
+def run_summary(task: Task, master: Master, setup_seconds: float) -> dict[str, Any]:
     """Scenario, times, components, versions.
 
     Args:
-        name: of the scenario. table: the scenario. plan, master: after the run. setup_seconds: wall time of the set-up
-            [s].
+        task: of the run. master: after the run. setup_seconds: wall time of the set-up [s].
     """
-    axis, timing = master.axis, master.timing
+    axis, timing, plan = master.axis, master.timing, master.plan
     reached = float(master.recorder.table()["time"][-1]) if master.recorder.count else axis.start
     wall = timing.initialisation + timing.stepping + timing.recording
     in_components = {s.component.name: s.component.seconds_in_all for s in plan.steps}
     rest = max(wall - sum(in_components.values()) - timing.recording, 0.0)  # reading and writing are estimated
-    return first_summary(name, table, plan) | {
+    return first_summary(task, plan) | {
         "start": axis.start,
         "stop": axis.stop,
         "reached": reached,

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.errors import CosimError, ScenarioError
+from cosim.run.described_components import describe_component
 from cosim.run.outcome import INTERRUPTED, Outcome
-from cosim.run.scenario_structure import describe_component
 from cosim.run.starts import start_values
 from cosim.scenario.override import CASE
 from cosim.studies.measures import Measure, error_measures, own_measures

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from cosim.components.described import DescribedComponent
 from cosim.drawing.style import OBSERVER_LINES, axes_or_new, styled
 from cosim.errors import CosimError, OutputError, nearest
-from cosim.run.scenario_structure import describe_component
+from cosim.run.described_components import describe_component
 from cosim.studies.measures import setting_text, with_unit
 from plant_models.hybrid.units import UnitError
 

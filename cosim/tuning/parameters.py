@@ -12,7 +12,7 @@ from typing import Any
 
 from cosim.components.described import DescribedComponent
 from cosim.errors import CosimError, ScenarioError, nearest
-from cosim.run.scenario_structure import describe_component
+from cosim.run.described_components import describe_component
 from cosim.scenario.override import COMPONENT_KEYS, INNER, TABLES
 from cosim.simulation.scenario import Scenario
 from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from cosim.run.described_components import describe_component
 from cosim.run.run_seeds import SEED, component_seed
-from cosim.run.scenario_structure import describe_component
 from cosim.simulation.scenario import Scenario
 from plant_models.hybrid.noise import FROM_NAME
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import check_writable
+from cosim.run.described_components import describe_component
 from cosim.run.outcome import Outcome
-from cosim.run.scenario_structure import describe_component
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost, make_cost
 from cosim.tuning.evaluation import Evaluator, closing

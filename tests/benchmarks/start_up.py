@@ -32,7 +32,8 @@ marks = [("interpreter", process_time())]
 from cosim import Scenario
 import cosim.simulation.scenario, cosim.cli.run_command
 marks.append(("imports", process_time()))
-from cosim.run import scenario_run as running
+from cosim.master.master import Master
+from cosim.run import checked_observers, loaded_components, services
 parts = {}
 def timed(module, name, part):
     inner = getattr(module, name)
@@ -43,10 +44,10 @@ def timed(module, name, part):
         finally:
             parts[part] = parts.get(part, 0.0) + process_time() - begin
     setattr(module, name, call)
-timed(running, "component_factories", "models and loading")
-timed(running, "check_certificates", "certificates")
-timed(running, "choose_method", "probe")
-timed(running.Master, "run", "stepping")
+timed(loaded_components, "component_factories", "models and loading")
+timed(checked_observers, "check_certificates", "certificates")
+timed(services, "choose_method", "probe")
+timed(Master, "run", "stepping")
 begin = process_time()
 outcome = Scenario.load(SCENARIO).run(warn=lambda _: None)
 whole = process_time() - begin

@@ -1,0 +1,63 @@
+"""From the task of a run to all that is known before a component is instantiated; cheap checks come first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from cosim.components.start_values import StartValue
+from cosim.run.balise_service import BaliseRoles, balise_roles
+from cosim.run.checked_observers import Certificates, check_observers
+from cosim.run.checked_tables import Stated, complete_tables, parse_tables
+from cosim.run.coupled import Coupled, couple
+from cosim.run.loaded_components import Loaded, load_components
+from cosim.run.network_remarks import network_warnings
+from cosim.run.remarks import Remarks
+from cosim.run.schedule import StepSchedule, make_schedule
+from cosim.run.starts import all_start_values
+from cosim.run.task import Task
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A run that can be set up.
+
+    Args:
+        task: with all roles and thresholds. stated: layout and connections. loaded: the components.
+        coupled: what hangs together. balises: who has to do with them. schedule: algorithm and order.
+        starts: values by component and name. certificates: by component.
+    """
+
+    task: Task
+    stated: Stated
+    loaded: Loaded
+    coupled: Coupled
+    balises: BaliseRoles
+    schedule: StepSchedule
+    starts: Mapping[str, Mapping[str, StartValue]]
+    certificates: Certificates
+
+
+def check_task(task: Task, building: Callable[[str], None], remarks: Remarks, resources: ExitStack) -> Checked:
+    """Load the components of a run, and check all that is said of them.
+
+    Args:
+        task: of the run. building: called for each FMU that is built. remarks: of the run.
+        resources: closed when the run ends, which frees the components.
+
+    Raises:
+        CosimError: something in the scenario cannot be.
+    """
+    stated = parse_tables(task, remarks)
+    loaded = load_components(task, building, remarks, resources)
+    coupled = couple(task, stated.links, loaded.components)
+    if coupled.network is not None:
+        remarks.note(*coupled.network.notes())
+        remarks.warn(*network_warnings(coupled.network, task.table, loaded.components, task.where))
+    balises = balise_roles(task.table.balises, loaded.components, task.where)
+    task = complete_tables(task, coupled, balises, remarks)
+    schedule = make_schedule(task.table, coupled, balises)
+    starts = all_start_values(task.table, loaded.components)
+    certificates = check_observers(task, coupled, stated, balises.receivers, remarks)
+    return Checked(task, stated, loaded, coupled, balises, schedule, starts, certificates)

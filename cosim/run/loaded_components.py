@@ -1,0 +1,104 @@
+"""From the tables of a scenario to its components: loaded, and later instantiated with their start values.
+
+Whoever hands in `resources` frees what was loaded, also where a later component cannot be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from cosim.components.component import Component
+from cosim.components.fmi3 import FMI3Component
+from cosim.components.logged_slave import log_calls
+from cosim.components.start_values import StartValue
+from cosim.coupling.instants import followed
+from cosim.diagnostics.call_log import CallLog
+from cosim.run.component_models import component_factories
+from cosim.run.coupled import Coupled
+from cosim.run.once_per_process import check_instances
+from cosim.run.remarks import Remarks
+from cosim.run.task import Task
+from cosim.scenario.schema import ScenarioTable
+from fmus.fmi.capabilities import tool_warning
+from fmus.fmi.sense import doubled_names
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """The components of a run.
+
+    Args:
+        components: by name. factories: make a fresh one each, to be probed.
+    """
+
+    components: Mapping[str, Component]
+    factories: Mapping[str, Callable[[], Component]]
+
+
+def load_components(task: Task, building: Callable[[str], None], remarks: Remarks, resources: ExitStack) -> Loaded:
+    """Load the components, with warnings of what their descriptions say.
+
+    Args:
+        task: of the run. building: called for each FMU that is built. remarks: of the run.
+        resources: closed when the run ends, which frees the components.
+
+    Raises:
+        CosimError: a component cannot be had.
+    """
+    table, folder = task.table, task.folder
+    span = table.start, table.stop
+    factories, notes = component_factories(table.components, folder, task.where, building, span, table.tolerance)
+    remarks.note(*notes)
+    files = {name: (folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
+    check_instances(files, task.where)
+    components: dict[str, Component] = {}
+    resources.callback(_free, components)
+    for name, factory in factories.items():
+        components[name] = factory()
+        components[name].configure(table.components[name].parameters)
+        _remark(components[name], remarks)
+    return Loaded(components, factories)
+
+
+def _remark(component: Component, remarks: Remarks) -> None:
+    """Warn of the tool that made an FMU, and of names that stand in it twice, once for all that share them."""
+    warning = tool_warning(component.name, component.description)
+    if warning is not None:
+        remarks.warn(warning)
+    doubled = doubled_names(component.description)
+    if doubled is not None and not any(doubled in reported for reported in remarks.warnings):
+        remarks.warn(f"{component.name}: {doubled}")
+
+
+def instantiate_components(
+    table: ScenarioTable, coupled: Coupled, starts: Mapping[str, Mapping[str, StartValue]], call_log: CallLog | None
+) -> None:
+    """Instantiate the components, and set their start values.
+
+    Args:
+        table: the scenario. coupled: its components and connections. starts: values by component and name.
+        call_log: where calls are logged; None for nowhere.
+
+    Raises:
+        CosimError: a component cannot be instantiated, or refuses a value.
+    """
+    moving = followed(coupled.components, coupled.connections)
+    every = table.master.inputs != "hold"
+    for name, component in coupled.components.items():
+        if isinstance(component, FMI3Component):
+            own = [c for c in coupled.connections if c.target[0] == name and (every or c.source_variable in moving)]
+            component.request_intermediate_updates([c.target[1] for c in own])
+        component.choose_log(table.components[name].log)
+        if call_log is not None:
+            log_calls(component, call_log)
+        component.instantiate()
+        for parameter, value in starts[name].items():
+            component.set_start(parameter, value)
+
+
+def _free(components: Mapping[str, Component]) -> None:
+    for component in components.values():
+        component.terminate()
+        component.free()

@@ -1,0 +1,91 @@
+"""From a checked run to one that is ready for its first step: components instantiated, plan, services, master."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from cosim.coupling.plan import Plan
+from cosim.diagnostics.call_log import CallLog
+from cosim.master.interpolation.attach import attach_interpolators
+from cosim.master.master import Master, close
+from cosim.results.stream import Stream
+from cosim.run.checked import Checked
+from cosim.run.coupled import Coupled, plan_run
+from cosim.run.coupling_warnings import coupling_warnings, interpolation_note, recording_notes
+from cosim.run.loaded_components import instantiate_components
+from cosim.run.master_setup import make_master, master_notes
+from cosim.run.remarks import Remarks
+from cosim.run.services import Services, make_services
+from cosim.run.streaming import Streaming, begin_stream
+from cosim.run.task import Task
+
+Progress = Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A run before its first step.
+
+    Args:
+        checked: task, components and connections. services: of the run. master: with the plan.
+        stream: that rows go to, or None.
+    """
+
+    checked: Checked
+    services: Services
+    master: Master
+    stream: Stream | None
+
+    @property
+    def task(self) -> Task:
+        """What is to be run, with all roles and thresholds."""
+        return self.checked.task
+
+    @property
+    def coupled(self) -> Coupled:
+        """Components and connections."""
+        return self.checked.coupled
+
+
+def make_ready(
+    checked: Checked,
+    progress: Progress | None,
+    call_log: CallLog | None,
+    streaming: Streaming | None,
+    remarks: Remarks,
+    resources: ExitStack,
+) -> Ready:
+    """Set up a run.
+
+    Args:
+        checked: task, components and connections. progress: called with the time reached and the end [s].
+        call_log: where calls are logged; None for nowhere. streaming: what a stream needs; None for none.
+        remarks: of the run. resources: closed when the run ends.
+
+    Raises:
+        CosimError: a component cannot be instantiated, or cannot do what is asked for.
+    """
+    table = checked.task.table
+    instantiate_components(table, checked.coupled, checked.starts, call_log)
+    plan = plan_run(table, checked.coupled, checked.schedule.order)
+    resources.callback(close, plan)
+    _remark_coupling(checked, plan, remarks)
+    services = make_services(checked, plan, remarks)
+    master = make_master(checked.task, plan, services, checked.schedule.algorithm, progress)
+    remarks.note(*master_notes(master))
+    stream = None if streaming is None else begin_stream(streaming, checked, services, master, remarks)
+    return Ready(checked, services, master, stream)
+
+
+def _remark_coupling(checked: Checked, plan: Plan, remarks: Remarks) -> None:
+    """What to know of the coupling; interpolators are attached to the plan."""
+    table, coupled = checked.task.table, checked.coupled
+    warnings, notes = coupling_warnings(table, coupled.components, coupled.connections)
+    remarks.warn(*warnings)
+    remarks.note(*notes, *checked.schedule.algorithm.notes)
+    interpolators = attach_interpolators(plan, table.master.inputs)
+    remarks.note(*recording_notes(coupled.components, table.components))
+    if table.master.inputs != "hold":
+        remarks.note(interpolation_note(interpolators, table.master.inputs))
