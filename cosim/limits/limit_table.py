@@ -74,7 +74,7 @@ def _row(limit: Limit, trial: Trial | None, members: int) -> LimitRow:
         printed=tuple((bound.value, bound.statement, bound.source) for bound in limit.printed),
         exact=limit.exact,
         exact_test=limit.exact_test,
-        looked=(limit.tried, limit.looked),
+        looked=(limit.tried, limit.searched_to),
         practical=None if trial is None else practical_limit(trial, members),
         searched=() if trial is None else reach(trial),
     )

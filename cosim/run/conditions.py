@@ -137,4 +137,4 @@ def _doubts(table: ComponentTable, system: Any) -> list[str]:
     except (ValueError, ArithmeticError) as error:
         return [f"its condition cannot be judged with these parameters: {error}."]
     refuted = [] if condition.holds else [f"its condition {condition.explain()}"]
-    return [*refuted, *(f"{doubt}." for doubt in condition.doubts)]
+    return [*refuted, *(f"{doubt}." for doubt in condition.warnings)]

@@ -21,7 +21,7 @@ from cosim.evaluation.balise_gaps import gap_errors, largest, root_mean_square
 from cosim.evaluation.numbers import error_number, number
 from cosim.observer_benchmark.benchmark import benchmark_observers
 from fmu_observer.formulas.filtering.square_root import factor
-from fmu_observer.formulas.moving_horizon.real_time_iteration import TOLD, WINDOW_MEMORY, Iterated
+from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, WINDOW_OUTPUTS, Iterated
 from fmu_observer.formulas.moving_horizon.robust_loss import SCALES
 from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon
@@ -96,7 +96,7 @@ class FactorGraphSmoother(BaliseMovingHorizon):
         self._smoother.update(graph, values, stamps)
         self._count = key
         estimate = np.asarray(self._smoother.calculateEstimate().atVector(key))
-        last = np.array([float(name == "rows_in_window") for name in TOLD])
+        last = np.array([float(name == "rows_in_window") for name in WINDOW_OUTPUTS])
         remembered = dict(zip(WINDOW_MEMORY, (arrival, row_flat, estimate, last), strict=True))
         return Iterated(estimate, arrival[2 * ORDER :], remembered)
 

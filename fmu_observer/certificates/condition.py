@@ -15,14 +15,14 @@ class Condition:
         values: the numbers it was judged by, by name.
         statement: the condition in words, with the symbols of `values`.
         source: equation or theorem.
-        doubts: sentences that a user of the observer should read before a run, although it may hold.
+        warnings: sentences that a user of the observer should read before a run, although it may hold.
     """
 
     holds: bool
     values: Mapping[str, float]
     statement: str
     source: str
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def explain(self) -> str:
         """One sentence for the user, numbers included."""

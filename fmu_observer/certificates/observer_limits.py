@@ -40,11 +40,11 @@ class Trial:
     send in turn, one each period.
 
     Attributes:
-        system: the observer. varied: what is varied. low, high: range in which the limit is looked for [s].
+        system: the observer. varied: what is varied. low, high: range in which the limit is sought [s].
         period: between two packets [s], where it is not varied. delay: of the packets [s], where it is not varied.
         settings: parameters and starts by name, those of the preset included.
-        delay_parameter: parameter that tells the observer the delay; empty where it has none.
-        event: by which packets are told. nodes: that send in turn; 0 for all measurements at once.
+        delay_parameter: parameter by which the observer knows the delay; empty where it has none.
+        event: by which packets are reported. nodes: that send in turn; 0 for all measurements at once.
         node_events: event of each node, where each has its own; `event` is not used then.
         payload: of packets by name, by the instants of their measurement, shape (k,).
         inputs: of the observer by name, by instants, shape (k,). truth: outputs by name, by instants, shape (k,).
@@ -78,9 +78,9 @@ class Limit:
     Attributes:
         quantity: what is limited, in words. unit: of all values.
         printed: bounds of a thesis. exact: first value at which the error equations are unstable, None where no exact
-            test is known, inf where none was found. exact_test: what that test looks at, in words.
-        looked: how far that test looked, inf where what it says holds without end. tried: shortest value that it
-            looked at, for an `exact` of 0; 0 where there is none at which the error equations are stable.
+            test is known, inf where none was found. exact_test: what that test judges, in words.
+        searched_to: how far that test searched, inf where what it says holds without end. tried: shortest value that it
+            tried, for an `exact` of 0; 0 where there is none at which the error equations are stable.
         trial: to find the practical limit by, None for none.
     """
 
@@ -89,6 +89,6 @@ class Limit:
     printed: tuple[PrintedBound, ...] = ()
     exact: float | None = None
     exact_test: str = ""
-    looked: float = inf
+    searched_to: float = inf
     tried: float = 0.0
     trial: Trial | None = None

@@ -82,10 +82,10 @@ class AccumulatedOutput:
         traced = TracedSystem(system)
         u, p, d = ca.SX.sym("u", rows.shape[1]), ca.SX.sym("p", len(values)), len(places)
         x, searched = ca.SX.sym("x", system.state_count), ca.SX.sym("q", d)
-        given = ca.SX(values)
+        every = ca.SX(values)
         for place, symbol in zip(places, ca.vertsplit(searched), strict=True):
-            given[place] = symbol
-        moved = traced.jump(event)(0.0, x, u, given)
+            every[place] = symbol
+        moved = traced.jump(event)(0.0, x, u, every)
         step = ca.Function("sample", [x, u, searched], [moved], {"cse": True})
         last = ca.Function("last", [x, u, p], [traced.output(0.0, x, u, p)[output]])
         symbols = ca.MX.sym("q", d)

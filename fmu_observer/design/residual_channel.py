@@ -124,19 +124,15 @@ def decoupled_channel(
 def _entries(
     n: int, q: int, on_states: np.ndarray | None, on_measurements: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    given = [np.asarray(matrix, dtype=float) for matrix in (on_states, on_measurements) if matrix is not None]
-    if not given or any(matrix.ndim != 2 for matrix in given):
+    entries = [np.asarray(matrix, dtype=float) for matrix in (on_states, on_measurements) if matrix is not None]
+    if not entries or any(matrix.ndim != 2 for matrix in entries):
         raise ValueError(
             f"Residual channel: give on_states of shape ({n}, k), on_measurements of shape ({q}, k), or both."
         )
-    k = given[0].shape[1]
-    reason = f"{k} signals"
-    E = (
-        np.zeros((n, k))
-        if on_states is None
-        else checked_matrix("Residual channel", "on_states", on_states, (n, k), reason)
+    k = entries[0].shape[1]
+    shapes = {"on_states": (on_states, (n, k)), "on_measurements": (on_measurements, (q, k))}
+    E, F = (
+        np.zeros(shape) if matrix is None else checked_matrix("Residual channel", name, matrix, shape, f"{k} signals")
+        for name, (matrix, shape) in shapes.items()
     )
-    F = np.zeros((q, k))
-    if on_measurements is not None:
-        F = checked_matrix("Residual channel", "on_measurements", on_measurements, (q, k), reason)
     return E, F

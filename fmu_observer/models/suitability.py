@@ -62,8 +62,8 @@ def with_unknown_inputs(model: ObserverModel, observer: str) -> ObserverModel:
             f"{observer}: model {model.name!r} declares no unknown inputs, and has no matrix B by which the error of a "
             f"known one could act. Give an ObserverModel with unknown_inputs and the matrix H by which they act."
         )
-    told = [model.inputs[i] for i in acting]
-    errors = (input_signal(f"{s.name}_error", s.unit, 0.0, f"What acts beyond: {s.description}") for s in told)
+    known = [model.inputs[i] for i in acting]
+    errors = (input_signal(f"{s.name}_error", s.unit, 0.0, f"What acts beyond: {s.description}") for s in known)
     return replace(model, unknown_inputs=tuple(errors), H=model.B[:, acting])
 
 
@@ -93,7 +93,7 @@ def require_mass(model: str, **masses: float) -> None:
             raise ValueError(f"Observer model {model!r}: {name} = {value!r} kg, expected a mass above zero.")
 
 
-def _require_single_output(model: ObserverModel, observer: str) -> None:
+def _require_one_output(model: ObserverModel, observer: str) -> None:
     """The model has one measurement.
 
     Args:
@@ -121,7 +121,7 @@ def require_triangular_chain(model: ObserverModel, observer: str) -> None:
     Raises:
         ValueError: one of them is not so; the message says which.
     """
-    _require_single_output(model, observer)
+    _require_one_output(model, observer)
     n = model.order
     where = f"{observer}: model {model.name!r} is not in the normal form (1.10): "
     if not np.array_equal(model.A, shift_matrix(n)):

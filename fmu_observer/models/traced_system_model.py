@@ -176,17 +176,24 @@ def find_filter_model(
     Raises:
         ValueError: the name is unknown, or something is asked for that the model has not.
     """
-    noises = {"process_noises": process_noises, "measurement_noises": measurement_noises}
     if isinstance(model, FilterModel | ObserverModel) or (model in MODELS and not outputs):
-        asked = [name for name, value in ({"outputs": outputs, "inputs": inputs} | noises).items() if value]
-        if asked:
-            raise ValueError(
-                f"{', '.join(asked)}: what an observer model measures and knows stands in the model; leave it out, or "
-                "name a plant."
-            )
+        _require_nothing(
+            outputs=outputs, inputs=inputs, process_noises=process_noises, measurement_noises=measurement_noises
+        )
         return model if isinstance(model, FilterModel) else filter_model(find_model(model))
-    noises = {"process_noises": process_noises, "measurement_noises": measurement_noises}
-    return system_model(_found(model), outputs, inputs, **noises, steps=steps)
+    plant = _found(model)
+    return system_model(
+        plant, outputs, inputs, process_noises=process_noises, measurement_noises=measurement_noises, steps=steps
+    )
+
+
+def _require_nothing(**options: Sequence[str] | None) -> None:
+    asked = [name for name, value in options.items() if value]
+    if asked:
+        raise ValueError(
+            f"{', '.join(asked)}: what an observer model measures and knows stands in the model; leave it out, or name "
+            "a plant."
+        )
 
 
 def _found(model: object) -> HybridSystem:

@@ -18,9 +18,9 @@ class MeasuredSystem:
         A: shape (n, n) [1/s and the units of the states].
         C_continuous: what is measured at all times, shape (q1, n), or None.
         C_sampled: what is measured at the instants of a pattern, shape (q2, n), or None.
-        states: names of the states; ``x1`` ... ``xn`` where none are given.
+        states: names of the states; ``x1`` ... ``xn`` where none are matrix.
         scales: a typical size of each state, so that states of different units can be compared, shape (n,); 1 where not
-            given.
+            matrix.
         name: for messages.
 
     Raises:
@@ -41,8 +41,8 @@ class MeasuredSystem:
         n = len(A)
         found = {"A": A, "scales": np.array(self.scales if len(self.scales) else np.ones(n), dtype=float)}
         for key in ("C_continuous", "C_sampled"):
-            given = getattr(self, key)
-            C = np.zeros((0, n)) if given is None else np.atleast_2d(np.array(given, dtype=float))
+            matrix = getattr(self, key)
+            C = np.zeros((0, n)) if matrix is None else np.atleast_2d(np.array(matrix, dtype=float))
             if C.shape[1] != n:
                 raise ValueError(f"{self.name}: {key} has shape {C.shape}, expected {n} columns as A has.")
             found[key] = C

@@ -65,13 +65,12 @@ class SamplePattern:
         if not (np.isfinite(speed) and speed):
             raise ValueError(f"Balise pattern: the speed must be finite and not zero [m/s], got {speed!r}.")
         order = np.argsort(places, kind="stable")
-        same = np.flatnonzero(np.diff(places[order]) == 0.0)
-        if same.size:
-            first, second = order[same[0]] + 1, order[same[0] + 1] + 1
+        repeated = np.flatnonzero(np.diff(places[order]) == 0.0)
+        if repeated.size:
+            first, second = order[repeated[0]] + 1, order[repeated[0] + 1] + 1
             raise ValueError(
-                f"Balise pattern: two balises at one place: numbers {first} and {second} at {places[order[same[0]]]:g} "
-                f"m. "
-                f"They are one measurement; list the place once."
+                f"Balise pattern: two balises at one place: numbers {first} and {second} at "
+                f"{places[order[repeated[0]]]:g} m. They are one measurement; list the place once."
             )
         times = np.sort((places - start) / speed)
         passed = times[(times >= 0.0) & (times <= (np.inf if duration is None else duration))]

@@ -101,13 +101,13 @@ def limits_of(certificate: Certificate) -> tuple[Limit, ...]:
         Limit(
             f"constant gap between {certificate.event}s",
             exact=certificate.constant_limit,
-            looked=certificate.horizon,
+            searched_to=certificate.horizon,
             exact_test=f"certificate, first gap at which the error grows, {about}",
         ),
         Limit(
             f"mixed gaps between {certificate.event}s",
             exact=certificate.aperiodic_limit,
-            looked=certificate.horizon,
+            searched_to=certificate.horizon,
             exact_test="certificate, longest gap up to which one Lyapunov function covers every mixture",
         ),
     )

@@ -10,7 +10,7 @@ from adaptive_runs import Samples, motion
 from scipy.integrate import solve_ivp
 
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
-from fmu_observer.formulas.adaptation.adaptive_law import smallest_eigenvalue, told_excitation
+from fmu_observer.formulas.adaptation.adaptive_law import own_excitation, smallest_eigenvalue
 from fmu_observer.models.known_models import find_state_affine_model
 from fmu_observer.observers.generic.adaptive import AdaptiveHold, AdaptivePredictor
 from fmu_observer.observers.generic.adaptive.adaptive_certificate import errors_left
@@ -170,7 +170,7 @@ def test_excitation_in_closed_form() -> None:
             E = seen.T @ seen
             scale = np.trace(E)
             assert abs(float(smallest_eigenvalue(E, size)) - np.linalg.eigvalsh(E)[0]) < 1e-9 * scale
-            np.testing.assert_allclose(told_excitation(E, size), 1.0 / np.diag(np.linalg.inv(E)), rtol=1e-6)
+            np.testing.assert_allclose(own_excitation(E, size), 1.0 / np.diag(np.linalg.inv(E)), rtol=1e-6)
     with pytest.raises(ValueError, match="up to size 3, got 4"):
         smallest_eigenvalue(np.eye(4), 4)
 

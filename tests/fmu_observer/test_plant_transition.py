@@ -103,11 +103,11 @@ def test_a_fast_plant_at_a_slow_period() -> None:
     judged = accurate.condition()
     assert judged.holds
     assert judged.values["transition_error"] < 1e-9
-    assert not judged.doubts
+    assert not judged.warnings
     coarse = KalmanFilter(Fast(), outputs=["y"], substeps=4).condition({"sample_period": 0.2})
     assert not coarse.holds
     assert coarse.values["transition_error"] == pytest.approx(0.1767, rel=1e-3)
-    assert "not accurate" in coarse.doubts[0]
+    assert "not accurate" in coarse.warnings[0]
 
 
 def test_a_motor_at_50_ms_is_that_of_another_solver() -> None:
@@ -123,7 +123,7 @@ def test_a_motor_at_50_ms_is_that_of_another_solver() -> None:
     assert (
         ExtendedKalmanFilter("synchronous_motor", **MOTOR, substeps=4)
         .condition({"sample_period": 0.05})
-        .doubts[0]
+        .warnings[0]
         .startswith("its transition over a period is not accurate")
     )
 

@@ -16,7 +16,7 @@ from fmu_observer.certificates.bounds.bounded_gaps import FIRST, HORIZON, growth
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates.bounds.worst_case import worst_case
 
-_EXACT_HORIZON = 1e3  # [s] to which gaps of the worst case are looked for
+_EXACT_HORIZON = 1e3  # [s] up to which gaps of the worst case are searched
 _COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
 
 
@@ -91,9 +91,9 @@ class ErrorBounds:
         Returns:
             Bound of the speed error [m/s]; noise and unknown inputs as stated are in it.
         """
-        told = sqrt(float(np.linalg.inv(self.P)[0, 0]))
+        size = sqrt(float(np.linalg.inv(self.P)[0, 0]))
         settled = self._forced(self.period) / (1.0 - exp(-self.decay * self.period))
-        return told * (exp(-self.decay * gap) * settled + self._forced(gap))
+        return size * (exp(-self.decay * gap) * settled + self._forced(gap))
 
     def exact(self, gap: float) -> float:
         """What the held reading can really do after many samples at the period: the worst acceleration, ours.
@@ -238,5 +238,5 @@ def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:
 
 
 def _seconds(name: str, value: float) -> str:
-    looked = _EXACT_HORIZON if name == "exact" else HORIZON
-    return f"> {looked:.4g} s" if value == inf else f"{value:.4g} s"
+    horizon = _EXACT_HORIZON if name == "exact" else HORIZON
+    return f"> {horizon:.4g} s" if value == inf else f"{value:.4g} s"

@@ -50,7 +50,7 @@ class Optimiser(ABC):
         self.best_cost = np.inf
         self.evaluations = 0
         self._asked: Array | None = None
-        self._told: list[tuple[list[float], list[list[float]] | None]] = []
+        self._reported: list[tuple[list[float], list[list[float]] | None]] = []
 
     @property
     def dimension(self) -> int:
@@ -59,11 +59,11 @@ class Optimiser(ABC):
 
     @property
     def iteration(self) -> int:
-        """Populations told so far; the first is the start of the search, iteration 0 of the tables."""
-        return len(self._told)
+        """Populations with costs so far; the first is the start of the search, iteration 0 of the tables."""
+        return len(self._reported)
 
     def ask(self) -> Array:
-        """The candidates whose costs are wanted, shape (m, d), within the bounds; the same until they are told.
+        """The candidates whose costs are wanted, shape (m, d), within the bounds; unchanged until their costs are in.
 
         Returns:
             The candidates; none, shape (0, d), where the optimiser has come to its end.
@@ -86,14 +86,14 @@ class Optimiser(ABC):
         """
         points, values = np.asarray(candidates, float), np.asarray(costs, float)
         if self._asked is None or not np.array_equal(points, self._asked):
-            raise ValueError(f"{self.name}: costs were told of candidates that it did not ask for; call ask() first.")
+            raise ValueError(f"{self.name}: these costs are of candidates that it did not ask for; call ask() first.")
         if values.shape != (len(points),):
             raise ValueError(f"{self.name}: expected {len(points)} costs, got shape {values.shape}.")
         slopes = None if gradients is None else np.asarray(gradients, float)
         if slopes is not None and slopes.shape != points.shape:
             raise ValueError(f"{self.name}: expected gradients of shape {points.shape}, got {slopes.shape}.")
         values = np.where(np.isfinite(values), values, np.inf)
-        self._told.append((values.tolist(), None if slopes is None else slopes.tolist()))
+        self._reported.append((values.tolist(), None if slopes is None else slopes.tolist()))
         self._asked = None
         self.evaluations += len(points)
         place = int(np.argmin(values)) if len(values) else -1
@@ -102,9 +102,9 @@ class Optimiser(ABC):
         self.learn(points, values, slopes)
 
     def state(self) -> dict[str, Any]:
-        """What the search so far follows from, as plain data: the seed, and the costs told."""
-        told = [{"costs": [None if np.isinf(c) else c for c in costs], "gradients": g} for costs, g in self._told]
-        return {"method": self.name, "seed": self.seed, "told": told}
+        """What the search so far follows from, as plain data: the seed, and the costs of its candidates."""
+        costs = [{"costs": [None if np.isinf(c) else c for c in costs], "gradients": g} for costs, g in self._reported]
+        return {"method": self.name, "seed": self.seed, "told": costs}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go to a saved state; what follows is bit-identical to what followed there.
@@ -113,16 +113,16 @@ class Optimiser(ABC):
             state: from `state`, of an optimiser made with the same arguments.
 
         Raises:
-            ValueError: the state belongs to another method or seed, or to other options; or this optimiser has been
-                told costs already.
+            ValueError: the state belongs to another method or seed, or to other options; or this optimiser has costs
+                already.
         """
-        if (state["method"], state["seed"]) != (self.name, self.seed) or self._told:
+        if (state["method"], state["seed"]) != (self.name, self.seed) or self._reported:
             raise ValueError(
                 f"{self.name} with seed {self.seed}: the state is of {state['method']} with seed {state['seed']}, or "
                 "the search has begun; restore into a new optimiser made with the same arguments."
             )
-        for told in state["told"]:
-            self.tell(self.ask(), [np.inf if c is None else c for c in told["costs"]], told["gradients"])
+        for population in state["told"]:
+            self.tell(self.ask(), [np.inf if c is None else c for c in population["costs"]], population["gradients"])
 
     def uniform(self, count: int) -> Array:
         """Points spread evenly at random over the box, shape (count, d).

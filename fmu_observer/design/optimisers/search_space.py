@@ -75,9 +75,9 @@ class SearchSpace:
         Args:
             values: in their units, shape (..., d).
         """
-        given = np.asarray(values, float)
+        array = np.asarray(values, float)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(self._log, np.log(np.where(self._log, given, 1.0)), given)
+            return np.where(self._log, np.log(np.where(self._log, array, 1.0)), array)
 
     def values(self, coordinates: ArrayLike) -> Array:
         """Parameters in their units, shape (..., d).
@@ -85,8 +85,8 @@ class SearchSpace:
         Args:
             coordinates: of the search, shape (..., d).
         """
-        given = np.asarray(coordinates, float)
-        found = np.where(self._log, np.exp(np.where(self._log, given, 0.0)), given)
+        array = np.asarray(coordinates, float)
+        found = np.where(self._log, np.exp(np.where(self._log, array, 0.0)), array)
         return np.clip(found, [p.low for p in self.parameters], [p.high for p in self.parameters])
 
     def named(self, coordinates: ArrayLike) -> dict[str, float]:

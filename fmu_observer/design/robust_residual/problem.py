@@ -43,7 +43,9 @@ class ResidualProblem:
         A = A[None] if A.ndim == 2 else A
         if A.ndim != 3 or not A.size or A.shape[1] != A.shape[2]:
             raise ValueError(f"{where}: vertices have shape {A.shape}, expected (N, n, n), or (n, n) for one.")
-        n, (q, nd) = A.shape[1], (np.shape(value)[axis] if np.ndim(value) == 2 else 0 for value, axis in self._given())
+        n = A.shape[1]
+        q = np.shape(self.C)[0] if np.ndim(self.C) == 2 else 0
+        nd = np.shape(self.disturbance)[1] if np.ndim(self.disturbance) == 2 else 0
         F = np.eye(q) if self.fault is None else np.asarray(self.fault, dtype=float)
         nf = F.shape[1] if F.ndim == 2 else 0
         shapes = {"C": (self.C, (q, n)), "disturbance": (self.disturbance, (n, nd)), "fault": (F, (q, nf))}
@@ -95,6 +97,3 @@ class ResidualProblem:
             residual_channel(A, K, self.C, on_measurements=F, residual_gain=self.residual_gain)
             for A, K in zip(self.vertices, self.gains(gains), strict=True)
         ]
-
-    def _given(self) -> tuple[tuple[np.ndarray, int], ...]:
-        return (self.C, 0), (self.disturbance, 1)

@@ -187,8 +187,8 @@ def state_covariance(V: Array, sensitivity: Array, sizes: Sizes) -> Array:
         V: see `covariance_now`. sensitivity: lambda, shape (n, m). sizes: see there.
     """
     n, m = sizes[:2]
-    told = np.vstack([np.hstack([np.eye(n), sensitivity]), np.hstack([np.zeros((m, n)), np.eye(m)])])
-    return told @ V[: n + m, : n + m] @ told.T
+    mapped = np.vstack([np.hstack([np.eye(n), sensitivity]), np.hstack([np.zeros((m, n)), np.eye(m)])])
+    return mapped @ V[: n + m, : n + m] @ mapped.T
 
 
 def first_covariance(deviations: Sequence[float], sizes: Sizes) -> np.ndarray:

@@ -234,24 +234,24 @@ def gentle_gain(R: Array, seen: Array, quickest: float) -> Array:
     return R - outer / (quickest + seen @ moved)
 
 
-def told_excitation(E: Array, size: int, guard: Array = _TINY) -> Array:
+def own_excitation(E: Array, size: int, guard: Array = _TINY) -> Array:
     """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
 
     Args:
         E: mean Gramian, shape (m, m). size: m, 1 to 3. guard: added to the diagonal for the others, so that rounding
-            does not decide where they cannot be told apart.
+            does not decide where they cannot be distinguished.
     """
     if size == 1:
         return vector(E[0, 0])
     own = [E[i, i] + guard for i in range(size)]
     if size == 2:
         return vector(*(E[i, i] - E[0, 1] ** 2 / np.maximum(own[1 - i], _TINY) for i in range(2)))
-    told = []
+    found = []
     for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         others = np.maximum(own[j] * own[k] - E[j, k] ** 2, _TINY)
         shared = E[i, j] ** 2 * own[k] - 2.0 * E[i, j] * E[i, k] * E[j, k] + E[i, k] ** 2 * own[j]
-        told.append(E[i, i] - shared / others)
-    return vector(*told)
+        found.append(E[i, i] - shared / others)
+    return vector(*found)
 
 
 def learnt_constants(E: Array, least: Array, size: int) -> Array:
@@ -260,8 +260,8 @@ def learnt_constants(E: Array, least: Array, size: int) -> Array:
     Args:
         E: mean Gramian, shape (m, m). least: excitation below which a constant is held; 0 for never. size: m.
     """
-    told = told_excitation(E, size, _GUARD * least + _TINY)
-    return vector(*(np.where(least > 0.0, np.where(told[i] >= least, 1.0, 0.0), 1.0) for i in range(size)))
+    found = own_excitation(E, size, _GUARD * least + _TINY)
+    return vector(*(np.where(least > 0.0, np.where(found[i] >= least, 1.0, 0.0), 1.0) for i in range(size)))
 
 
 def smallest_eigenvalue(E: Array, size: int) -> Array:

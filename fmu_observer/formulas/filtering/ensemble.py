@@ -86,8 +86,8 @@ def correct_members(members: Array, seen: Array, y: Array, RN: Array, draws: Arr
         Members and NIS.
     """
     expected = mean_of(seen)
-    spread, looks = deviations_of(members, mean_of(members)), deviations_of(seen, expected)
-    S = looks @ looks.T + RN
-    K = np.linalg.solve(S, looks @ spread.T).T
+    spread, readings = deviations_of(members, mean_of(members)), deviations_of(seen, expected)
+    S = readings @ readings.T + RN
+    K = np.linalg.solve(S, readings @ spread.T).T
     perturbed = y.reshape(y.shape[0], 1) + drawn(RN, draws) - seen
     return EnsembleCorrected(members + K @ perturbed, normalised_square(y - expected, S))

@@ -182,11 +182,11 @@ def correct_root(
     Returns:
         Estimate, lower factor of the covariance, gain and covariance of the innovation.
     """
-    spread, looks = _root_columns(states, w), _root_columns(seen, w)
+    spread, readings = _root_columns(states, w), _root_columns(seen, w)
     if unseen is not None:
         spread = np.hstack([spread, unseen])
-        looks = np.hstack([looks, np.zeros((looks.shape[0], unseen.shape[1]))])
-    return corrected_by(x, y - mean(seen, w), noise, looks, spread)
+        readings = np.hstack([readings, np.zeros((readings.shape[0], unseen.shape[1]))])
+    return corrected_by(x, y - mean(seen, w), noise, readings, spread)
 
 
 def predicted_root(found: Scattered, noise: Array, w: Weights) -> Array:

@@ -212,7 +212,7 @@ def _exchanged(active: Array, wanted: Array, wrong: Array, fewest: Array) -> tup
 
     Args:
         active: held in this pass, shape (N, b). wanted: by the signs that it found. wrong: force by which each is on
-            the wrong side, zero where it is right, shape (N, b). fewest: wrong ones in any pass before, shape (1,).
+            the wrong bound, zero where it is right, shape (N, b). fewest: wrong ones in any pass before, shape (1,).
     """
     count, largest = np.reshape(np.sum(np.where(wrong > 0.0, 1.0, 0.0)), (1,)), np.max(wrong)
     from_on = np.where(count < fewest, 0.0 * count, largest)
@@ -224,8 +224,8 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     """The Kalman filter over one row: prediction, measurements, active bounds."""
     n, q, states = problem.order, problem.layout.measurements, len(problem.bounded)
 
-    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (before, mean, flat, free), (row_flat, point, active, fresh), (shared,) = carry, given, known
+    def body(carry: Arrays, rows: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (before, mean, flat, free), (row_flat, point, active, fresh), (shared,) = carry, rows, known
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         moved = problem.moved(before, row, shared)
@@ -262,9 +262,9 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
     """The adjoint over one row: its state, its bounds, and what it says of the rows before."""
     n, q = problem.order, problem.layout.measurements
 
-    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+    def body(carry: Arrays, rows: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
         (adjoint, sums), (shared,) = carry, known
-        row_flat, point, active, _, mean, flat, _, F, H, K, noise, forces, gains, pulls, beyond, *disturbed = given
+        row_flat, point, active, _, mean, flat, _, F, H, K, noise, forces, gains, pulls, beyond, *disturbed = rows
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         x = mean - P @ adjoint
@@ -294,8 +294,8 @@ def _followed(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     """A row as near to its estimate as the bounds of disturbances and states allow (where both cannot be, a state's),
     and what it lacks to be a course of the model."""
 
-    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (about, before, lacks), (row_flat, point, push, own), (shared,) = carry, given, known
+    def body(carry: Arrays, rows: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (about, before, lacks), (row_flat, point, push, own), (shared,) = carry, rows, known
         row, n = problem.layout.unpacked(row_flat), problem.order
         goes, into = row.moves > 0.5, problem.moved(about, row, shared)
         moved = into.state + into.F @ (before - about)
@@ -393,24 +393,24 @@ def _at_bounds(problem: WindowProblem, before: Array, rows: Array, points: Array
         x = points[:, i : i + 1]
         columns.append(np.where(x >= upper[k], 1.0, 0.0) - np.where(x <= lower[k], 1.0, 0.0))
     if problem.disturbed:
-        _, (touched,) = scan_table(_touched(problem), (before,), (rows, points), (shared,))
-        columns.append(touched)
+        _, (held,) = scan_table(_at_bound(problem), (before,), (rows, points), (shared,))
+        columns.append(held)
     return np.hstack(columns)
 
 
 @lru_cache(maxsize=KEPT)
-def _touched(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
+def _at_bound(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
     """Which disturbances stand at a bound on the way to a row."""
 
-    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
-        (before,), (row_flat, point), (shared,) = carry, given, known
+    def body(carry: Arrays, rows: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (before,), (row_flat, point), (shared,) = carry, rows, known
         row = problem.layout.unpacked(row_flat)
         moved, (lower, upper) = problem.moved(before, row, shared), problem.noise_limits(row, shared)
         at = []
         for k, i in enumerate(problem.disturbed):
             w, near = point[i] - moved.state[i], _NEAR * np.sqrt(moved.noise[i, i])
-            side = np.where(w >= upper[k] - near, 1.0, 0.0) - np.where(w <= lower[k] + near, 1.0, 0.0)
-            at.append(np.where(row.moves > 0.5, side, 0.0))
+            bound = np.where(w >= upper[k] - near, 1.0, 0.0) - np.where(w <= lower[k] + near, 1.0, 0.0)
+            at.append(np.where(row.moves > 0.5, bound, 0.0))
         return (point,), (vector(*at),)
 
     return body

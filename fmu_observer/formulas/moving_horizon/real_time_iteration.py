@@ -19,10 +19,10 @@ from plant_models.hybrid.scan import enclosed
 from plant_models.hybrid.system import Array
 
 MOST_ROWS, MOST_PASSES = 1000, 20
-_MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within what is told of its error [ours]
+_MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within its own deviation [ours]
 
 WINDOW_MEMORY = ("arrival_cost", "window", "window_estimates", "last_pass")
-TOLD = {
+WINDOW_OUTPUTS = {
     "residual_norm": "Root of the mean square of the window's residuals, in their deviations",
     "last_step": "Largest change of an estimate in the last pass, in its standard deviations",
     "passes_used": "Passes that changed an estimate by more than 0.001 of its deviation",
@@ -89,12 +89,12 @@ def window_memory(start: Array, covariance: Array, row_width: int, window: int) 
         memory("arrival_cost", "1", tuple(map(float, first)), "Before the window: point, mean, P", size=len(first)),
         memory("window", "1", 0.0, rows, size=window * row_width),
         memory("window_estimates", "1", values, "Estimates of the rows, oldest first, SI units", size=len(values)),
-        memory("last_pass", "1", 0.0, "What is told of the passes and the window", size=len(TOLD)),
+        memory("last_pass", "1", 0.0, "What is reported of the passes and the window", size=len(WINDOW_OUTPUTS)),
     )
 
 
-def told_outputs(window: int) -> tuple[Signal, ...]:
-    """The outputs `TOLD`.
+def window_outputs(window: int) -> tuple[Signal, ...]:
+    """The outputs `WINDOW_OUTPUTS`.
 
     Args:
         window: rows of the window.
@@ -107,17 +107,17 @@ def told_outputs(window: int) -> tuple[Signal, ...]:
     warnings = {**_WARNINGS, "rows_in_window": filled}
     return tuple(
         output_signal(name, "1", text, variability="discrete", warning=warnings.get(name))
-        for name, text in TOLD.items()
+        for name, text in WINDOW_OUTPUTS.items()
     )
 
 
-def told(last_pass: Array) -> dict[str, Array]:
-    """Values of the outputs `TOLD`.
+def window_values(last_pass: Array) -> dict[str, Array]:
+    """Values of the outputs `WINDOW_OUTPUTS`.
 
     Args:
         last_pass: the memory of that name, shape (6,).
     """
-    return {name: last_pass[i] for i, name in enumerate(TOLD)}
+    return {name: last_pass[i] for i, name in enumerate(WINDOW_OUTPUTS)}
 
 
 def iterate(

@@ -47,17 +47,17 @@ class BufferedCall:
         function: its arguments and results are taken by their nonzeros, column by column.
 
     Attributes:
-        memory: number by which the function tells the statistics of these calls.
+        memory: number by which the function keeps the statistics of these calls.
     """
 
     def __init__(self, function: Any) -> None:
-        self._given = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
+        self._arguments = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
         self._results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
         self.memory: int = function.checkout()  # the buffer takes the next one that is free: this
         function.release(self.memory)
         self._buffer, self._evaluate = function.buffer()
-        for i, given in enumerate(self._given):
-            self._buffer.set_arg(i, given.data)
+        for i, buffer in enumerate(self._arguments):
+            self._buffer.set_arg(i, buffer.data)
         for i, result in enumerate(self._results):
             self._buffer.set_res(i, result.data)
 
@@ -67,8 +67,8 @@ class BufferedCall:
         Args:
             arguments: as many numbers each as it has nonzeros, column by column.
         """
-        for given, argument in zip(self._given, arguments, strict=True):
-            given[:] = np.ravel(argument)
+        for buffer, argument in zip(self._arguments, arguments, strict=True):
+            buffer[:] = np.ravel(argument)
         self._evaluate()
         return self._results
 

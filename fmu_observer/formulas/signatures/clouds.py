@@ -95,7 +95,7 @@ def separation(first: Extent, second: Extent) -> Separation:
     """Strip between two clouds that is widest beside their range across it, among lines of one a degree.
 
     As a share of that range a strip does not depend on the units of the coordinates, and clouds that lie on one line,
-    since two properties say the same, are not held apart by that line's thinness.
+    since two properties agree, are not held apart by that line's thinness.
 
     Args:
         first: of the one cloud. second: of the other.
@@ -103,8 +103,8 @@ def separation(first: Extent, second: Extent) -> Separation:
     gaps = np.stack([first.low - second.high, second.low - first.high])
     widths = np.maximum(first.high, second.high) - np.minimum(first.low, second.low)
     shares = np.where(widths > _THIN, gaps / np.maximum(widths, _THIN), -1.0)
-    side, at = np.unravel_index(int(np.argmax(shares)), shares.shape)
-    margin, gap = float(shares[side, at]), float(gaps[side, at])
-    if side == 0:
+    order, at = np.unravel_index(int(np.argmax(shares)), shares.shape)
+    margin, gap = float(shares[order, at]), float(gaps[order, at])
+    if order == 0:
         return Separation(margin, gap, _NORMALS[:, at], float(0.5 * (first.low[at] + second.high[at])))
     return Separation(margin, gap, -_NORMALS[:, at], float(-0.5 * (second.low[at] + first.high[at])))

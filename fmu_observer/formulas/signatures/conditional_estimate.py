@@ -81,9 +81,9 @@ def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace
     Raises:
         ValueError: there are fewer than two classes, or not one value a record.
     """
-    given = np.asarray(values, dtype=float)
-    curves = [(_curve(drawn, given), drawn) for drawn in drawn_planes(records, list(values), space)]
-    off = [np.sqrt(np.mean((curve.nearest(drawn.points).value - given) ** 2)) for curve, drawn in curves]
+    quantity = np.asarray(values, dtype=float)
+    curves = [(_curve(drawn, quantity), drawn) for drawn in drawn_planes(records, list(values), space)]
+    off = [np.sqrt(np.mean((curve.nearest(drawn.points).value - quantity) ** 2)) for curve, drawn in curves]
     best, drawn = curves[int(np.argmin(off))]
     return best, drawn.margin
 

@@ -131,11 +131,11 @@ def _slabs(frame: np.ndarray, slabs: int) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def _checked(points: np.ndarray, slabs: int) -> np.ndarray:
-    given = np.asarray(points, dtype=float)
-    if given.ndim != 2 or given.shape[0] != 2:
-        raise ValueError(f"an envelope needs points of shape (2, N), these have shape {given.shape}.")
-    if not 1 <= slabs <= given.shape[1]:
-        raise ValueError(f"{slabs} slabs for {given.shape[1]} points; each slab needs a point.")
-    if not np.all(np.isfinite(given)):
+    array = np.asarray(points, dtype=float)
+    if array.ndim != 2 or array.shape[0] != 2:
+        raise ValueError(f"an envelope needs points of shape (2, N), these have shape {array.shape}.")
+    if not 1 <= slabs <= array.shape[1]:
+        raise ValueError(f"{slabs} slabs for {array.shape[1]} points; each slab needs a point.")
+    if not np.all(np.isfinite(array)):
         raise ValueError("a point is not finite; leave it out first.")
-    return given
+    return array

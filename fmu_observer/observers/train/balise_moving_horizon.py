@@ -12,12 +12,12 @@ from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, See
 from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     MOST_PASSES,
     MOST_ROWS,
-    TOLD,
+    WINDOW_OUTPUTS,
     iterate,
     require_window,
-    told,
-    told_outputs,
     window_memory,
+    window_outputs,
+    window_values,
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
@@ -129,7 +129,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     description = "Moving-horizon observer of odometer and balises, with disturbance and creep"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
     parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
-    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW), RESTARTS)
+    outputs = (*BaliseOdometerEkf.outputs, *window_outputs(WINDOW), RESTARTS)
     iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
@@ -143,7 +143,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
             raise ValueError(f"{self.name}: loss = {loss!r}; expected one of {', '.join(LOSSES)}.")
         self.window, self.passes, self.loss = window, passes, loss
         self.gate_start = OFF
-        told_of = {s.name: s for s in told_outputs(window)}
+        told_of = {s.name: s for s in window_outputs(window)}
         judged = (s for s in self.outputs if loss == "squares" or s.name != "nis")
         self.outputs = tuple(told_of.get(s.name, s) for s in judged)
         super().__init__()
@@ -176,7 +176,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The window with a row more, and the estimates that it gives."""
         filtered, estimate = super().update(event, t, x, u, p), estimate_of(x)
-        begun = x.last_pass[list(TOLD).index("rows_in_window")] > 0.5
+        begun = x.last_pass[list(WINDOW_OUTPUTS).index("rows_in_window")] > 0.5
         shared = vector(*(getattr(p, name) for name in Shared._fields))
         start = np.hstack([estimate, estimate, np.reshape(x.estimate_covariance, (ORDER * ORDER,))])
         before = np.where(begun, x.window_estimates[-ORDER:], estimate)
@@ -204,7 +204,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
         if self.loss != "squares":
             values.pop("nis")
-        return values | told(x.last_pass) | {RESTARTS.name: x.restart_count}
+        return values | window_values(x.last_pass) | {RESTARTS.name: x.restart_count}
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -67,7 +67,7 @@ def test_intervals_of_packets_are_looked_for_far_enough(model: str, theta: float
     limit = observer.limits({"theta": theta})[0]
     own = own_limit(observer, {"theta": theta}, np.arange(0.01, 30.0, 0.01))
     assert limit.exact == (inf if own == inf else pytest.approx(own, abs=0.01))
-    assert limit.looked == 100.0
+    assert limit.searched_to == 100.0
 
 
 def test_a_limit_far_below_the_first_step_of_a_scan_is_found() -> None:

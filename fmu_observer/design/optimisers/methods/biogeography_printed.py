@@ -48,10 +48,10 @@ class BiogeographyPrinted(Optimiser):
         n, d = self._habitats.shape
         moved = self._habitats.copy()
         changed = self.random.random(n) < 1.0 - self._emigration
-        given = self.random.random((n, n)) < self._emigration
+        gives = self.random.random((n, n)) < self._emigration
         places = self.random.integers(0, d, (n, n))
         for j in range(n):  # in this order, since a later one overwrites an earlier one
-            takers = np.flatnonzero(changed & given[:, j])
+            takers = np.flatnonzero(changed & gives[:, j])
             moved[takers, places[takers, j]] = self._habitats[j, places[takers, j]]
         mutates = self.random.random((n, d)) < self._rates[:, np.newaxis]
         return np.where(mutates, self.uniform(n), moved)

@@ -287,7 +287,7 @@ class AdaptiveObserver(GatedObserver, GapCertified):
                 if self.predicts
                 else (),
                 exact=adapted if known == LONGEST_PERIOD else min(adapted, known),
-                looked=LONGEST_PERIOD,
+                searched_to=LONGEST_PERIOD,
                 tried=shortest_tried(known),
                 exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
                 f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",

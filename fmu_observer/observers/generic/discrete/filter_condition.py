@@ -42,7 +42,7 @@ def steady_condition(
     where = "" if model.linear else ", linearised at the start of the estimates"
     driven = observability_matrix(F.T, Q)
     rank, reached = int(np.linalg.matrix_rank(matrix)), int(np.linalg.matrix_rank(driven))
-    doubts = (INACCURATE.format(error=error),) if error > DOUBTED else ()
+    warnings = (INACCURATE.format(error=error),) if error > DOUBTED else ()
     return Condition(
         holds=steady is not None and error <= WRONG,
         values={
@@ -58,7 +58,7 @@ def steady_condition(
         f"and the process noise drives {reached}; steps of half the length change the transition over a period by "
         f"transition_error, at most {WRONG:g}",
         source=source,
-        doubts=doubts,
+        warnings=warnings,
     )
 
 

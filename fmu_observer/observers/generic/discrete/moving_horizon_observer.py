@@ -17,9 +17,9 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     MOST_ROWS,
     iterate,
     require_window,
-    told,
-    told_outputs,
     window_memory,
+    window_outputs,
+    window_values,
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
@@ -138,7 +138,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         values = super().output(t, x, u, p)
         if self.robust:
             values.pop("nis")
-        return values | named_as(self.model.states, inside) | told(x.last_pass)
+        return values | named_as(self.model.states, inside) | window_values(x.last_pass)
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Those of the filter; no lowest value above the highest; the scale of the loss within its bounds."""
@@ -170,7 +170,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
             steady,
             values={**steady.values, "window_rank": told_by.rank},
             statement=f"{steady.statement}. {told}",
-            doubts=(told,) if told_by.unseen.size else (),
+            warnings=(told,) if told_by.unseen.size else (),
         )
 
     @cached_property
@@ -272,7 +272,8 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         self.own_parameters = own
         super()._declare()
         self.states += window_memory(model.start, np.eye(model.order), self._layout.width, self.window)
-        self.outputs = (*(s for s in self.outputs if not (self.robust and s.name == "nis")), *told_outputs(self.window))
+        kept = (s for s in self.outputs if not (self.robust and s.name == "nis"))
+        self.outputs = (*kept, *window_outputs(self.window))
 
     def _limits(self, shared: Array) -> Limits:
         if not self.bounds:

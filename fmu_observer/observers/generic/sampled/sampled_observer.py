@@ -66,7 +66,7 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
                 "period of the samples",
                 printed=self.printed_bounds(self.unpack_parameters(values)),
                 exact=longest,
-                looked=certificate.horizon,
+                searched_to=certificate.horizon,
                 exact_test="first period at which the error grows from sample to sample, at an extreme slope",
                 trial=model_trial(self, "period", high / 50.0, high, self.named_values(values)) if high > 0.0 else None,
             ),
