@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from railway_runs import started
+from railway_runs import outputs, started
 
 from plant_models import FAULT_CAUSES, PLANTS
 from plant_models.faults.fault_cause import Fault, FaultCause
@@ -135,6 +135,22 @@ def test_the_distance_of_a_ramped_wheel_has_exact_edges() -> None:
             runtime.advance(k * step)
         # the area of the trapezium, 0.6 s, times what is missing, 4 m/s
         assert runtime.update_outputs()[1] == pytest.approx(17.0 - 4.0 * 0.6, abs=1e-9)
+
+
+def test_lost_samples_of_a_wheel_are_lost_to_its_distance_whatever_this_is_counted_from() -> None:
+    found = {}
+    for source in ("speed", "position"):
+        wheel = PLANTS["wheel_fault"](cause="lost_samples", distance_from=source)
+        lost = {"fault_onset[1]": 1.0, "fault_length[1]": 10.0, "fault_loss[1]": 1.0, "sample_period": 0.1}
+        runtime = started(wheel, None, None, np.zeros(len(wheel.input_signals)), **lost)
+        for k in range(40):  # the speed rises by steps, and what is lost stays at the last one before the fault
+            runtime.u[0] = float(k // 2)
+            runtime.advance(0.05 * (k + 1))
+        if source == "position":
+            runtime.u[4] = 0.1 * sum(range(20))
+        found[source] = outputs(runtime)["wheel_distance"]
+    assert found["position"] == pytest.approx(found["speed"], abs=1e-9)
+    assert found["speed"] < 0.1 * sum(range(20)) - 4.0
 
 
 def _cause(**members: Any) -> type[FaultCause]:

@@ -129,9 +129,7 @@ def test_faults_that_touch_do_not_overlap_and_unused_ones_never_do() -> None:
 
 
 def test_unknown_causes_and_counts_are_refused() -> None:
-    with pytest.raises(
-        ValueError, match=r"Unknown cause 'luck'; choose one of: adhesion, drawn, gain_and_offset, given, lost"
-    ):
+    with pytest.raises(ValueError, match=r"Unknown cause 'luck'; choose one of: adhesion, .*given, .*or write file.py"):
         PLANTS["wheel_fault"](cause="luck")
     with pytest.raises(ValueError, match="fault_count must be at least 1, got 0"):
         PLANTS["wheel_fault"](fault_count=0)

@@ -47,11 +47,17 @@ def written(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.fixture(params=["block3", pytest.param("fmu3", marks=pytest.mark.compiler)])
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
 def speed(scenario: Scenario) -> float:
     return float(scenario.run(warn=lambda _text: None)["wheel.wheel_speed"][-1])
 
 
-def test_a_scenario_names_its_file_and_an_edit_is_followed(written: Path) -> None:
+def test_a_scenario_names_its_file_and_an_edit_is_followed(written: Path, kind: str) -> None:
+    (written / "scenario.toml").write_text(SCENARIO.replace("block3", kind), encoding="utf-8")
     assert speed(Scenario.load(written / "scenario.toml")) == pytest.approx(25.0)
     (written / "worn.py").write_text(CAUSE.replace("Fault(", "Fault(-"), encoding="utf-8")
     assert speed(Scenario.load(written / "scenario.toml")) == pytest.approx(15.0)
@@ -63,6 +69,7 @@ def test_results_keep_the_file_and_run_again_without_it(written: Path, tmp_path:
     (written / "worn.py").unlink()
     again = rerun(tmp_path / "results")
     assert again.verdict == "bit-identical"
+    assert not again.changes  # the path is no part of the model
     assert (tmp_path / "results" / "made_from" / "files" / "wheel" / "worn.py").is_file()
 
 
