@@ -20,6 +20,7 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
@@ -74,8 +75,7 @@ class AdhesionDetector(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"slip_definition": ("odometer", "speed")}
 
     def __init__(self, slip_definition: SlipDefinition = "odometer") -> None:
-        if slip_definition not in self.option_choices["slip_definition"]:
-            raise ValueError(f"{self.name}: unknown slip_definition {slip_definition!r}; use 'odometer' or 'speed'.")
+        require_chosen(self.name, self.option_choices, slip_definition=slip_definition)
         self.slip_definition = slip_definition
         computed = _map_values(nominal_map(), degraded_map())
         self.parameters = (

@@ -17,6 +17,7 @@ from fmu_observer.detection.jam_rules import (
 )
 from fmu_observer.detection.printed_jam_rules import PrintedRules
 from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 NOISE = "odometer_noise"
@@ -40,8 +41,7 @@ def find_rules(name: str, rules: str) -> Rules:
     Raises:
         ValueError: there are no such rules.
     """
-    if rules not in RULES:
-        raise ValueError(f"{name}: unknown rules {rules!r}; use 'repaired' or 'printed'.")
+    require_chosen(name, {"rules": tuple(RULES)}, rules=rules)
     return RULES[rules]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
 from plant_models.hybrid import output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Variant = Literal["mixed", "speed", "root"]
@@ -51,9 +52,7 @@ class BrakedOscillator(NoisyPlant):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"variant": ("mixed", "speed", "root")}
 
     def __init__(self, variant: Variant = "mixed") -> None:
-        if variant not in self.option_choices["variant"]:
-            known = ", ".join(self.option_choices["variant"])
-            raise ValueError(f"{self.name}: unknown variant {variant!r}; use one of: {known}.")
+        require_chosen(self.name, self.option_choices, variant=variant)
         self.variant: Variant = variant
         self.declare(
             (output_signal("measured_y", "1/s", "Measured output", variability="discrete"),),

@@ -11,6 +11,7 @@ import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
 from plant_models.hybrid import output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Glycerol = Literal["clamped", "as_published"]
@@ -60,9 +61,7 @@ class EcoliCulture(NoisyPlant):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"glycerol": ("clamped", "as_published")}
 
     def __init__(self, glycerol: Glycerol = "clamped") -> None:
-        if glycerol not in self.option_choices["glycerol"]:
-            known = ", ".join(self.option_choices["glycerol"])
-            raise ValueError(f"{self.name}: unknown glycerol {glycerol!r}; use one of: {known}.")
+        require_chosen(self.name, self.option_choices, glycerol=glycerol)
         self.glycerol: Glycerol = glycerol
         self.declare(
             (

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Gravity = Literal["link_angle", "motor_speed"]
@@ -91,6 +92,5 @@ def checked_gravity(gravity: Gravity, where: str) -> Gravity:
     Raises:
         ValueError: another word.
     """
-    if gravity not in GRAVITY:
-        raise ValueError(f"{where}: unknown gravity {gravity!r}; choose one of: {', '.join(GRAVITY)}.")
+    require_chosen(where, {"gravity": GRAVITY}, gravity=gravity)
     return gravity

@@ -17,6 +17,7 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
 )
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 
@@ -86,8 +87,7 @@ class StateFeedback(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"plant": tuple(REGULATED)}
 
     def __init__(self, plant: str = "cart_pendulum") -> None:
-        if plant not in REGULATED:
-            raise ValueError(f"{self.name}: unknown plant {plant!r}; choose one of: {', '.join(REGULATED)}.")
+        require_chosen(self.name, self.option_choices, plant=plant)
         regulated = REGULATED[plant]
         self.inputs, self.outputs = regulated.inputs, (regulated.output,)
         self.parameters = (

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Reading = Literal["minus", "as_published", "product"]
@@ -39,9 +40,7 @@ class TanhSystem(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"reading": ("minus", "as_published", "product")}
 
     def __init__(self, reading: Reading = "minus") -> None:
-        if reading not in self.option_choices["reading"]:
-            known = ", ".join(self.option_choices["reading"])
-            raise ValueError(f"{self.name}: unknown reading {reading!r}; use one of: {known}.")
+        require_chosen(self.name, self.option_choices, reading=reading)
         self.reading = reading
         super().__init__(reading=reading)
 

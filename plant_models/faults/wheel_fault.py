@@ -10,6 +10,7 @@ import numpy as np
 from plant_models.faults.fault_cause import ADHESION_LIMIT, BRAKE_RELEASED, EFFORT, RELEASE_TIME, Carrier
 from plant_models.faults.fault_system import CAUSES, FaultSystem, active, unfinished_output
 from plant_models.hybrid import input_signal, output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 DistanceFrom = Literal["speed", "position"]
@@ -68,8 +69,7 @@ class WheelFault(FaultSystem):
     }
 
     def __init__(self, *, cause: str = "given", fault_count: int = 4, distance_from: DistanceFrom = "speed") -> None:
-        if distance_from not in self.option_choices["distance_from"]:
-            raise ValueError(f"Unknown distance_from {distance_from!r}; choose one of: speed, position.")
+        require_chosen(self.name, self.option_choices, distance_from=distance_from)
         self.distance_from = distance_from
         self.inputs = (*_INPUTS, *((_POSITION,) if distance_from == "position" else ()))
         options = {"cause": cause, "fault_count": fault_count, "distance_from": distance_from}

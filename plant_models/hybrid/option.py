@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,22 @@ def is_number(value: object) -> bool:
     """
     real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     return real and value == value  # noqa: PLR0124 # not-a-number is not itself
+
+
+def require_chosen(where: str, choices: Mapping[str, Sequence[Any]], **options: object) -> None:
+    """Refuse an option that is none of its choices.
+
+    Args:
+        where: what asks, for the message. choices: by name of the option, `option_choices` of a system say.
+        options: values by name.
+
+    Raises:
+        ValueError: one is not; the message says which, and names the choices.
+    """
+    for name, value in options.items():
+        if value not in choices[name]:
+            known = ", ".join(map(str, choices[name]))
+            raise ValueError(f"{where}: unknown {name} {value!r}; choose one of: {known}.")
 
 
 def require_whole(where: str, low: int = 1, high: int | None = None, **options: object) -> None:

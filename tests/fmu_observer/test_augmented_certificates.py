@@ -146,5 +146,5 @@ def test_certified_mixtures_do_converge(make: type[AugmentedTrainObserver], seed
 
 
 def test_an_unknown_first_stage_is_refused() -> None:
-    with pytest.raises(ValueError, match="unknown first_stage 'radar'; use one of: multirate, differentiator"):
+    with pytest.raises(ValueError, match="unknown first_stage 'radar'; choose one of: multirate, differentiator"):
         AugmentedHighGainCdo("radar")  # type: ignore[arg-type]

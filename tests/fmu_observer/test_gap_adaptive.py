@@ -148,7 +148,7 @@ def test_the_spacing_is_learnt_from_the_last_two_balises() -> None:
 
 @pytest.mark.parametrize("option", [{"first_stage": "wish"}, {"gain_speed": "wish"}, {"spacing": "wish"}])
 def test_an_unknown_option_is_refused_with_what_there_is(option: dict[str, str]) -> None:
-    with pytest.raises(ValueError, match=f"unknown {next(iter(option))} 'wish'; use one of: "):
+    with pytest.raises(ValueError, match=f"unknown {next(iter(option))} 'wish'; choose one of: "):
         AdaptiveGainCdo(**option)  # type: ignore[arg-type]
 
 

@@ -563,5 +563,5 @@ def test_the_block_tells_a_jam(rules: Any) -> None:
 
 
 def test_unknown_rules_are_refused() -> None:
-    with pytest.raises(ValueError, match="jam_detector: unknown rules 'mine'; use 'repaired' or 'printed'"):
+    with pytest.raises(ValueError, match="jam_detector: unknown rules 'mine'; choose one of: repaired, printed"):
         JamDetector("mine")  # type: ignore[arg-type]

@@ -126,7 +126,7 @@ def test_the_printed_jacobian_has_three_misprints() -> None:
     assert difference[0, 2] == pytest.approx(T * 2.0 * (0.7 - 1.3))  # x1 in place of x2
     assert difference[1, 2] == pytest.approx(T * 2.0 * 2.0 * 0.7)  # plus in place of minus
     assert np.count_nonzero(difference) == 2  # the third does nothing where L_d = L_q
-    with pytest.raises(ValueError, match="Unknown jacobian 'wrong'; choose one of: exact, as_published"):
+    with pytest.raises(ValueError, match="unknown jacobian 'wrong'; choose one of: exact, as_published"):
         MotorEkf(jacobian="wrong")  # type: ignore[arg-type]
 
 

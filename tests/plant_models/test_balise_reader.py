@@ -406,7 +406,7 @@ def test_a_restored_reader_continues_as_it_did() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"layout": "circle"}, "Unknown layout 'circle'; choose one of: spacing, positions"),
+        ({"layout": "circle"}, "unknown layout 'circle'; choose one of: spacing, positions"),
         ({"pending_capacity": 0}, "pending_capacity must be at least 1, got 0"),
         ({"layout": "positions", "balise_capacity": 0}, "balise_capacity must be at least 1, got 0"),
         (

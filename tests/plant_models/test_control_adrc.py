@@ -100,7 +100,7 @@ def test_a_ramped_drive_keeps_its_rate_and_the_observer_knows_it() -> None:
     assert np.abs(states[:, 1]).max() < 1e-9  # no disturbance in that
     loop.advance(60.0)
     assert loop.x[4] == pytest.approx(25.0, abs=1e-3)
-    with pytest.raises(ValueError, match=r"Unknown drive 'slow'.*immediate, ramped"):
+    with pytest.raises(ValueError, match=r"unknown drive 'slow'.*immediate, ramped"):
         AdrcController(drive="slow")  # type: ignore[arg-type]
 
 

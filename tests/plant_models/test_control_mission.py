@@ -96,5 +96,5 @@ def test_by_place_the_reference_is_the_braking_curve() -> None:
 
 
 def test_an_unknown_way_of_braking_is_refused_in_words() -> None:
-    with pytest.raises(ValueError, match=r"Unknown braking 'place' of the mission; choose one of: time, position"):
+    with pytest.raises(ValueError, match=r"unknown braking 'place'; choose one of: time, position"):
         Mission(braking="place")  # type: ignore[arg-type]

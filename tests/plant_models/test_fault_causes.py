@@ -11,7 +11,7 @@ from railway_runs import outputs, started
 
 from plant_models import FAULT_CAUSES, PLANTS
 from plant_models.faults.fault_cause import Fault, FaultCause
-from plant_models.hybrid import Runtime, TracedSystem, input_signal, parameter, state
+from plant_models.hybrid import Runtime, TracedSystem, input_signal, parameter, state, width
 from plant_models.hybrid.requirements import unfulfilled
 
 CAUSES = sorted(FAULT_CAUSES)
@@ -142,7 +142,7 @@ def test_lost_samples_of_a_wheel_are_lost_to_its_distance_whatever_this_is_count
     for source in ("speed", "position"):
         wheel = PLANTS["wheel_fault"](cause="lost_samples", distance_from=source)
         lost = {"fault_onset[1]": 1.0, "fault_length[1]": 10.0, "fault_loss[1]": 1.0, "sample_period": 0.1}
-        runtime = started(wheel, None, None, np.zeros(len(wheel.input_signals)), **lost)
+        runtime = started(wheel, None, None, np.zeros(width(wheel.input_signals)), **lost)
         for k in range(40):  # the speed rises by steps, and what is lost stays at the last one before the fault
             runtime.u[0] = float(k // 2)
             runtime.advance(0.05 * (k + 1))

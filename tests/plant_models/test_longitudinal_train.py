@@ -100,7 +100,7 @@ def test_a_zone_lowers_the_adhesion_limit_between_its_edges() -> None:
 
 
 def test_an_unknown_railway_is_refused_with_those_known() -> None:
-    with pytest.raises(ValueError, match=r"Unknown railway 'moon'; choose one of: sncf_multi_motor_bogie"):
+    with pytest.raises(ValueError, match=r"unknown railway 'moon'; choose one of: sncf_multi_motor_bogie"):
         PLANTS["longitudinal_train"](railway="moon")
 
 

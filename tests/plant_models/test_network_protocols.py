@@ -74,7 +74,7 @@ def test_share_of_lost_packets_is_a_normal_quantile() -> None:
     [
         ({"signals": 0}, "signals must be 1 to 32, got 0"),
         ({"nodes": 1.5}, "nodes must be a whole number"),
-        ({"protocol": "token"}, "Unknown protocol 'token'"),
+        ({"protocol": "token"}, "unknown protocol 'token'"),
         ({"delay_periods": 65}, "delay_periods must be 0 to 64"),
     ],
 )

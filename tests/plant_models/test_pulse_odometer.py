@@ -117,7 +117,7 @@ def test_a_wheel_without_teeth_radius_or_whole_samples_is_refused(changes: dict[
 
 
 def test_an_unknown_source_of_the_count_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"Unknown count_from 'axle'; choose one of: wheel_speed, wheel_distance"):
+    with pytest.raises(ValueError, match=r"unknown count_from 'axle'; choose one of: wheel_speed, wheel_distance"):
         PLANTS["pulse_odometer"](count_from="axle")
 
 

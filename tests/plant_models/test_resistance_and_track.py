@@ -113,9 +113,9 @@ def test_setting_the_first_gradient_alone_tilts_the_whole_track() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"adhesion": "coulomb"}, "Unknown adhesion 'coulomb'; choose one of: burckhardt, polach"),
-        ({"zones": "space"}, "Unknown zones 'space'"),
-        ({"gradient_shape": "cubic"}, "Unknown gradient_shape 'cubic'"),
+        ({"adhesion": "coulomb"}, "unknown adhesion 'coulomb'; choose one of: burckhardt, polach"),
+        ({"zones": "space"}, "unknown zones 'space'"),
+        ({"gradient_shape": "cubic"}, "unknown gradient_shape 'cubic'"),
         ({"zone_count": 0}, "zone_count must be at least 1, got 0"),
     ],
 )

@@ -155,7 +155,7 @@ def test_stator_readings_are_turned_rotor_currents() -> None:
     now = outputs(motor)
     turned = to_stator(now["current_d"], now["current_q"], now["angle"])
     assert (now["measured_current_alpha"], now["measured_current_beta"]) == pytest.approx(turned)
-    with pytest.raises(ValueError, match="Unknown frame 'north'; choose one of: rotor, stator"):
+    with pytest.raises(ValueError, match="unknown frame 'north'; choose one of: rotor, stator"):
         SynchronousMotor(frame="north")  # type: ignore[arg-type]
 
 

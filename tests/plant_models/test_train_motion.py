@@ -136,8 +136,8 @@ def test_trains_of_one_and_of_many_wagons_run(wagons: int) -> None:
         ({"wagons": 2.5}, r"whole number from 1 to 20, got 2\.5"),
         ({"axles": 2}, "4 axles, or 1 that stands for all; got axles = 2"),
         ({"effort_per_axle": "each"}, "effort_per_axle must be true or false, got 'each'"),
-        ({"adhesion": "kalker"}, "Unknown adhesion 'kalker'; choose one of: burckhardt, polach"),
-        ({"zones": "day"}, "Unknown zones 'day'"),
+        ({"adhesion": "kalker"}, "unknown adhesion 'kalker'; choose one of: burckhardt, polach"),
+        ({"zones": "day"}, "unknown zones 'day'"),
         ({"delay_samples": 0}, "delay_samples must be a whole number, 1 at least, got 0"),
     ],
 )

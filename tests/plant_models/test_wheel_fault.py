@@ -78,7 +78,7 @@ def test_from_the_position_only_faults_feel_the_held_speed() -> None:
         lost = sum(0.05 * 2.0 * 0.05 * (j - 1) for j in range(21, 31) if j <= k)
         # the jam is missing, by ten held speeds; the train's own distance is exact
         assert outputs(runtime)["wheel_distance"] == pytest.approx(runtime.u[4] - lost, abs=1e-12)
-    with pytest.raises(ValueError, match=r"Unknown distance_from 'rail'; choose one of: speed, position"):
+    with pytest.raises(ValueError, match=r"unknown distance_from 'rail'; choose one of: speed, position"):
         PLANTS["wheel_fault"](distance_from="rail")
 
 

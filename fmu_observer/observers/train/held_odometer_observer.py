@@ -32,6 +32,7 @@ from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -157,8 +158,7 @@ class HeldOdometerObserver(TrainObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"missing": ("predicted", "held")}
 
     def __init__(self, missing: Missing = "predicted") -> None:
-        if missing not in self.option_choices["missing"]:
-            raise ValueError(f"{self.name}: unknown missing {missing!r}; use 'predicted' or 'held'.")
+        require_chosen(self.name, self.option_choices, missing=missing)
         self.missing = missing
         super().__init__(missing=missing)
 

@@ -39,6 +39,7 @@ from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import BALISE, POSITION
 from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 SPEEDS = 21  # between the vertices, for the certificate
@@ -145,8 +146,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     def __init__(self, rules: RuleChoice = "repaired", hold: HoldChoice = "innovation") -> None:
         self.rules = find_rules(self.name, rules)
         self.told_bounds = told_bounds(self.rules)
-        if hold not in HOLDS:
-            raise ValueError(f"{self.name}: unknown hold {hold!r}; use 'innovation' or 'reading'.")
+        require_chosen(self.name, self.option_choices, hold=hold)
         self.hold = hold
         self.repaired = rules == "repaired"
         self.states = (

@@ -14,6 +14,7 @@ from fmu_observer.design.certified_gains import balise_family, certified_gains
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import memory, parameter
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Premise = Literal["frozen", "live", "estimated"]
@@ -94,8 +95,7 @@ class TakagiSugenoCdo(TrainObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"premise": ("frozen", "live", "estimated")}
 
     def __init__(self, premise: Premise = "frozen") -> None:
-        if premise not in self.option_choices["premise"]:
-            raise ValueError(f"{self.name}: unknown premise {premise!r}; use 'frozen', 'live' or 'estimated'.")
+        require_chosen(self.name, self.option_choices, premise=premise)
         self.premise = premise
         if premise == "frozen":
             self.estimator_memory = (

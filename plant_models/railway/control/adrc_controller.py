@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.brake_blending import air_brake_demand, building_up, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
@@ -104,8 +105,7 @@ class AdrcController(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"drive": ("immediate", "ramped")}
 
     def __init__(self, *, drive: Drive = "immediate") -> None:
-        if drive not in self.option_choices["drive"]:
-            raise ValueError(f"Unknown drive {drive!r} of the ADRC controller; choose one of: immediate, ramped.")
+        require_chosen(self.name, self.option_choices, drive=drive)
         self._ramped = drive == "ramped"
         if self._ramped:
             self.states = (*self.states, state("drive_effort", "N", 0.0, "Effort of the drive"))

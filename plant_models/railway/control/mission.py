@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.logic import either, every, holds
 from plant_models.railway.control.trapezoid import Trapezoid, braking_curve
@@ -75,8 +76,7 @@ class Mission(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"braking": ("time", "position")}
 
     def __init__(self, *, braking: BrakingPoint = "time") -> None:
-        if braking not in self.option_choices["braking"]:
-            raise ValueError(f"Unknown braking {braking!r} of the mission; choose one of: time, position.")
+        require_chosen(self.name, self.option_choices, braking=braking)
         self._by_position = braking == "position"
         if self._by_position:
             self.inputs = (input_signal("position", "m", 0.0, "Position of the train, measured or estimated"),)

@@ -12,7 +12,7 @@ import numpy as np
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
 from plant_models.hybrid.noise import Purpose
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.network.loss import loss_threshold
@@ -81,8 +81,7 @@ class NetworkProtocol(HybridSystem):
         turns: int = 2,
         delay_periods: int = 0,
     ) -> None:
-        if protocol not in PROTOCOLS:
-            raise ValueError(f"Unknown protocol {protocol!r}; choose one of: {', '.join(PROTOCOLS)}.")
+        require_chosen(self.name, self.option_choices, protocol=protocol)
         require_whole("network_protocol", 1, MOST_SIGNALS, signals=signals)
         require_whole("network_protocol", 1, MOST_NODES, nodes=nodes)
         require_whole("network_protocol", 1, MOST_TURNS, turns=turns)

@@ -20,7 +20,7 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.hermite_cubic import HermiteCubic
 from plant_models.railway.track.balise_layout import BaliseLayout, Positions, Spacing
@@ -111,8 +111,7 @@ class BaliseReader(HybridSystem):
         balise_capacity: int = 64,
         pending_capacity: int = 8,
     ) -> None:
-        if layout not in self.option_choices["layout"]:
-            raise ValueError(f"Unknown layout {layout!r}; choose one of: spacing, positions.")
+        require_chosen(self.name, self.option_choices, layout=layout)
         require_whole("balise_reader", pending_capacity=pending_capacity)
         self.pending_capacity = pending_capacity
         self._layout: BaliseLayout = (

@@ -20,6 +20,7 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
@@ -91,8 +92,7 @@ class PulseOdometer(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"count_from": ("wheel_speed", "wheel_distance")}
 
     def __init__(self, *, count_from: CountFrom = "wheel_speed") -> None:
-        if count_from not in self.option_choices["count_from"]:
-            raise ValueError(f"Unknown count_from {count_from!r}; choose one of: wheel_speed, wheel_distance.")
+        require_chosen(self.name, self.option_choices, count_from=count_from)
         self.count_from = count_from
         self.inputs = (_SPEED,) if count_from == "wheel_speed" else (_FIRST_SPEED, _DISTANCE)
         late = {"reading": "aggregation_period", "sampled_reading": "sample_period"}

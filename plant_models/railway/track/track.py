@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.signal import Signal, parameter
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_constant, piecewise_linear
@@ -22,6 +22,7 @@ UNUSED_POSITION = 1e9  # [m]; a gradient point that is not laid lies beyond the 
 # Traction [10, 20] s and braking [70, 80] s are printed; the zone in the hold phase comes without times, [40, 50] s is
 # ours.
 PUBLISHED_ZONES = ((10.0, 20.0), (40.0, 50.0), (70.0, 80.0))
+_CHOICES = {"zones": ("time", "position"), "gradient_shape": ("constant", "linear")}
 
 
 class Track:
@@ -54,8 +55,7 @@ class Track:
         gradient_shape: GradientShape = "constant",
         gradient_count: int = 4,
     ) -> None:
-        _check("zones", zones, ("time", "position"))
-        _check("gradient_shape", gradient_shape, ("constant", "linear"))
+        require_chosen("Track", _CHOICES, zones=zones, gradient_shape=gradient_shape)
         require_whole("Track", zone_count=zone_count, gradient_count=gradient_count)
         self.zones = zones
         self.gradient_shape = gradient_shape
@@ -140,8 +140,3 @@ def _parameters(zones: ZoneAxis, zone_count: int, gradient_count: int) -> tuple[
             size=gradient_count,
         ),
     )
-
-
-def _check(option: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise ValueError(f"Unknown {option} {value!r}; choose one of: {', '.join(allowed)}.")

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
@@ -82,10 +83,7 @@ class FieldOrientedControl(HybridSystem):
     }
 
     def __init__(self, *, frame: Frame = "rotor", reference: Reference = "speed") -> None:
-        for option, value in (("frame", frame), ("reference", reference)):
-            if value not in self.option_choices[option]:
-                known = ", ".join(self.option_choices[option])
-                raise ValueError(f"Unknown {option} {value!r}; choose one of: {known}.")
+        require_chosen(self.name, self.option_choices, frame=frame, reference=reference)
         self.frame, self.reference = frame, reference
         speed = input_signal("speed_reference", "rad/s", 0.0, "Speed asked for", display_unit="rpm")
         torque = input_signal("torque_reference", "N.m", 0.0, "Torque asked for")

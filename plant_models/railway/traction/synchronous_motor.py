@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 from plant_models.hybrid import HybridSystem, Signal, state
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import (
@@ -65,10 +66,7 @@ class SynchronousMotor(HybridSystem):
 
     def __init__(self, *, frame: Frame = "rotor", noise: Noise = "none") -> None:
         chosen = {"frame": frame, "noise": noise}
-        for option, value in chosen.items():
-            if value not in SynchronousMotor.option_choices[option]:
-                known = ", ".join(SynchronousMotor.option_choices[option])
-                raise ValueError(f"Unknown {option} {value!r}; choose one of: {known}.")
+        require_chosen(self.name, SynchronousMotor.option_choices, **chosen)
         self.frame, self.sampled = frame, noise == "sampled"
         if self.sampled:
             self.parameters = (*MOTOR_PARAMETERS, *NOISE_PARAMETERS)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion.law import ADHESION_LAWS
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
@@ -106,8 +107,7 @@ class Locomotive(HybridSystem):
         gradient_shape: GradientShape = "constant",
         gradient_count: int = 4,
     ) -> None:
-        if adhesion not in ADHESION_LAWS:
-            raise ValueError(f"Unknown adhesion {adhesion!r}; choose one of: {', '.join(ADHESION_LAWS)}.")
+        require_chosen(self.name, self.option_choices, adhesion=adhesion)
         self._law = ADHESION_LAWS[adhesion]()
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
         self.switchings = self._track.edges

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, OutputWarning, input_signal, output_signal, parameter
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.signal import Signal
 from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
@@ -94,8 +95,7 @@ class LongitudinalForces(HybridSystem):
         gradient_count: int = 4,
         railway: str = "sncf_multi_motor_bogie",
     ) -> None:
-        if railway not in STANDING_ADHESION:
-            raise ValueError(f"Unknown railway {railway!r}; choose one of: {', '.join(STANDING_ADHESION)}.")
+        require_chosen(self.name, self.option_choices, railway=railway)
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
         self.parameters = (*_vehicle(railway), *self.own_parameters, *self._unused_zones())
         super().__init__(

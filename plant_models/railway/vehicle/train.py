@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, vector
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion.law import ADHESION_LAWS
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
@@ -322,7 +323,6 @@ def _check(wagons: int, axles: int, effort_per_axle: bool, adhesion: str, delay_
         raise ValueError(f"train: the locomotive has 4 axles, or 1 that stands for all; got axles = {axles!r}.")
     if not isinstance(effort_per_axle, bool):
         raise ValueError(f"train: effort_per_axle must be true or false, got {effort_per_axle!r}.")
-    if adhesion not in ADHESION_LAWS:
-        raise ValueError(f"Unknown adhesion {adhesion!r}; choose one of: {', '.join(ADHESION_LAWS)}.")
+    require_chosen("train", {"adhesion": ADHESION_LAWS}, adhesion=adhesion)
     if not isinstance(delay_samples, int) or delay_samples < 1:
         raise ValueError(f"train: delay_samples must be a whole number, 1 at least, got {delay_samples!r}.")

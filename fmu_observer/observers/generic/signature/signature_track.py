@@ -23,7 +23,7 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.system import Array
 
 Reading = Literal["repaired", "as_published"]
@@ -114,9 +114,7 @@ class SignatureTrack(HybridSystem):
         require_whole(self.name, 2, long_order=long_order, short_order=short_order)
         if short_order > long_order:
             raise ValueError(f"{self.name}: short_order {short_order} is above long_order {long_order}; exchange them.")
-        for key, value in (("next_scaling", next_scaling), ("reading", reading)):
-            if value not in self.option_choices[key]:
-                raise ValueError(f"{self.name}: {key} is {value!r}; use one of {', '.join(self.option_choices[key])}.")
+        require_chosen(self.name, self.option_choices, next_scaling=next_scaling, reading=reading)
         self.orders, self.next_scaling, self.reading = (long_order, short_order), next_scaling, reading
         self.states = (
             memory("samples", "1", 0.0, "The last samples, the oldest first", size=long_order),
