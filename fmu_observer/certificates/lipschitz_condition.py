@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
+from fmu_observer.certificates.lyapunov import lyapunov_matrix
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale, scaled, scaled_lipschitz
 
@@ -46,9 +46,10 @@ def thau_bound(closed: np.ndarray) -> tuple[float, float]:
     Returns:
         Both bounds [1/s]; zeros when `closed` is not Hurwitz.
     """
-    if np.linalg.eigvals(closed).real.max() >= 0.0:
+    P = lyapunov_matrix(closed)
+    if P is None:
         return 0.0, 0.0
-    sizes = np.linalg.eigvalsh(scipy.linalg.solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))
+    sizes = np.linalg.eigvalsh(P)
     return float(0.5 / sizes[-1]), float(1.0 / sizes[0])
 
 

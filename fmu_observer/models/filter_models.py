@@ -16,6 +16,7 @@ import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals
 from fmu_observer.models.discrete_model import transition
+from fmu_observer.models.named_states import NamedStates
 from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid import Signal
 from plant_models.hybrid.exact_jacobian import exact_jacobian, is_affine
@@ -41,7 +42,7 @@ Measured = Callable[[Array, Array, Known], Array]  # (x (n,), v (s,), known) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class FilterModel:
+class FilterModel(NamedStates):
     """What a filter believes of its plant: ``x+ = f(x, u, w)``, ``y = h(x, u, v)``; Allaoui 2024, (2.25).
 
     Args:
@@ -84,16 +85,6 @@ class FilterModel:
         check_identifiers(where, name=self.name, event=self.event)
         check_signals(where, states=self.states, inputs=self.inputs, measurements=self.measurements)
         check_numbers(where, {"sample_period": self.sample_period}, {})
-
-    @property
-    def order(self) -> int:
-        """Number of states, n."""
-        return len(self.states)
-
-    @property
-    def start(self) -> np.ndarray:
-        """Start of the estimates, shape (n,)."""
-        return np.array([float(s.start_values[0]) for s in self.states])
 
     @property
     def noise_count(self) -> int:

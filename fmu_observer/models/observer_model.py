@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
+from fmu_observer.models.named_states import NamedStates
 from plant_models.hybrid import Signal
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.hybrid.system import Array, vector
@@ -24,7 +25,7 @@ Remainder = Callable[[Array, Array], Array]  # (x of shape (n,), u of shape (m,)
 
 
 @dataclass(frozen=True, eq=False)
-class ObserverModel:
+class ObserverModel(NamedStates):
     """What an observer believes of its plant.
 
     Args:
@@ -95,9 +96,8 @@ class ObserverModel:
         """phi is tried at the starts: a wrong shape would be broadcast in silence."""
         if self.phi is None:
             return
-        starts = [np.array([float(s.start_values[0]) for s in signals]) for signals in (self.states, self.inputs)]
         try:
-            found = np.shape(self.phi(*starts))
+            found = np.shape(self.phi(self.start, self.start_inputs))
         except Exception as error:
             raise ValueError(f"{where}: phi(x, u) fails at the start values: {error}") from error
         if found != (self.order,):
@@ -105,11 +105,6 @@ class ObserverModel:
                 f"{where}: phi(x, u) returns shape {found}, expected {(self.order,)}, one value a state, as of "
                 f"vector(...)."
             )
-
-    @property
-    def order(self) -> int:
-        """Number of states, n."""
-        return len(self.states)
 
     def remainder(self, x: Array, u: Array) -> Array:
         """``phi(x, u)``, shape (n,); zero for a linear model."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
+from fmu_observer.models.named_states import NamedStates
 from plant_models.hybrid import Signal
 from plant_models.hybrid.system import Array
 
@@ -18,7 +19,7 @@ Matrices = Callable[[Array, Array], Array]  # (t, u of shape (m,)) -> an array
 
 
 @dataclass(frozen=True, eq=False)
-class StateAffineModel:
+class StateAffineModel(NamedStates):
     """What an adaptive observer believes of its plant: Hann 2014, (4.1).
 
     Args:
@@ -61,18 +62,12 @@ class StateAffineModel:
         n, m, q = self.order, len(self.unknowns), len(self.measurements)
         reason = f"{n} states, {q} measurements and {m} unknown constants"
         object.__setattr__(self, "C", checked_matrix(where, "C", self.C, (q, n), reason))
-        u = np.array([float(s.start_values[0]) for s in self.inputs])
         if len(self.example) not in (0, n + m):
             raise ValueError(f"{where}: the example has {len(self.example)} numbers, expected {n + m} for {reason}.")
         for name, shape in {"drift": (n, n), "drive": (n,), "regressor": (n, m)}.items():
-            found = np.shape(getattr(self, name)(0.0, u))
+            found = np.shape(getattr(self, name)(0.0, self.start_inputs))
             if found != shape:
                 raise ValueError(f"{where}: {name}(t, u) returns shape {found}, expected {shape} for {reason}.")
-
-    @property
-    def order(self) -> int:
-        """Number of states, n."""
-        return len(self.states)
 
     def flow(self, t: Array, x: Array, rho: Array, u: Array) -> Array:
         """``A(t, u) x + B(t, u) + Phi(t, u) rho``, shape (n,).

@@ -13,6 +13,7 @@ from math import isfinite
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
+from fmu_observer.models.named_states import NamedStates
 from fmu_observer.models.observer_model import stacked
 from plant_models.hybrid import Signal
 from plant_models.hybrid.system import Array, vector
@@ -64,7 +65,7 @@ class Premise:
 
 
 @dataclass(frozen=True, eq=False)
-class TakagiSugenoModel:
+class TakagiSugenoModel(NamedStates):
     """``dx = sum_i h_i (A_i x + B_i u) + G w``, ``y1(t_k) = C1 x`` at samples, ``y2 = C2 x + D v`` always.
 
     Bouchama 2024, (2.1)-(2.5). Vertex i is the corner where premise j is at its upper bound if bit j of i is set, so
@@ -130,11 +131,6 @@ class TakagiSugenoModel:
             object.__setattr__(self, name, checked_matrix(where, name, getattr(self, name), shape, reason))
 
     @property
-    def order(self) -> int:
-        """Number of states, n."""
-        return len(self.states)
-
-    @property
     def vertices(self) -> int:
         """Number of vertices, N."""
         return len(self.A)
@@ -148,11 +144,6 @@ class TakagiSugenoModel:
     def measurements(self) -> tuple[Signal, ...]:
         """Both kinds, sampled ones first."""
         return (*self.sampled, *self.continuous)
-
-    @property
-    def start(self) -> np.ndarray:
-        """Start of the estimates, shape (n,)."""
-        return np.array([float(s.start_values[0]) for s in self.states])
 
     def corner(self, vertex: int) -> np.ndarray:
         """Values of the premises at a vertex, shape (p,)."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.linear_models import linear_part, start_of
+from fmu_observer.models.linear_models import linear_part
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability.measured_system import MeasuredSystem
@@ -50,7 +50,7 @@ def require_detectable_model(model: ObserverModel, asking: str) -> None:
 def _elsewhere(model: ObserverModel) -> list[np.ndarray]:
     if model.phi is None:
         return []
-    at = start_of(model) + np.random.default_rng(0).normal(size=(_POINTS, model.order))
+    at = model.start + np.random.default_rng(0).normal(size=(_POINTS, model.order))
     jacobians = [np.asarray(model.jacobian(x, np.ones(len(model.inputs)))) for x in at]
     return [A for A in jacobians if np.isfinite(A).all()]
 

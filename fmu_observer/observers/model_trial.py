@@ -36,7 +36,7 @@ def model_trial(
             a delay ago. further: as for `Trial`, such as `nodes`, `period`, `stop`.
     """
     model = observer.model
-    start = np.array([float(s.start_values[0]) for s in model.states])
+    start = model.start
     stop = float(further.get("stop", Trial.stop))
 
     def drive(t: np.ndarray) -> np.ndarray:

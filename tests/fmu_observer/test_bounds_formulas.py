@@ -220,7 +220,7 @@ def test_the_improved_bound_is_tight(m: float) -> None:
 def test_what_the_worst_case_refuses() -> None:
     with pytest.raises(ValueError, match=r"not stable, its slowest pole is at \+1 1/s"):
         worst_case(np.eye(2), np.ones(2), 1.7, 0.2)
-    with pytest.raises(ValueError, match="period must be a positive number"):
+    with pytest.raises(ValueError, match="the period must be finite and positive"):
         worst_case(-np.eye(2), np.ones(2), 1.7, 0.0)
     with pytest.raises(ValueError, match="not negative, got -1"):
         worst_case(-np.eye(2), np.ones(2), -1.0, 0.2)

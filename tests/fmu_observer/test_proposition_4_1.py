@@ -131,9 +131,9 @@ def test_the_printed_gain_of_5_4() -> None:
 
 def test_what_is_not_legal() -> None:
     A = train_vertices([W1])
-    with pytest.raises(ValueError, match="m must be a positive number, got 0"):
+    with pytest.raises(ValueError, match="m must be finite and positive, got 0"):
         design_proposition_4_1(A, C, 0.0)
-    with pytest.raises(ValueError, match="alpha must be a positive number, got -1"):
+    with pytest.raises(ValueError, match="alpha must be finite and positive, got -1"):
         design_proposition_4_1(A, C, 0.1, -1.0)
     with pytest.raises(ValueError, match="gains need 3 finite numbers"):
         design_proposition_4_1(A, C, 0.1, gains=(1.0, 2.0))

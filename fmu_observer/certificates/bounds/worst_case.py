@@ -14,6 +14,7 @@ import numpy as np
 
 from fmu_observer.certificates.gap_error import matrix_powers
 from fmu_observer.certificates.matrix_exponential import small_exponential
+from fmu_observer.models.checks import check_numbers
 
 _POINTS, _FEWEST = 400, 8  # a period: errors of the trapezium rule are of the order 1e-6 of the result
 _TOTAL = 50_000  # points altogether: for short periods fewer a period, which are closer then
@@ -78,11 +79,7 @@ def worst_case(
 
 def _checked_decay(F: np.ndarray, rate: float, period: float, gap: float) -> float:
     """Decay of the slowest pole [1/s], of numbers that are legal."""
-    for name, value in (("period", period), ("time since the sample", gap)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise ValueError(f"Worst case: the {name} must be a positive number, got {value!r}.")
-    if not (np.isfinite(rate) and rate >= 0.0):
-        raise ValueError(f"Worst case: the rate must be a number that is not negative, got {rate!r}.")
+    check_numbers("Worst case", {"the period": period, "the time since the sample": gap}, {"the rate": rate})
     decay = -float(np.linalg.eigvals(F).real.max())
     if not decay > 0.0:
         raise ValueError(f"Worst case: the error matrix is not stable, its slowest pole is at {-decay:+.4g} 1/s.")

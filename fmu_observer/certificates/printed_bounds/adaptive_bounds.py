@@ -105,7 +105,7 @@ def _window_sums(
     """Gramians of ``C lambda`` and of observability over the window, shapes (m, m) and (n, n), suprema of ``|Phi|``,
     ``|C A|_1`` and ``|C Phi|_1``, shape (3,), and eigenvalues of inv(S) at the end, shape (n,).
     """
-    u = np.array([float(s.start_values[0]) for s in model.inputs])
+    u = model.start_inputs
     n, m = model.order, len(model.unknowns)
     L, Z, Phi = np.zeros((n, m)), np.eye(n), np.eye(n)
     excited, observed = np.zeros((m, m)), np.zeros((n, n))
@@ -131,7 +131,7 @@ def settled_gain(model: StateAffineModel, mu: float) -> np.ndarray:
     Args:
         model: state-affine. mu: decay of S [1/s].
     """
-    u = np.array([float(s.start_values[0]) for s in model.inputs])
+    u = model.start_inputs
     n, A = model.order, np.asarray(model.drift(0.0, u))
     left = mu * np.eye(n * n) + np.kron(np.eye(n), A.T) + np.kron(A.T, np.eye(n))
     S = np.linalg.solve(left, (model.C.T @ model.C).ravel()).reshape(n, n)

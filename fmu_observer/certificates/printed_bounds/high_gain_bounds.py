@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
+
+from fmu_observer.certificates.lyapunov import lyapunov_matrix
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,9 @@ def high_gain_bounds(
     Returns:
         The bounds; where ``A - K C`` is not Hurwitz no theta is large enough (inf) and no gap short enough (0).
     """
-    closed = A - K @ C
-    if np.linalg.eigvals(closed).real.max() >= 0.0:
+    P = lyapunov_matrix(A - K @ C, 2.0 * mu)
+    if P is None:
         return HighGainBounds(mu, np.nan, np.nan, np.inf, 0.0)
-    P = scipy.linalg.solve_continuous_lyapunov(closed.T, -2.0 * mu * np.eye(len(A)))
     eigenvalues = np.linalg.eigvalsh(P)
     smallest, largest = float(eigenvalues[0]), float(eigenvalues[-1])
     slope = (lipschitz + theta) * float(np.linalg.norm(K, 2))

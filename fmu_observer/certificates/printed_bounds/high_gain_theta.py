@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import ceil, inf, log, sqrt
 
 import numpy as np
-import scipy
 
+from fmu_observer.certificates.lyapunov import lyapunov_matrix
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 
 _THETAS = np.geomspace(1.0, 1e4, 4001)
@@ -25,10 +25,8 @@ def lyapunov_size(K: np.ndarray) -> float:
     """``lmax(P)`` of ``(A - K C)' P + P (A - K C) = -I`` for the chain of integrators [s]; inf when A - K C is not
     Hurwitz.
     """
-    closed = chain_error(K)
-    if np.linalg.eigvals(closed).real.max() >= 0.0:
-        return inf
-    return float(np.linalg.eigvalsh(scipy.linalg.solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))[-1])
+    P = lyapunov_matrix(chain_error(K))
+    return inf if P is None else float(np.linalg.eigvalsh(P)[-1])
 
 
 def chain_error(K: np.ndarray) -> np.ndarray:

@@ -10,6 +10,8 @@ from math import inf, sqrt
 import numpy as np
 import scipy
 
+from fmu_observer.certificates.lyapunov import lyapunov_matrix
+
 
 @dataclass(frozen=True)
 class DynamicThetaBounds:
@@ -80,7 +82,7 @@ def dynamic_theta_bounds(
     Returns:
         The bounds; where ``A - K C`` is not Hurwitz theta has no limit (inf) and no gap is short enough (0).
     """
-    P = _lyapunov_matrix(A, K, C)
+    P = lyapunov_matrix(A - K @ C)
     if P is None or not np.isfinite(lipschitz):
         return DynamicThetaBounds(np.nan, np.nan, np.nan, inf, 0.0, 0.0)
     values = np.linalg.eigvalsh(P)
@@ -105,7 +107,7 @@ def decay_bounds(
     Returns:
         The bounds; where ``A - K C`` is not Hurwitz no theta is large enough (inf) and no gap short enough (0).
     """
-    P = _lyapunov_matrix(A, K, C)
+    P = lyapunov_matrix(A - K @ C)
     if P is None:
         return DecayBounds(inf, inf, 0.0, inf, 0.0, inf)
     values = np.linalg.eigvalsh(P)
@@ -115,11 +117,3 @@ def decay_bounds(
     speed = theta + lipschitz + theta * float(np.linalg.norm(K, 2)) + decay_rate
     longest = alpha * sqrt(smallest) / (2.0 * beta * speed) if beta * speed > 0.0 else inf
     return DecayBounds(printed, printed * largest / smallest, alpha, beta, longest, speed)
-
-
-def _lyapunov_matrix(A: np.ndarray, K: np.ndarray, C: np.ndarray) -> np.ndarray | None:
-    """P of ``(A - K C)' P + P (A - K C) = -I``; None where ``A - K C`` is not Hurwitz."""
-    closed = A - K @ C
-    if np.linalg.eigvals(closed).real.max() >= 0.0:
-        return None
-    return np.asarray(scipy.linalg.solve_continuous_lyapunov(closed.T, -np.eye(len(A))))

@@ -132,6 +132,16 @@ class Optimiser(ABC):
         """
         return self.random.uniform(self.lower, self.upper, (count, self.dimension))
 
+    @staticmethod
+    def ranked(candidates: Array, costs: Array) -> tuple[Array, Array]:
+        """Candidates and costs, the best first.
+
+        Args:
+            candidates: shape (m, d). costs: shape (m,).
+        """
+        order = np.argsort(costs, kind="stable")
+        return candidates[order], costs[order]
+
     @abstractmethod
     def propose(self) -> Array:
         """The next candidates, shape (m, d); what lies outside the bounds is clipped to them."""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.design.cone_solver import Matrix, Rows, smallest_eigenvalue
+from fmu_observer.models.checks import check_numbers
 
 DECAY, GAIN, _SCALE = "(4.41)", "(4.42)", "(4.44)"
 """Names of the inequalities: decay of the error, size of the gain, P at least the identity."""
@@ -50,9 +51,7 @@ class Proposition41Problem:
                 f"Proposition 4-1: A {np.shape(A)} must be square, or vertices of square matrices, and C "
                 f"{np.shape(C)} one row for them."
             )
-        for name, value in (("m", m), ("alpha", 1.0 if alpha is None else alpha)):
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"Proposition 4-1: {name} must be a positive number, got {value!r}.")
+        check_numbers("Proposition 4-1", {"m": m, "alpha": 1.0 if alpha is None else alpha})
         return cls(vertices, measured, float(m), None if alpha is None else float(alpha))
 
     @property

@@ -89,7 +89,7 @@ def window_memory(start: Array, covariance: Array, row_width: int, window: int) 
         memory("arrival_cost", "1", tuple(map(float, first)), "Before the window: point, mean, P", size=len(first)),
         memory("window", "1", 0.0, rows, size=window * row_width),
         memory("window_estimates", "1", values, "Estimates of the rows, oldest first, SI units", size=len(values)),
-        memory("last_pass", "1", 0.0, "What is reported of the passes and the window", size=len(WINDOW_OUTPUTS)),
+        memory("last_pass", "1", 0.0, "What is told of the passes and the window", size=len(WINDOW_OUTPUTS)),
     )
 
 

@@ -70,13 +70,9 @@ class Biogeography(Optimiser):
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""
-        order = np.argsort(costs, kind="stable")
-        candidates, costs = candidates[order], costs[order]
+        candidates, costs = self.ranked(candidates, costs)
         if self._habitats is not None:
             new = self.population - self._kept
             candidates = np.concatenate([self._habitats[: self._kept], candidates[:new]])
             costs = np.concatenate([self._costs[: self._kept], costs[:new]])
-            order = np.argsort(costs, kind="stable")
-        else:
-            order = np.arange(len(costs))
-        self._habitats, self._costs = candidates[order], costs[order]
+        self._habitats, self._costs = self.ranked(candidates, costs)

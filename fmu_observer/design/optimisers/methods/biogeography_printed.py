@@ -58,8 +58,7 @@ class BiogeographyPrinted(Optimiser):
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""
-        order = np.argsort(costs, kind="stable")
-        candidates, costs = candidates[order], costs[order]
+        candidates, costs = self.ranked(candidates, costs)
         if self._habitats is not None and self._costs[0] < costs[0]:
             candidates = np.concatenate([self._habitats[:1], candidates[:-1]])
             costs = np.concatenate([self._costs[:1], costs[:-1]])

@@ -68,5 +68,4 @@ class Genetic(Optimiser):
         if self._members is not None:
             candidates = np.concatenate([self._members[: self.elite], candidates])
             costs = np.concatenate([self._costs[: self.elite], costs])
-        order = np.argsort(costs, kind="stable")
-        self._members, self._costs = candidates[order], costs[order]
+        self._members, self._costs = self.ranked(candidates, costs)

@@ -192,7 +192,7 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         """
         K = settled_gain(self.model, mu)
         decay = self.model.C @ K if self.predicts else np.zeros((self.sizes.q, self.sizes.q))
-        u = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        u = self.model.start_inputs
         return ImpulsiveError.with_innovation(np.asarray(self.model.drift(0.0, u)), K, decay, self.model.C)
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:

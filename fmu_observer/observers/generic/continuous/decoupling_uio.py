@@ -10,7 +10,6 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.decoupling import SOURCE, decoupled_gain, decoupling, decoupling_condition, require_decoupling
 from fmu_observer.models.known_models import MODELS, find_model
-from fmu_observer.models.linear_models import start_of
 from fmu_observer.models.observer_model import ObserverModel, named_as
 from fmu_observer.models.suitability import linear_part, with_unknown_inputs
 from fmu_observer.observers.generic.continuous.decay_of_errors import NUMBERS, errors_decay
@@ -103,7 +102,7 @@ class DecouplingUio(ModelObserver):
         return self.estimates(x) - self._decoupling.M @ self.measured(u)
 
     def _estimates(self) -> tuple[Signal, ...]:
-        starts = self._decoupling.P @ start_of(self.model)
+        starts = self._decoupling.P @ self.model.start
         return tuple(
             state(f"filter_{s.name}", s.unit, float(start), f"Filter z of: {s.description}")
             for s, start in zip(self.model.states, starts, strict=True)

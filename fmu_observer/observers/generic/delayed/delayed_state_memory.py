@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fmu_observer.models.observer_model import ObserverModel
 from plant_models.hybrid import Signal, memory
 
@@ -16,7 +14,7 @@ def declared_memory(model: ObserverModel, predictors: int, places: int, input_pl
             each predictor. input_places: mean inputs of each input.
     """
     n, m = model.order, len(model.inputs)
-    start = np.array([float(s.start_values[0]) for s in model.states])
+    start = model.start
     newest = "the newest first"
     of_inputs = (
         memory("past_input", "1", 0.0, f"Mean inputs of the last periods, {newest}", shape=(m, input_places)),

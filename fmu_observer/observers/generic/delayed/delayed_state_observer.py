@@ -356,8 +356,7 @@ class DelayedStateObserver(HighGainSampled):
 
     def linearised_drift(self) -> np.ndarray:
         """Jacobian of the model at its start, shape (n, n)."""
-        start = np.array([float(s.start_values[0]) for s in self.model.states])
-        return np.asarray(self.model.jacobian(start, np.zeros(len(self.model.inputs))), dtype=float)
+        return np.asarray(self.model.jacobian(self.model.start, np.zeros(len(self.model.inputs))), dtype=float)
 
     def error_generator(self, drift: np.ndarray, p: Any) -> np.ndarray:
         """Generator of the errors of the estimate and of the kept outputs, shape (n + q, n + q).

@@ -329,7 +329,7 @@ class GaussianFilter(GatedObserver):
             p: all parameters.
         """
         start, period = self.model.start, float(p.sample_period)
-        inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        inputs = self.model.start_inputs
         known = Known(0.0, inputs, np.asarray(self.known(0.0, _Starts(self.model.inputs), p).p, dtype=float))
         r, s = self.model.noise_count, self.model.reading_noise_count
         if self.arrivals.timed:
@@ -391,7 +391,7 @@ class GaussianFilter(GatedObserver):
             return (density / model.sample_period if model.any_period else np.eye(r)), text
         if not model.any_period:
             return density * model.sample_period, text
-        inputs = np.array([float(s.start_values[0]) for s in model.inputs])
+        inputs = model.start_inputs
         parameters = np.array([value for s in model.parameters for value in s.start_values])
         known = Known(0.0, inputs, parameters)
         return np.asarray(noise_over(model, model.start, known, model.sample_period, density)), text
@@ -400,7 +400,7 @@ class GaussianFilter(GatedObserver):
         """The state that the told position is: the one whose column in its row of the Jacobian is largest."""
         names = [s.name for s in self.model.measurements]
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
-        inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        inputs = self.model.start_inputs
         H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
         return self._estimated[int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))]
 

@@ -231,7 +231,7 @@ class MemberFilter(HybridSystem):
         return np.stack([self.model.moved(before[i], none, known, p.sample_period) for i in range(count)], 1) + noise
 
     def _at_start(self) -> Known:
-        inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        inputs = self.model.start_inputs
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
         return Known(0.0, inputs, parameters)
 

@@ -70,7 +70,7 @@ class MultirateSylvester(GapCertified):
             _matrix("filter_gain", design.B, "Gain [B_c B_d] of the filter, row by row"),
             _matrix("transformation", design.T, "T = [T_R T_c T_d] of the Sylvester equation, row by row"),
         )
-        starts = np.array([float(s.start_values[0]) for s in self.model.states])
+        starts = self.model.start
         self.states = (
             state("filter", "1", tuple(map(float, design.T @ starts)), "Filter z, stands for T x", size=self.hidden),
             *(

@@ -52,8 +52,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
         n = chosen.order
-        start = np.array([float(s.start_values[0]) for s in chosen.states])
-        slope = np.asarray(chosen.jacobian(start, np.zeros(len(chosen.inputs))))
+        slope = np.asarray(chosen.jacobian(chosen.start, np.zeros(len(chosen.inputs))))
         names = tuple(s.name for s in chosen.states)
         require_observable(MeasuredSystem(slope, chosen.C, states=names, name=f"{self.name} of {chosen.name}"))
         self.gain_parameters = (
