@@ -20,6 +20,7 @@ from cosim.compiled.recorded_returns import Answer
 from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
+from fmus.fmi.described import EventPort
 from fmus.fmi.standard import NEVER
 
 FUNCTIONS = ("fmi3EnterEventMode", "fmi3SetClock", "fmi3SetFloat64", "fmi3UpdateDiscreteStates", "fmi3EnterStepMode")
@@ -76,8 +77,19 @@ class CompiledDelivery:
         self._before, self._after = (np.zeros(len(receiver.planned.outputs)) for _ in range(2))
         counted = list(OUTCOME_VARIABLES) if _counts(self.component) else []
         self._counts = [OUTCOME_VARIABLES[name] for name in counted]
-        keep, slave = program.keep, self.component.slave
-        self.telegram = CTelegram(
+        self.telegram = self._telegram(port, references, counted)
+        self._times = (ctypes.c_double * 3)()
+        self._call, self._slowly = library.stepper_deliver, receiver.step_in_python
+        self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
+
+    def _telegram(self, port: EventPort, references: Sequence[int | None], counted: Sequence[str]) -> CTelegram:
+        """The event as the stepper knows it.
+
+        Args:
+            references: value references of what comes with it. counted: variables that say what became of events.
+        """
+        program, keep, slave = self.program, self.program.keep, self.component.slave
+        telegram = CTelegram(
             *(ctypes.cast(slave._functions[name], ctypes.c_void_p).value for name in FUNCTIONS),
             program.function(self.component, "fmi3GetInt32") if self._counts else None,
             keep(np.array(references, dtype=np.uint32)),
@@ -91,10 +103,8 @@ class CompiledDelivery:
             len(counted),
         )
         for i, name in enumerate(self._counts):
-            self.telegram.count_ranks[i] = OUTCOMES.index(name) if name in OUTCOMES else -1
-        self._times = (ctypes.c_double * 3)()
-        self._call, self._slowly = library.stepper_deliver, receiver.step_in_python
-        self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
+            telegram.count_ranks[i] = OUTCOMES.index(name) if name in OUTCOMES else -1
+        return telegram
 
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
         """As `Receiver.step`.

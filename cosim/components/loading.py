@@ -24,7 +24,7 @@ from cosim.errors import FmuLoadError, ScenarioError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
 from fmu_observer.description import describe
-from fmus.fmi.archive import NotAnFmuError
+from fmus.fmi.archive import Archive, NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
 from fmus.fmi.library import load
@@ -58,21 +58,8 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
         raise FmuLoadError(f"{name}: {error}") from error
     guard_exit()
     here, before = Path.cwd(), Surroundings()
-    folder: Path | None = None
     try:
-        folder = unpack(archive)
-        refuse_foreign_libraries(_library(folder, description), path, name)
-        with LAST_CALL.making(name, "loading its library"):
-            slave = load(folder, description, CO_SIMULATION, name, complete=True)
-    except Exception as error:
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        if isinstance(error, FmuLoadError):
-            raise
-        lacks = (
-            "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
-        )
-        raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
+        folder, slave = _loaded(archive, path, name)
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
         changed = before.put_back()
@@ -89,6 +76,28 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
     component.trespasses |= dict.fromkeys(changed, "loading its library")
     component.choose_tolerance(tolerance)
     return component
+
+
+def _loaded(archive: Archive, path: Path, name: str) -> tuple[Path, Any]:
+    """The folder into which an FMU is unpacked, and fmpy's slave with its library loaded; no folder is left on failure.
+
+    Raises:
+        FmuLoadError: there is no such library, or it cannot be loaded.
+    """
+    folder: Path | None = None
+    try:
+        folder = unpack(archive)
+        refuse_foreign_libraries(_library(folder, archive.description), path, name)
+        with LAST_CALL.making(name, "loading its library"):
+            return folder, load(folder, archive.description, CO_SIMULATION, name, complete=True)
+    except Exception as error:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        if isinstance(error, FmuLoadError):
+            raise
+        missing = isinstance(error, AttributeError)
+        lacks = "its library lacks a function that FMI demands of every FMU: " if missing else ""
+        raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
 
 
 def describe_fmu(path: str | Path, name: str) -> Component:

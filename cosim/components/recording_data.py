@@ -141,45 +141,28 @@ def make_recording(
     time = np.array(result.time, dtype=float)
     _check_time(time, source, span)
     rows = _rows(time, span)
-    signals, columns, left_out = [], [], {}
-    for column, signal in chosen.items():
-        values = np.array(result.table[column][rows], dtype=float)
-        fault, known = "", signal
-        if signal.name in can_be_missing or signal.can_be_missing:
-            known, values = replace(signal, can_be_missing=True), np.where(np.isfinite(values), values, np.nan)
-        else:
-            values, fault = _without_gaps(values, time[rows], said.get(signal.name, "linear"))
-        if fault:
-            left_out[signal.name] = fault
-        else:
-            signals.append(known)
-            columns.append(values)
-    if not signals:
+    played, left_out = _playable(result, chosen, said, time, rows, can_be_missing)
+    if not played:
         raise ScenarioError(
             f"{source}: no column can be played back; " + "; ".join(f"{n}: {w}" for n, w in left_out.items())
         )
-    held = np.array([said.get(s.name) == "hold" or s.variability == "discrete" for s in signals])
-    values = np.column_stack(columns)
-    events = _events(time[rows], values, np.array([e.delivered_at for e in result.events]))
-    known = _algorithm(result).get("before_start", {})
-    at_start = len(result.time) and time[rows][0] == result.time[0]
-    before = {s.name: float(known[column]) for column, s in chosen.items() if at_start and column in known}
+    signals, values = tuple(signal for signal, _ in played), np.column_stack([column for _, column in played])
     asked = {column: said[s.name] for column, s in chosen.items() if s.name in said}
     kinds = {s.name: kind for s, kind in zip(chosen.values(), column_courses(result, chosen, asked), strict=True)}
     kept, lines = (frozenset(s.name for s in signals if kinds[s.name] == one) for one in ("held", "line"))
     return Recording(
         source,
         time[rows],
-        tuple(signals),
+        signals,
         values,
-        held,
-        events,
+        np.array([said.get(s.name) == "hold" or s.variability == "discrete" for s in signals]),
+        _events(time[rows], values, np.array([e.delivered_at for e in result.events])),
         left_out,
         kept,
         lines,
         frozenset(said),
         _is_run(result),
-        before,
+        _before_start(result, chosen, time[rows][0]),
         *(frozenset(map(str, _algorithm(result).get(key, ()))) for key in ("held", "fresh")),
     )
 
@@ -232,6 +215,37 @@ def said_of(interpolation: Chosen, names: Sequence[str], source: str) -> dict[st
         if name not in names:
             raise ScenarioError(f"{source}: interpolation: there is no column {name!r}; {nearest(name, names)}")
     return dict(interpolation)
+
+
+def _playable(
+    result: Result,
+    chosen: Mapping[str, SignalInfo],
+    said: Mapping[str, Interpolation],
+    time: np.ndarray,
+    rows: slice,
+    can_be_missing: Collection[str],
+) -> tuple[list[tuple[SignalInfo, np.ndarray]], dict[str, str]]:
+    """The columns that can be played back with their values in these rows, and by name why others cannot."""
+    played, left_out = list[tuple[SignalInfo, np.ndarray]](), dict[str, str]()
+    for column, signal in chosen.items():
+        values = np.array(result.table[column][rows], dtype=float)
+        if signal.name in can_be_missing or signal.can_be_missing:
+            known = replace(signal, can_be_missing=True)
+            played.append((known, np.where(np.isfinite(values), values, np.nan)))
+            continue
+        values, fault = _without_gaps(values, time[rows], said.get(signal.name, "linear"))
+        if fault:
+            left_out[signal.name] = fault
+        else:
+            played.append((signal, values))
+    return played, left_out
+
+
+def _before_start(result: Result, chosen: Mapping[str, SignalInfo], begin: float) -> dict[str, float]:
+    """What columns were before a run that is played back from its begin [s] was initialised, by name."""
+    known = _algorithm(result).get("before_start", {})
+    at_start = len(result.time) and begin == result.time[0]
+    return {s.name: float(known[column]) for column, s in chosen.items() if at_start and column in known}
 
 
 def _algorithm(result: Result) -> Mapping[str, Any]:

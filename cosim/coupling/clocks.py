@@ -36,8 +36,8 @@ def connect_clocks(
 ) -> tuple[list[ClockConnection], list[Link]]:
     """Take the connections between clocks out of all connections.
 
-    A connected input clock is no longer an event that somebody may tell (no balise event), and its clocked inputs may
-    be connected like any others; to be called before `cosim.coupling.connection.connect`.
+    A connected input clock is no longer an event that somebody may announce (no balise event), and its clocked inputs
+    may be connected like any others; to be called before `cosim.coupling.connection.connect`.
 
     Args:
         pairs: names of source and target. components: by name.
@@ -47,8 +47,7 @@ def connect_clocks(
 
     Raises:
         CouplingError: a clock joined to something else, a clock that ticks by itself, a component without Event Mode,
-        or two
-            sources for one clock.
+            or two sources for one clock.
     """
     clocks: list[ClockConnection] = []
     others: list[Link] = []
@@ -60,8 +59,8 @@ def connect_clocks(
             continue
         if made.target in taken:
             raise CouplingError(
-                f"Clock {pair[1]} has two sources, {taken[made.target]} and {pair[0]}; a clock takes one. Remove one "
-                f"connection."
+                f"Clock {pair[1]} has two sources, {taken[made.target]} and {pair[0]}; a clock takes one. "
+                "Remove one connection."
             )
         taken[made.target] = pair[0]
         clocks.append(made)

@@ -101,32 +101,39 @@ def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[
     """
     connections: list[Connection] = []
     taken: dict[tuple[str, str], str] = {}
-    for source_name, target_name, *given in pairs:
-        transformation = given[0] if given else Transformation()
-        source = split_name(source_name, components, "Connection source")
-        target = split_name(target_name, components, "Connection target")
-        exact = _exact(components, source, target, transformation)
-        _require_leaving_out(components, source, target)
-        factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
-        for output, name in _elements(components, source, target):
-            made = Connection(
-                (source[0], output.name),
-                (target[0], name.name),
-                *transformation.after(factor, offset),
-                transformation.table,
-                exact,
-                _array(output),
-                _array(name),
-            )
+    for pair in pairs:
+        for made in _of_elements(pair, components):
             if made.target in taken:
                 raise CouplingError(
-                    f"Input {'.'.join(made.target)} has two sources, {taken[made.target]} and {source_name}; an input "
-                    f"takes one. "
-                    "Remove one connection."
+                    f"Input {'.'.join(made.target)} has two sources, {taken[made.target]} and {pair[0]}; an input "
+                    "takes one. Remove one connection."
                 )
-            taken[made.target] = source_name
+            taken[made.target] = pair[0]
             connections.append(made)
     return connections
+
+
+def _of_elements(pair: Link, components: Mapping[str, Component]) -> list[Connection]:
+    """The connections of one link, one for each element."""
+    source_name, target_name, *more = pair
+    transformation = more[0] if more else Transformation()
+    source = split_name(source_name, components, "Connection source")
+    target = split_name(target_name, components, "Connection target")
+    exact = _exact(components, source, target, transformation)
+    _require_leaving_out(components, source, target)
+    factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
+    return [
+        Connection(
+            (source[0], output.name),
+            (target[0], name.name),
+            *transformation.after(factor, offset),
+            transformation.table,
+            exact,
+            _array(output),
+            _array(name),
+        )
+        for output, name in _elements(components, source, target)
+    ]
 
 
 def event_connection(pair: Link, components: Mapping[str, Component]) -> Connection:

@@ -90,27 +90,36 @@ def execution_groups(
     groups = strong_groups(names, edges | must)
     group_of = {name: i for i, group in enumerate(groups) for name in group}
     levels = [_split(level, group_of, len(groups)) for level in _levels(components, connections, must)]
-    loops: list[list[AlgebraicLoop]] = [[] for _ in groups]
-    maybe: list[list[AlgebraicLoop]] = [[] for _ in groups]
+    loops, maybe = _by_group(algebraic, group_of, len(groups)), _by_group(possible, group_of, len(groups))
     signals: list[list[OrderedSignal[str]]] = [[] for _ in groups]
-    for loop in algebraic:
-        loops[group_of[loop.components[0]]].append(loop)
-    for loop in possible:
-        maybe[group_of[loop.components[0]]].append(loop)
     for signal in _signals(components, connections):
         inside = frozenset(name for name in signal.targets if group_of[name] == group_of[signal.source])
         signals[group_of[signal.source]].append(replace(signal, targets=inside))
     found = []
     for i, group in enumerate(groups):
-        ties = [pair for loop in loops[i] for pair in _round(loop.components)]
         inner = Inside(group, [level[i] for level in levels], signals[i], rank)
-        blocks = inner.blocks(ties)
-        tied = {name for loop in loops[i] for name in loop.components}
-        ordered = tuple(name for block in blocks for name in block)
-        knots = tuple(block for block in blocks if not tied.isdisjoint(block))
         is_loop = len(group) > 1 or (group[0], group[0]) in edges
-        found.append(Group(ordered, is_loop, tuple(loops[i]), tuple(maybe[i]), knots))
+        found.append(_ordered_group(inner, is_loop, loops[i], maybe[i]))
     return found
+
+
+def _by_group(loops: Iterable[AlgebraicLoop], group_of: Mapping[str, int], count: int) -> list[list[AlgebraicLoop]]:
+    """The loops of each of `count` groups."""
+    found: list[list[AlgebraicLoop]] = [[] for _ in range(count)]
+    for loop in loops:
+        found[group_of[loop.components[0]]].append(loop)
+    return found
+
+
+def _ordered_group(
+    inner: Inside, is_loop: bool, loops: Sequence[AlgebraicLoop], maybe: Sequence[AlgebraicLoop]
+) -> Group:
+    """A group in Gauss-Seidel order, the components of each of its loops together."""
+    blocks = inner.blocks([pair for loop in loops for pair in _round(loop.components)])
+    tied = {name for loop in loops for name in loop.components}
+    ordered = tuple(name for block in blocks for name in block)
+    knots = tuple(block for block in blocks if not tied.isdisjoint(block))
+    return Group(ordered, is_loop, tuple(loops), tuple(maybe), knots)
 
 
 def execution_order(

@@ -39,15 +39,13 @@ def held_signals(
     """
     place = {name: i for i, name in enumerate(order)}
     loop_of = {name: i for i, loop in enumerate(iterated) for name in loop}
-    told = {link for recording in _played(components) for link in recording.held_links}
+    recorded = {link for recording in _played(components) for link in recording.held_links}
 
     def holds(c: Connection) -> bool:
         source, target = c.source[0], c.target[0]
         if source in components and c.source[1] in components[source].line_outputs:
             return False
-        if source not in place:
-            return True  # it is not stepped: its values change between steps only
-        if str(c) in told:
+        if source not in place or str(c) in recorded:  # what is not stepped changes between steps only
             return True
         together = source in loop_of and loop_of[source] == loop_of.get(target)
         if place[target] <= place[source] and not together:

@@ -155,32 +155,38 @@ def make_plan(
     connections = _in_order(connections, components, order)
     cells, places = non_numeric_cells(connections)
     hidden = local_sources(connections, components)
-    read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ()), hidden.get(n, ())) for n in order}
-    columns: dict[tuple[str, str], int] = {}
-    spans: dict[str, slice] = {}
-    signals: list[SignalInfo] = []
-    for name in order:
-        first = len(signals)
-        columns |= {(name, signal): first + i for i, signal in enumerate(read_names[name])}
-        signals += [_info(components[name], signal) for signal in read_names[name]]
-        spans[name] = slice(first, len(signals))
-    if still is not None:
-        outputs = still.names("output")
-        columns |= {(still.name, signal): len(signals) + i for i, signal in enumerate(outputs)}
-        signals += [_info(still, signal) for signal in outputs]
+    read = [(components[n], _names_to_read(components[n], (extra or {}).get(n, ()), hidden.get(n, ()))) for n in order]
+    signals, columns, spans = _layout([*read, *([(still, still.names("output"))] if still is not None else [])])
     twice = np.zeros(2 * len(signals))
     values, start = twice[: len(signals)], twice[len(signals) :]
     missing = np.array([s.can_be_missing for s in signals], dtype=bool)
     continuous = np.array([s.variability == "continuous" for s in signals], dtype=bool) & ~missing
     steps = []
-    for name in order:
-        component, span = components[name], spans[name]
-        read = with_non_numeric(component.reader(read_names[name], values[span]), component, places, cells)
+    for component, names in read:
+        span = spans[component.name]
+        reader = with_non_numeric(component.reader(names, values[span]), component, places, cells)
         non_numeric = non_numeric_inputs(component, connections, places, cells)
         inputs = connected_inputs(component, connections, columns, twice, non_numeric)
-        steps.append(PlannedComponent(component, values[span], read, inputs, span, continuous[span]))
+        steps.append(PlannedComponent(component, values[span], reader, inputs, span, continuous[span]))
     now, before = cells[: len(places)], cells[len(places) :]
     return Plan(steps, values, start, signals, continuous, missing, now, before, connections, clocks)
+
+
+def _layout(
+    read: Sequence[tuple[Component, Sequence[str]]],
+) -> tuple[list[SignalInfo], dict[tuple[str, str], int], dict[str, slice]]:
+    """All signals in a row, the column of each (component, signal), and the columns of each component.
+
+    Args:
+        read: the components with the names of what is read of each, in order.
+    """
+    signals, columns, spans = list[SignalInfo](), dict[tuple[str, str], int](), dict[str, slice]()
+    for component, names in read:
+        first = len(signals)
+        columns |= {(component.name, name): first + i for i, name in enumerate(names)}
+        signals += [_info(component, name) for name in names]
+        spans[component.name] = slice(first, len(signals))
+    return signals, columns, spans
 
 
 def _in_order(

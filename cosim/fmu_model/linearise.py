@@ -88,32 +88,19 @@ def linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: floa
     Raises:
         FmuModelError: the FMU refuses the point.
     """
-    n, remarks = len(model.states), list[str]()
-    method: Method = "central differences"
+    n, exchange = len(model.states), isinstance(model, ExchangeModel)
     if isinstance(model, ExchangeModel):
         model.restart(t, x, u)
-        remarks += _held_between_events(model)
-        function, length = _continuous(model, t), 0.0
+        remarks = _held_between_events(model)
+        function = _continuous(model, t)
     else:
-        remarks += _held_between_events(model)
-        function, length = _sampled(model, t, step), step
-        remarks += _doubts(model, step)
+        remarks = _held_between_events(model)
+        function = _sampled(model, t, step)
+        remarks += _objections(model, step)
     rates, y = function(x, u)
     if not (np.isfinite(rates).all() and np.isfinite(y).all()):
         raise FmuModelError(f"{model.path}: at this point it gives values that are no finite numbers. Choose another.")
-    if isinstance(model, ExchangeModel):
-        model.demand_moved(x)
-    whole = None
-    if isinstance(model, ExchangeModel) and model.directional:
-        whole, doubt = _directional(model, function, x, u)
-        remarks += [doubt] if doubt else []
-    if whole is None:
-        whole = _differences(model, function, x, u)
-        remarks.append(
-            f"Central differences with steps of {RELATIVE_STEP:g} of the value or the nominal size, the larger of both."
-        )
-    else:
-        method = "directional derivatives"
+    whole, method, more = _jacobian(model, function, x, u)
     names = (*model.states, *model.inputs, *model.outputs)
     return Linearisation(
         Path(model.path).stem,
@@ -127,9 +114,9 @@ def linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: floa
         u=u,
         y=y,
         rates=rates,
-        step=length,
+        step=0.0 if exchange else step,
         method=method,
-        remarks=tuple(remarks),
+        remarks=(*remarks, *more),
     )
 
 
@@ -181,7 +168,7 @@ def _held_between_events(model: SealedModel) -> list[str]:
     """What the matrices leave out of an FMU with samples of its own: values and clocks that only an event changes.
 
     Args:
-        model: the FMU; one of model exchange stands at a restart, where it has told its next event.
+        model: the FMU; one of model exchange stands at a restart, where it has announced its next event.
 
     Returns:
         One sentence or none.
@@ -219,16 +206,32 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
 
 
-def _doubts(model: SealedModel, step: float) -> list[str]:
+def _objections(model: SealedModel, step: float) -> list[str]:
     """What stands against the states of a co-simulation, and where they are set, if that is unusual."""
-    told = []
+    found = []
     if model.way == "step mode":
-        told.append("Its states have no start values; they are set in Step Mode, after a restart, which it takes.")
+        found.append("Its states have no start values; they are set in Step Mode, after a restart, which it takes.")
     try:
         check_states(model, step)
     except FmuModelError as error:
-        told.append(f"Do not rely on A and B before this is settled: {str(error).removeprefix(f'{model.path}: ')}")
-    return told
+        found.append(f"Do not rely on A and B before this is settled: {str(error).removeprefix(f'{model.path}: ')}")
+    return found
+
+
+def _jacobian(model: SealedModel, function: Function, x: Array, u: Array) -> tuple[Array, Method, list[str]]:
+    """Jacobian of rates and outputs by states and inputs, shape (n + q, n + m), by the best method, and remarks."""
+    remarks = list[str]()
+    if isinstance(model, ExchangeModel):
+        model.demand_moved(x)
+        if model.directional:
+            whole, objection = _directional(model, function, x, u)
+            if whole is not None:
+                return whole, "directional derivatives", []
+            remarks.append(objection)
+    remarks.append(
+        f"Central differences with steps of {RELATIVE_STEP:g} of the value or the nominal size, the larger of both."
+    )
+    return _differences(model, function, x, u), "central differences", remarks
 
 
 def _differences(model: SealedModel, function: Function, x: Array, u: Array) -> Array:
@@ -247,7 +250,7 @@ def _differences(model: SealedModel, function: Function, x: Array, u: Array) -> 
 
 
 def _directional(model: ExchangeModel, function: Function, x: Array, u: Array) -> tuple[Array | None, str]:
-    """The Jacobian that the FMU tells, shape (n + q, n + m), and what stands against it in words."""
+    """The Jacobian that the FMU gives, shape (n + q, n + m), and what stands against it in words."""
     knowns, unknowns = (*model.states, *model.inputs), (*model.derivative_names, *model.outputs)
     values, at, n = dict(zip(knowns, np.concatenate([x, u]).tolist(), strict=True)), np.concatenate([x, u]), len(x)
 
@@ -256,12 +259,12 @@ def _directional(model: ExchangeModel, function: Function, x: Array, u: Array) -
         z[knowns.index(name)] = value
         return np.concatenate(function(z[:n], z[n:]))
 
-    told: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
 
     def directional(name: str) -> Array:
         function(x, u)
-        told[name] = model.instance.directional_derivative(list(unknowns), [name], [1.0])
-        return told[name]
+        columns[name] = model.instance.directional_derivative(list(unknowns), [name], [1.0])
+        return columns[name]
 
     try:
         outcome = compare(evaluate, directional, values, unknowns, {name: model.nominal(name) for name in knowns})
@@ -272,7 +275,7 @@ def _directional(model: ExchangeModel, function: Function, x: Array, u: Array) -
             f"Its directional derivatives are not used: {outcome.detail}. They are wrong, or the model has a kink here "
             "(a train that stands or switches), where there is no slope: try a point beside it."
         )
-    return np.array([told[name] for name in knowns]).T, ""
+    return np.array([columns[name] for name in knowns]).T, ""
 
 
 def _simulated(model: SealedModel, t: float, u: Array, step: float) -> Array:

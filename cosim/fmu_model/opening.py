@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from fmpy.model_description import ModelDescription
+
 from cosim.components.description import open_fmu
 from cosim.components.unpacking import unpack
 from cosim.errors import FmuLoadError, nearest
@@ -52,15 +54,7 @@ def open_model(
     """
     path = Path(path)
     archive = open_fmu(path, path.name)
-    chosen = INTERFACES[interface] if interface is not None else None
-    offered = [kind for kind in INTERFACES.values() if getattr(archive.description, kind) is not None]
-    if fmi_version(archive.description) == 1:
-        raise FmuModelError(f"{path}: FMI 1.0 has no way to reset or to set states. Export it as FMI 2.0 or 3.0.")
-    if chosen is None:
-        chosen = offered[0] if offered else CO_SIMULATION
-    if chosen not in offered:
-        instead = ", ".join(offered) or "scheduled execution only, in which no time passes by itself"
-        raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {instead}.")
+    chosen = _interface_of(archive.description, path, interface)
     try:
         archive.demand_this_platform(chosen)
     except NotAnFmuError as error:
@@ -77,6 +71,22 @@ def open_model(
     finally:
         os.chdir(here)  # fmpy changes it while it loads
     return model
+
+
+def _interface_of(description: ModelDescription, path: Path, interface: Interface | None) -> str:
+    """The interface asked for, or the first one that an FMU offers, in the words of its description.
+
+    Raises:
+        FmuModelError: it has no such interface, or is of FMI 1.0.
+    """
+    if fmi_version(description) == 1:
+        raise FmuModelError(f"{path}: FMI 1.0 has no way to reset or to set states. Export it as FMI 2.0 or 3.0.")
+    offered = [kind for kind in INTERFACES.values() if getattr(description, kind) is not None]
+    chosen = INTERFACES[interface] if interface is not None else next(iter(offered), CO_SIMULATION)
+    if chosen not in offered:
+        instead = ", ".join(offered) or "scheduled execution only, in which no time passes by itself"
+        raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {instead}.")
+    return chosen
 
 
 def start_value(path: str | Path, name: str) -> float:

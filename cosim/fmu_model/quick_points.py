@@ -110,7 +110,7 @@ class QuickPoints:
             of it. It raises what the instance makes of a failure.
         """
         kept: dict[int, Prepared] = {}
-        instance, (event, terminate, early), told = self._instance, self._flags, shown(names)
+        instance, text = self._instance, shown(names)
 
         def run(t: float, h: float, written: Array, slowly: Slowly) -> Array:
             count = len(written)
@@ -118,33 +118,35 @@ class QuickPoints:
                 kept[count] = self._prepared(count, names, step)
             prepared = kept[count]
             prepared.written[:] = written
-            apart: list[int] = []
             self._begin(t, h)
             try:
-                for i, calls in enumerate(prepared.calls):
-                    for raw, typed, name in calls:
-                        status = raw(*typed)
-                        if status > WARNING:
-                            if status != DISCARD or not name.endswith("DoStep"):
-                                raise FMICallException(name, status)
-                            apart.append(i)
-                            break
-                    else:
-                        if step and (event.value or terminate.value or early.value):
-                            apart.append(i)
-                            event.value = terminate.value = early.value = False
+                apart = [i for i, calls in enumerate(prepared.calls) if not self._is_plain(calls, step)]
                 found = prepared.read.copy()
                 for i in apart:
                     found[i] = slowly(t, h, written[i])
             except instance.mistakes:
                 raise
             except Exception as error:
-                raise self._explained(error, told, t) from error
+                raise self._explained(error, text, t) from error
             instance.note_initialised()
             instance.time = t + h
             return found
 
         return run
+
+    def _is_plain(self, calls: Sequence[Call], step: bool) -> bool:
+        """Make the calls of a point; whether its step, if there is one, was done to its end and met no event."""
+        for raw, typed, name in calls:
+            status = raw(*typed)
+            if status > WARNING:
+                if status != DISCARD or not name.endswith("DoStep"):
+                    raise FMICallException(name, status)
+                return False
+        event, terminate, early = self._flags
+        if step and (event.value or terminate.value or early.value):
+            event.value = terminate.value = early.value = False
+            return False
+        return True
 
     def _prepared(self, count: int, names: Sequence[str], step: bool) -> Prepared:
         """Calls of `count` points."""
@@ -153,8 +155,8 @@ class QuickPoints:
         each = []
         for into, out in zip(written, read, strict=True):
             write = [instance.writer(self._written, into)[0]] if self._written else []
-            look = [instance.reader(names, out)] if names else []
-            each.append(JoinedCalls(instance.slave, [self._reset, *write, *around, *look]).steps)
+            read_out = [instance.reader(names, out)] if names else []
+            each.append(JoinedCalls(instance.slave, [self._reset, *write, *around, *read_out]).steps)
         return Prepared(written, read, each)
 
     def _begin(self, t: float, h: float) -> None:

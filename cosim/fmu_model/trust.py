@@ -74,19 +74,21 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
     at, (x, _), u = t + STEPS * h, rows[STEPS], _moving(model, STEPS)
     _demand_read_back(model, at, x, u)
     model.restart(at, x, u)
-    worst, exact = 0.0, True
-    for k in range(STEPS, 2 * STEPS):
-        model.set_inputs(_moving(model, k))
-        model.advance(t + k * h, h)
-        deviation, same = _deviation(model, rows, k + 1, model.read(), t + (k + 1) * h)
-        worst, exact = max(worst, deviation), exact and same
+    seen = [_continued(model, rows, k, t, h) for k in range(STEPS, 2 * STEPS)]
     idle = _idle(model, at, x, u, h)
     if len(idle) == len(model.states):
         raise FmuModelError(
             f"{model.path}: no state changes what follows ({', '.join(idle)}): the FMU does not start from the values "
             "given. No filter can move it; a particle filter over saved states only selects."
         )
-    return StateTrust(model.way, exact, worst, idle)
+    return StateTrust(model.way, all(same for _, same in seen), max(0.0, *(deviation for deviation, _ in seen)), idle)
+
+
+def _continued(model: SealedModel, rows: list[tuple[Array, Array]], k: int, t: float, h: float) -> tuple[float, bool]:
+    """Step number `k` of the run that was started again: its deviation from `rows`, and whether it is the same."""
+    model.set_inputs(_moving(model, k))
+    model.advance(t + k * h, h)
+    return _deviation(model, rows, k + 1, model.read(), t + (k + 1) * h)
 
 
 def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:

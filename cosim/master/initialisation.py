@@ -53,6 +53,18 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     changing = settling.run()
     if changing:
         raise _unsettled(plan, changing, settling.residuals, start_time)
+    _leave_initialization(plan)
+    rounds = settling.rounds
+    if settling.exchange_changes_feedback():
+        settling.run()
+    plan.begin_step()
+    for interpolator in plan.interpolators:
+        interpolator.prepare(start_time)  # where its lines begin
+    return rounds
+
+
+def _leave_initialization(plan: Plan) -> None:
+    """All components into step mode, each with what the ones before it gave, and what jumped on the way noted."""
     plan.begin_step()
     for step in plan.steps:
         step.inputs.gather()
@@ -62,13 +74,6 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     plan.note_jumps()
     for relay in plan.relays:
         relay()
-    rounds = settling.rounds
-    if settling.exchange_changes_feedback():
-        settling.run()
-    plan.begin_step()
-    for interpolator in plan.interpolators:
-        interpolator.prepare(start_time)  # where its lines begin
-    return rounds
 
 
 class _Settling:

@@ -124,20 +124,32 @@ def _description(
     components: Mapping[str, Component],
     readers: Sequence[PacketReader],
 ) -> ModelDescription:
+    variables = _outputs(settings, sources, components, readers)
+    abilities = CoSimulation(modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True)
+    return ModelDescription(
+        fmiVersion="3.0",
+        modelName=KIND,
+        instantiationToken=KIND,
+        description="A network",
+        generationTool=KIND,
+        coSimulation=abilities,
+        modelVariables=variables,
+        outputs=[Unknown(variable=variable, dependencies=[]) for variable in variables],
+    )
+
+
+def _outputs(
+    settings: NetworkSettings,
+    sources: Sequence[tuple[str, str]],
+    components: Mapping[str, Component],
+    readers: Sequence[PacketReader],
+) -> list[ModelVariable]:
     variables: list[ModelVariable] = []
 
     def add(name: str, description: str, **more: Any) -> None:
-        variables.append(
-            AnnotatedVariable(
-                name=name,
-                valueReference=len(variables) + 1,
-                type="Float64",
-                causality="output",
-                variability="discrete",
-                description=description,
-                **more,
-            )
-        )
+        kind: dict[str, Any] = {"type": "Float64", "causality": "output", "variability": "discrete"}
+        number = len(variables) + 1
+        variables.append(AnnotatedVariable(name=name, valueReference=number, description=description, **kind, **more))
 
     for kind in ("received", "error"):
         for name, (component, signal) in zip(settings.signals, sources, strict=True):
@@ -154,17 +166,7 @@ def _description(
         component, signal = sources[reader.signal]
         text = f"What arrived of {component}.{signal} for {reader.target}, NaN where it is lost or was read"
         add(arrived_name(reader.target), text, marks=[CAN_BE_MISSING], **_units(components[component], signal))
-    abilities = CoSimulation(modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True)
-    return ModelDescription(
-        fmiVersion="3.0",
-        modelName=KIND,
-        instantiationToken=KIND,
-        description="A network",
-        generationTool=KIND,
-        coSimulation=abilities,
-        modelVariables=variables,
-        outputs=[Unknown(variable=variable, dependencies=[]) for variable in variables],
-    )
+    return variables
 
 
 def _units(component: Component, signal: str) -> dict[str, Any]:

@@ -111,14 +111,10 @@ class NetworkService:
         readers: Sequence[PacketReader] = (),
     ) -> None:
         self.settings, self.sources, self.listeners = settings, sources, list(listeners)
-        self.chance = Chance(settings, start)
+        self.chance, self._readers = Chance(settings, start), list(readers)
         count, nodes = len(sources), len(settings.nodes)
-        self._held = slice(first, first + count)
-        self._errors = slice(first + count, first + 2 * count)
-        self._sender, self._stamps = first + 2 * count, slice(first + 2 * count + 1, first + 2 * count + 1 + nodes)
-        self._readers, behind = list(readers), first + 2 * count + 1 + nodes
+        self._place_outputs(first, count, nodes)
         self._sampled = np.array([reader.signal for reader in readers], dtype=np.intp)
-        self._arriving = slice(behind, behind + len(self._readers))
         self._reads = [reader.next_sample(start, start) for reader in readers]  # a packet at the start, as it were
         node_of = np.array(settings.node_of)
         self._own = [np.flatnonzero(node_of == i) for i in range(nodes)]
@@ -137,6 +133,14 @@ class NetworkService:
         self._newest = [-1] * nodes
         self._arrived: list[set[int]] = [set() for _ in range(nodes)]
         self._receivers: list[Receiver] = []
+
+    def _place_outputs(self, first: int, count: int, nodes: int) -> None:
+        """Columns of the outputs, from `first` on: of signals, their errors, the sender, the nodes' stamps, readers."""
+        self._held = slice(first, first + count)
+        self._errors = slice(first + count, first + 2 * count)
+        self._sender, self._stamps = first + 2 * count, slice(first + 2 * count + 1, first + 2 * count + 1 + nodes)
+        behind = first + 2 * count + 1 + nodes
+        self._arriving = slice(behind, behind + len(self._readers))
 
     def attach(self, plan: Plan, known: Sequence[Receiver] = ()) -> None:
         """Take a place in the plan: values are measured in it, and receivers that are behind are told in their steps.

@@ -17,7 +17,7 @@ import fmu_observer
 import fmus
 from cosim.fmu_model import exchange_events
 from cosim.fmu_model.co_simulation import CoSimulationModel
-from cosim.fmu_model.linearise import _doubts, linearise_model
+from cosim.fmu_model.linearise import _objections, linearise_model
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states
@@ -174,8 +174,8 @@ def test_steps_of_its_own_that_do_not_fit_are_told() -> None:
         said = rf"at each of {count} steps of {step:g} s.*steps of its own.*steps of 0.1 s"
         with pytest.raises(FmuModelError, match=said):
             check_states(model, step)
-    assert _doubts(model, 0.1) == []
-    assert _doubts(model, 0.01)[0].startswith("Do not rely on A and B before this is settled: started again at each")
+    assert _objections(model, 0.1) == []
+    assert _objections(model, 0.01)[0].startswith("Do not rely on A and B before this is settled: started again at each")
 
 
 def test_events_of_model_exchange_are_handled() -> None:
