@@ -124,7 +124,7 @@ class _Trial:
         """The step, divided where the plant itself turns."""
         hermite = self._hermite
         if not hermite.turns():
-            return hermite.segments()
+            return [Segment(0.0, hermite.h, hermite.p0, hermite.p1)]
         low, high = 0.0, hermite.h
         while high - low > TURN_TOLERANCE:
             middle = 0.5 * (low + high)

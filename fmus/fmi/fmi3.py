@@ -212,7 +212,7 @@ class FMI3Slave(FMI3Instance, Slave):
         if defined and math.isnan(next_time):
             raise self.failure("updateDiscreteStates says that the next event is at t = nan")
         self.next_event = float(next_time) if defined else NEVER
-        if self.clocks:
+        if self.clocks.clocks:
             self.guard("intervals of clocks", self.clocks.ask, self.time)
             self.next_event = min(self.next_event, self.clocks.next)
         self.event_pending = False
