@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cosim.balises.letter import Letter
+from cosim.balises.event_message import EventMessage
 from cosim.balises.telegram import payload
 from cosim.coupling.planned import PlannedComponent
 from cosim.results.result import BaliseRecord
@@ -20,8 +20,8 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.standard import TIME_TOLERANCE
 
 Timing = Literal["exact", "stale"]
-Told = BaliseRecord | Letter
-"""What receivers are told: telegrams of balises, and letters of others with an event of their own."""
+Deliverable = BaliseRecord | EventMessage
+"""What receivers are notified of: telegrams of balises, and messages of others with an event of their own."""
 
 OUTCOMES = (
     "ignored",
@@ -84,7 +84,7 @@ class Receiver:
 
     Args:
         planned: the component in the plan.
-        event: name of its event for balises; a `Letter` names its own.
+        event: name of its event for balises; an `EventMessage` names its own.
         timing: ``exact`` uses a telegram at its own instant; ``stale`` hands it over unshifted at the next
             communication point, as a master without events would (for comparison only).
         compiled: the compiled stepper's way over a step with telegrams, where there is one.
@@ -94,7 +94,7 @@ class Receiver:
     event: str = "balise"
     timing: Timing = "exact"
     seen: dict[str, int] = field(default_factory=dict)
-    backlog: list[Told] = field(default_factory=list)
+    backlog: list[Deliverable] = field(default_factory=list)
     arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
     compiled: StepThrough | None = None
     _open: list[Delivery] = field(default_factory=list)
@@ -120,7 +120,7 @@ class Receiver:
         self.seen, self.backlog = dict(seen), list(backlog)
         self._open, self._kept = list(unsettled), dict(kept)
 
-    def step(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
+    def step(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
         """Step from `t` to `until` [s] with the prepared inputs through `telegrams`, in order of delivery.
 
         Args:
@@ -133,7 +133,7 @@ class Receiver:
         """
         return (self.compiled or self.step_in_python)(t, until, telegrams)
 
-    def step_in_python(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
+    def step_in_python(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
         """As `step`, without the compiled stepper's way through a single telegram.
 
         Args:
@@ -149,7 +149,7 @@ class Receiver:
             return self._notify_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
         return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
 
-    def hold_back(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
+    def hold_back(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
         """Keep telegrams of a part of a step, from `t` to `until` [s], that the component does not take: its next step
         has them.
 
@@ -159,20 +159,20 @@ class Receiver:
         self.arrived = self.planned.outputs.copy()
         return [self._put_off(telegram, snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
 
-    def tell(self, t: float, letter: Letter) -> Delivery:
-        """Tell of a letter at `t` [s], where all components have come to; one that has not, or that knows one letter
-        for each step, is told of it in its next step.
+    def notify(self, t: float, message: EventMessage) -> Delivery:
+        """Notify of a message at `t` [s], where all components have come to; one that has not, or that knows one
+        message for each step, is notified in its next step.
 
         Args:
-            t: the instant [s]. letter: delivered there.
+            t: the instant [s]. message: delivered there.
         """
         component = self.planned.component
         if abs(component.time - t) > TIME_TOLERANCE or self._announced:
-            return self._put_off(letter, t)
+            return self._put_off(message, t)
         if not component.event_needs_step:
             self._open.clear()
         self._announced = component.event_needs_step
-        return self._notify_here(t, letter, letter.stamp)
+        return self._notify_here(t, message, message.stamp)
 
     def stepped_elsewhere(self, delivery: Delivery, arrived: np.ndarray) -> None:
         """Somebody else has stepped it through one telegram, all as `step` would have done.
@@ -185,7 +185,7 @@ class Receiver:
 
     # -- a receiver that can be stopped anywhere --------------------------------------------------------------------
 
-    def _step_through(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
+    def _step_through(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
         now = t
         deliveries: list[Delivery] = []
         arrived = None
@@ -201,7 +201,7 @@ class Receiver:
         self.arrived = self.planned.outputs.copy() if arrived is None else arrived
         return deliveries
 
-    def _deliver(self, now: float, notified_at: float, telegram: Told) -> Delivery:
+    def _deliver(self, now: float, notified_at: float, telegram: Deliverable) -> Delivery:
         component = self.planned.component
         if not component.event_needs_step:
             if notified_at > now:
@@ -217,14 +217,14 @@ class Receiver:
         self._announced = True
         return self._notify_here(notified_at, telegram, telegram.stamp)
 
-    def _notify_here(self, t: float, telegram: Told, stamp: float) -> Delivery:
+    def _notify_here(self, t: float, telegram: Deliverable, stamp: float) -> Delivery:
         before = self._outputs()
         delivery = Delivery(t, before, before)
         self._notify(t, telegram, stamp, delivery)
         delivery.after = self._outputs()
         return delivery
 
-    def _announce(self, now: float, notified_at: float, telegram: Told) -> Delivery:
+    def _announce(self, now: float, notified_at: float, telegram: Deliverable) -> Delivery:
         """FMI 2: the event happens at the end of the step from `now` to `notified_at` [s]."""
         delivery = Delivery(notified_at, self._look_ahead(now, notified_at))
         self._notify(now, telegram, min(telegram.stamp, notified_at), delivery)
@@ -248,7 +248,7 @@ class Receiver:
 
     # -- a receiver that takes whole steps only ---------------------------------------------------------------------
 
-    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
+    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
         """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told
         late.
         """
@@ -264,7 +264,7 @@ class Receiver:
         self.arrived = self._outputs()
         return deliveries
 
-    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
+    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
         """Whatever was passed in the step is told at its end, as if it had happened there."""
         self._advance(t, until)
         self.arrived = self._outputs()
@@ -278,8 +278,8 @@ class Receiver:
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _port(self, telegram: Told) -> EventPort:
-        event = telegram.event if isinstance(telegram, Letter) else self.event
+    def _port(self, telegram: Deliverable) -> EventPort:
+        event = telegram.event if isinstance(telegram, EventMessage) else self.event
         return self.planned.component.events[event]
 
     def _advance(self, now: float, until: float) -> None:
@@ -291,12 +291,12 @@ class Receiver:
         self.planned.read()
         return self.planned.outputs.copy()
 
-    def _put_off(self, telegram: Told, time: float) -> Delivery:
+    def _put_off(self, telegram: Deliverable, time: float) -> Delivery:
         """The next step has it; what becomes of it there settles this delivery of `time` [s]."""
         self.backlog.append(telegram)
         return self._kept.setdefault(id(telegram), Delivery(time))
 
-    def _notify(self, t: float, telegram: Told, stamp: float, delivery: Delivery) -> None:
+    def _notify(self, t: float, telegram: Deliverable, stamp: float, delivery: Delivery) -> None:
         self.planned.component.notify(self._port(telegram), t, stamp, payload(telegram))
         self._open.append(delivery)
         if id(telegram) in self._kept:

@@ -1,4 +1,4 @@
-"""Letters: what a receiver is told at an event, whoever sends it: a balise or a node of a network."""
+"""Messages: what a receiver is notified of at an event, whoever sends it: a balise or a node of a network."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Sent(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Letter:
+class EventMessage:
     """A message to one receiver.
 
     Args:

@@ -53,7 +53,7 @@ class BaliseService:
         self.odometer, self.position = odometer, position
         self.mailbox: Mailbox[BaliseRecord] = Mailbox()
         self.passed = 0
-        self._told: dict[tuple[str, float], None] = {}  # in the order of delivery
+        self._delivered: dict[tuple[str, float], None] = {}  # in the order of delivery
         self._by_name = {r.planned.component.name: r for r in receivers}
         self._false = sorted(channel.false_telegrams, key=lambda f: f.time)
         self._t = self._until = nan
@@ -139,7 +139,7 @@ class BaliseService:
         return self._event_rows(self._t, self._until, self._telegrams) if self._telegrams else NO_ROWS
 
     @property
-    def touched(self) -> Collection[str]:
+    def notified(self) -> Collection[str]:
         """Names of the receivers on which a telegram may have acted in the last step."""
         return self._deliveries.keys()
 
@@ -180,14 +180,14 @@ class BaliseService:
         """What a step changes here."""
         mailbox = list(self.mailbox.waiting), len(self.mailbox.log)
         receivers = [r.save() for r in self.receivers]
-        passed = self.passed, len(self._told)
+        passed = self.passed, len(self._delivered)
         return mailbox, passed, list(self._false), self.localiser.save(), receivers, list(self._ahead)
 
     def restore(self, state: Any) -> None:
         """Return to a saved state."""
-        (waiting, logged), (self.passed, told), false, localiser, receivers, ahead = state
-        while len(self._told) > told:
-            self._told.popitem()
+        (waiting, logged), (self.passed, delivered), false, localiser, receivers, ahead = state
+        while len(self._delivered) > delivered:
+            self._delivered.popitem()
         self._ahead = list(ahead)
         self.mailbox.waiting = list(waiting)
         del self.mailbox.log[logged:]
@@ -235,8 +235,8 @@ class BaliseService:
     def _is_repeated(self, telegram: BaliseRecord) -> bool:
         """Whether it was told before, which is only logged. One of no balise has no identity."""
         key = telegram.identity, telegram.stamp
-        if telegram.kind == "false" or key not in self._told:
-            self._told[key] = None
+        if telegram.kind == "false" or key not in self._delivered:
+            self._delivered[key] = None
             return False
         self.mailbox.delivered(telegram, dict.fromkeys(self._by_name, REPEATED))
         return True

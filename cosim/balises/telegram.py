@@ -14,7 +14,7 @@ from operator import attrgetter
 from types import MappingProxyType
 from typing import Generic, TypeVar
 
-from cosim.balises.letter import Letter, Sent
+from cosim.balises.event_message import EventMessage, Sent
 from cosim.errors import ScenarioError
 from cosim.results.result import BaliseRecord
 from plant_models.hybrid.noise import Purpose, standard_normal, uniform_pair
@@ -146,10 +146,10 @@ PAYLOAD = ("position", "location_accuracy", "odometer_reading", "delivered_at")
 _of_telegram = attrgetter(*PAYLOAD)
 
 
-def payload(telegram: BaliseRecord | Letter) -> Mapping[str, float]:
-    """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``; of a letter its
+def payload(telegram: BaliseRecord | EventMessage) -> Mapping[str, float]:
+    """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``; of a message its
     own.
     """
-    if isinstance(telegram, Letter):
+    if isinstance(telegram, EventMessage):
         return telegram.payload
     return dict(zip(PAYLOAD, _of_telegram(telegram), strict=True))

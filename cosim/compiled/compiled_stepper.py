@@ -20,7 +20,7 @@ from cosim.compiled.crossings import Crossings
 from cosim.compiled.library import load_stepper
 from cosim.compiled.notifying import CompiledDelivery, can_be_notified
 from cosim.compiled.program import NotCompilable, Program, Stop
-from cosim.compiled.recorded_returns import Answer, answered
+from cosim.compiled.recorded_returns import RecordedReturn, repeated
 from cosim.components.component import Component
 from cosim.coupling.chain import COMPILED_STAGE_TEXT, Mover, Position, Stage
 from cosim.coupling.plan import Plan
@@ -75,7 +75,7 @@ class CompiledStepper:
         self._program = Program(self.plan, axis)
         self._program.head.seconds_at_most = SECONDS
         self._library = _load()
-        self._answering = False
+        self._repeating = False
         for place, step in enumerate(self.plan.steps):
             self._quicken(place, step)
         self._crossings = self._watch_balises()
@@ -180,9 +180,9 @@ class CompiledStepper:
     def _whole_step(self, k: int) -> Sequence[Row]:
         return self.control.step(self.axis[k], self.axis[k + 1])
 
-    def _step_again(self, k: int, said: Mapping[int, Mapping[str, Sequence[Answer]]]) -> Sequence[Row]:
+    def _step_again(self, k: int, said: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Sequence[Row]:
         """The whole of step `k`, of which the stepper has done a part: the slaves repeat what they said."""
-        with self._answered(said):
+        with self._repeated(said):
             return self._whole_step(k)
 
     def _rest_of_step(self, k: int) -> Sequence[Row]:
@@ -192,7 +192,7 @@ class CompiledStepper:
             balises.begin(t, until)
         for place, step in enumerate(self.plan.steps[first:]):
             if place == 0:
-                self._answered_move(step.move, t, until)
+                self._repeated_move(step.move, t, until)
             else:
                 step.step(t, until)
         rows = NO_ROWS if balises is None else balises.rows()
@@ -213,7 +213,7 @@ class CompiledStepper:
         call, address = self._library.stepper_move, self._program.address
 
         def move(slowly: Mover, t: float, until: float, reads: bool) -> None:
-            if self._answering or component.next_event <= until + 2.0 * TIME_TOLERANCE:
+            if self._repeating or component.next_event <= until + 2.0 * TIME_TOLERANCE:
                 slowly(t, until)
                 return
             begin = perf_counter()
@@ -224,7 +224,7 @@ class CompiledStepper:
                     component.call_statistics[kind].add(0.0, 1)
                 component.seconds += perf_counter() - begin
             else:
-                self._answered_move(slowly, t, until)
+                self._repeated_move(slowly, t, until)
 
         def quickly(reads: bool, slowly: Mover) -> Mover:
             return lambda t, until: move(slowly, t, until, reads)
@@ -246,32 +246,32 @@ class CompiledStepper:
         for receiver in service.receivers:
             place = names.index(receiver.planned.component.name)
             if can_be_notified(receiver, place, self._program):
-                idle = lambda: not self._answering  # noqa: E731 - one word of state
+                idle = lambda: not self._repeating  # noqa: E731 - one word of state
                 deliveries[place] = CompiledDelivery(
-                    receiver, place, self._program, self._library, self._answered, idle
+                    receiver, place, self._program, self._library, self._repeated, idle
                 )
                 receiver.compiled = deliveries[place].step
         return Crossings(self._program, self.plan, service, deliveries)
 
-    def _answered_move(self, move: Mover, t: float, until: float) -> None:
+    def _repeated_move(self, move: Mover, t: float, until: float) -> None:
         """Move a component in Python that the stepper has moved in part."""
         head = self._program.head
-        with self._answered({int(head.slave): self._program.said(head.slave, Stop(head.stop))}):
+        with self._repeated({int(head.slave): self._program.said(head.slave, Stop(head.stop))}):
             move(t, until)
 
     @contextmanager
-    def _answered(self, answers: Mapping[int, Mapping[str, Sequence[Answer]]]) -> Iterator[None]:
+    def _repeated(self, answers: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Iterator[None]:
         """Python is at work on a step that the stepper has begun: slaves repeat themselves, and nobody calls the
         stepper.
         """
-        self._answering = True
+        self._repeating = True
         try:
             with ExitStack() as stack:
                 for place, said in answers.items():
-                    stack.enter_context(answered(self.plan.steps[place].component.slave, said))
+                    stack.enter_context(repeated(self.plan.steps[place].component.slave, said))
                 yield
         finally:
-            self._answering = False
+            self._repeating = False
 
     def _set_times(self, k: int) -> None:
         """Where the components stand after a chunk that ended in step number `k`; one call there is Python's to

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from cosim.compiled.recorded_returns import Answer
+from cosim.compiled.recorded_returns import RecordedReturn
 
 STEPS_AT_MOST = 68
 """Of the plant in a step over a balise: the whole step, `MAX_ROOT_STEPS` of the root search, to the stamp, again to the
@@ -100,7 +100,7 @@ class StepperJournal:
         self._bytes = np.zeros(STEPS_AT_MOST * (values + 64), dtype=np.uint8)
         head.notes, head.bytes = ctypes.cast(self._notes, ctypes.POINTER(CNote)), self._bytes.ctypes.data
 
-    def read(self, versions: Sequence[int]) -> Iterator[tuple[int, StepperCall, int, Answer]]:
+    def read(self, versions: Sequence[int]) -> Iterator[tuple[int, StepperCall, int, RecordedReturn]]:
         """Place of the slave, function, port, answer; in the order of the calls.
 
         Args:
@@ -109,15 +109,15 @@ class StepperJournal:
         for note in self._notes[: self._head.count]:
             yield note.slave, StepperCall(note.call), note.port, self._answer(note, versions[note.slave])
 
-    def _answer(self, note: CNote, version: int) -> Answer:
+    def _answer(self, note: CNote, version: int) -> RecordedReturn:
         call = StepperCall(note.call)
         if call is StepperCall.STEP and version == FMI3:
             event, terminate, early = (bool(flag) for flag in note.flags[:3])
-            return Answer(note.status, (event, terminate, early, note.number))
+            return RecordedReturn(note.status, (event, terminate, early, note.number))
         if call is StepperCall.UPDATE:
-            return Answer(note.status, (*(bool(flag) for flag in note.flags), note.number))
+            return RecordedReturn(note.status, (*(bool(flag) for flag in note.flags), note.number))
         if call is StepperCall.SAVE:
-            return Answer(note.status, (note.state,))
+            return RecordedReturn(note.status, (note.state,))
         if call in (StepperCall.GET, StepperCall.COUNT):
-            return Answer(note.status, values=self._bytes[note.first : note.first + note.bytes].tobytes())
-        return Answer(note.status)
+            return RecordedReturn(note.status, values=self._bytes[note.first : note.first + note.bytes].tobytes())
+        return RecordedReturn(note.status)

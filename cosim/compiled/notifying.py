@@ -16,7 +16,7 @@ import numpy as np
 from cosim.balises.delivery import OUTCOMES, Delivery, Receiver, snapped
 from cosim.balises.telegram import PAYLOAD
 from cosim.compiled.program import Program
-from cosim.compiled.recorded_returns import Answer
+from cosim.compiled.recorded_returns import RecordedReturn
 from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
@@ -27,7 +27,7 @@ FUNCTIONS = ("fmi3EnterEventMode", "fmi3SetClock", "fmi3SetFloat64", "fmi3Update
 FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at", "stamp")  # in the order of `stepper.h`
 OUTCOMES_AT_MOST = 8
 FMI3 = 3
-Answering = Callable[[Mapping[int, Mapping[str, Sequence[Answer]]]], AbstractContextManager[None]]
+Repeating = Callable[[Mapping[int, Mapping[str, Sequence[RecordedReturn]]]], AbstractContextManager[None]]
 
 
 class CTelegram(ctypes.Structure):
@@ -54,7 +54,7 @@ class CompiledDelivery:
     Args:
         receiver: see `can_be_notified`. place: of its component in the plan. program: the plan in C.
         library: the stepper.
-        answering: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called
+        repeating: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called
             now.
     """
 
@@ -64,11 +64,11 @@ class CompiledDelivery:
         place: int,
         program: Program,
         library: Any,
-        answering: Answering,
+        repeating: Repeating,
         idle: Callable[[], bool],
     ) -> None:
         self.receiver, self.place, self.program = receiver, place, program
-        self._answering, self._idle = answering, idle
+        self._repeating, self._idle = repeating, idle
         self.component = receiver.planned.component
         self._port = port = self.component.events[receiver.event]
         self._names = [name for name in port.payload if name in PAYLOAD] + ["stamp"] * (port.stamp is not None)
@@ -121,7 +121,7 @@ class CompiledDelivery:
         self.begin()
         begin = perf_counter()
         if not self._call(*self._arguments):
-            with self._answering(self.program.journalled()):
+            with self._repeating(self.program.journalled()):
                 return self._slowly(t, until, telegrams)
         before, after = self._before.copy(), self._after.copy()
         component.time, component.calls = until, component.calls + (notified_at > t) + (until > notified_at)

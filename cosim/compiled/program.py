@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cosim.compiled.journal import CJournal, StepperCall, StepperJournal
-from cosim.compiled.recorded_returns import Answer
+from cosim.compiled.recorded_returns import RecordedReturn
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
@@ -234,14 +234,16 @@ class Program:
         reads = ctypes.cast(self.slaves[which].reads, ctypes.POINTER(CPort))
         return self.reads[which] == ["fmi3GetFloat64"] and reads[0].places is None
 
-    def said(self, which: int, stop: Stop) -> dict[str, list[Answer]]:
+    def said(self, which: int, stop: Stop) -> dict[str, list[RecordedReturn]]:
         """What a slave has said in a move that ended with `stop`, by function; `which`: its place in the plan."""
         head, writes, reads = self.head, self.writes[which], self.reads[which]
         if stop is Stop.REFUSED:
             return {}
         if stop is Stop.WRITE:
-            return {name: [Answer()] for name in writes[: head.port]} | {writes[head.port]: [Answer(head.status)]}
-        said = {name: [Answer()] for name in writes}
+            return {name: [RecordedReturn()] for name in writes[: head.port]} | {
+                writes[head.port]: [RecordedReturn(head.status)]
+            }
+        said = {name: [RecordedReturn()] for name in writes}
         if stop is Stop.SENT:
             return said
         version = self.plan.steps[which].component.fmi_version
@@ -249,15 +251,15 @@ class Program:
         if stop is Stop.STEP:
             results = bool(head.event), bool(head.terminate), bool(head.early), float(head.reached)
         said[f"fmi{version}DoStep"] = [
-            Answer(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())
+            RecordedReturn(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())
         ]
         if stop is Stop.READ:
-            said[reads[head.port]] = [Answer(head.status)]
+            said[reads[head.port]] = [RecordedReturn(head.status)]
         return said
 
-    def journalled(self) -> dict[int, dict[str, list[Answer]]]:
+    def journalled(self) -> dict[int, dict[str, list[RecordedReturn]]]:
         """What slaves have said since the journal was begun: by place in the plan, then by function, in order."""
-        said: dict[int, dict[str, list[Answer]]] = {}
+        said: dict[int, dict[str, list[RecordedReturn]]] = {}
         for place, call, port, answer in self.journal.read(self._versions):
             name = call.function(self._versions[place])
             name = (

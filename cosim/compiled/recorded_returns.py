@@ -1,5 +1,5 @@
-"""Answers: what functions of an FMU said when the stepper called them, handed to the Python that would have called
-them.
+"""Recorded returns: what functions of an FMU said when the stepper called them, handed to the Python that would have
+called them.
 
 So the Python stepper goes on from the middle of a step with its own rules for errors, events, early returns and
 termination, and the FMU is not called twice. Touches the table of functions that fmpy's slave goes through.
@@ -21,7 +21,7 @@ COUNT, VALUES = (
 )  # places of the number of references and of the values among the arguments of a function that gets variables
 
 
-class Answer:
+class RecordedReturn:
     """Stands in for a function of the library, for one call.
 
     Args:
@@ -32,7 +32,7 @@ class Answer:
         self.status, self.results, self.values = status, results, values
 
     def __call__(self, function: str, *arguments: Any) -> int:
-        """Answer as the library did.
+        """Return what the library did.
 
         Args:
             function: that is called. arguments: of the call.
@@ -63,7 +63,7 @@ def bytes_wanted(function: str, arguments: Sequence[Any]) -> int:
 
 
 @contextmanager
-def answered(slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[None]:
+def repeated(slave: Any, answers: Mapping[str, Sequence[RecordedReturn]]) -> Iterator[None]:
     """Within this context each function in `answers` answers its first calls so; further calls reach the library.
 
     Args:
@@ -72,7 +72,7 @@ def answered(slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[No
     functions: dict[str, Any] = slave._functions
     real = {name: functions[name] for name in answers}
 
-    def stand_in(name: str, waiting: list[Answer]) -> Any:
+    def stand_in(name: str, waiting: list[RecordedReturn]) -> Any:
         def call(*arguments: Any) -> int:
             answer = waiting.pop(0)
             if not waiting:

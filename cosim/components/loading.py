@@ -21,8 +21,8 @@ from cosim.components.shared_libraries import refuse_foreign_libraries
 from cosim.components.surroundings import Surroundings
 from cosim.components.unpacking import unpack
 from cosim.errors import FmuLoadError, ScenarioError
+from cosim.process.exit_guard import guard_exit
 from cosim.process.last_call import LAST_CALL
-from cosim.process.sentinel import guard_exit
 from fmu_observer.description import describe
 from fmus.fmi.archive import Archive, NotAnFmuError
 from fmus.fmi.binaries import platform_folder

@@ -21,8 +21,8 @@ def log_calls(component: Component, log: CallLog) -> None:
     names = Names(component.description)
     if is_native(component.slave):
         component.slave._call = _logged_native(component, log, names)
-        component.slave.fmiCallLogger = _unheard  # prepared calls and the compiled stepper make way for a logger
-        component.slave._log_fmi_args = _unheard
+        component.slave.fmiCallLogger = _ignore  # prepared calls and the compiled stepper make way for a logger
+        component.slave._log_fmi_args = _ignore
     else:
         component.slave = LoggedSlave(component, log, names)
 
@@ -39,7 +39,7 @@ def _logged_native(component: Component, log: CallLog, names: Names) -> Callable
     return call
 
 
-def _unheard(*_arguments: Any) -> None:
+def _ignore(*_arguments: Any) -> None:
     """fmpy's own logging of calls, which knows no time and writes after the call."""
 
 

@@ -56,7 +56,7 @@ class PythonSlave:
         self._values = np.array([x for group in self._groups for s in group for x in s.start_values])
         self._given: dict[str, Any] = {}
         self._made: Any = None
-        self._time, self._told = NO_TIME, False
+        self._time, self._notified = NO_TIME, False
         self.model_description = self.modelDescription = self._describe()
 
     def _describe(self) -> ModelDescription:
@@ -101,7 +101,7 @@ class PythonSlave:
 
     def reset(self) -> None:
         """Back to before initialisation."""
-        self._made, self._time, self._told, self.counters = None, NO_TIME, False, EventCounters()
+        self._made, self._time, self._notified, self.counters = None, NO_TIME, False, EventCounters()
 
     def enterInitializationMode(self, startTime: float = 0.0, stopTime: float | None = None, **_: Any) -> None:
         """Make the object with its parameters; its attributes are the first outputs.
@@ -150,13 +150,13 @@ class PythonSlave:
         Args:
             vr: the one clock. values: whether it ticks.
         """
-        self._told = any(values)
+        self._notified = any(values)
         self._values[self._ends[3] :] = NO_TIME
 
     def updateDiscreteStates(self) -> tuple[bool, bool, bool, bool, bool, float]:
         """The object's ``balise``, where a telegram came."""
-        if self._told:
-            self._told = False
+        if self._notified:
+            self._notified = False
             fields = [signal.name.removeprefix(f"{EVENT}_") for signal in self._groups[3]]
             telegram = dict(zip(fields, self._values[self._ends[3] :].tolist(), strict=True))
             telegram["stamp"] = telegram.pop("time")

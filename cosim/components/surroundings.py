@@ -58,7 +58,7 @@ class SurroundingsOfSteps:
         self._calls = 0
         self._before = Surroundings()
 
-    def look(self) -> None:
+    def compare(self) -> None:
         """After the first steps, and after every `EVERY`-th call."""
         self._calls += 1
         if self._calls <= 3 or self._calls % EVERY == 0:

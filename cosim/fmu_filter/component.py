@@ -85,7 +85,7 @@ class FmuFilterModel:
         ]
         self.outputs = self._output_signals()
         self._driven = [self._words[name] for name in model.inputs]
-        self._told = [self._words[name] for name in model.outputs]
+        self._output_words = [self._words[name] for name in model.outputs]
         self._measured_inputs = [MEASURED + self._words[name] for name in table.measurements]
         self._means = [self._words[name] for name in self._estimated]
         self._deviations = [f"{name}_std" for name in self._means]
@@ -182,7 +182,7 @@ class FmuFilterModel:
     def _values(self, t: float) -> dict[str, float]:
         assert self._journal is not None
         belief = self._journal.belief
-        found = dict(zip(self._told, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
+        found = dict(zip(self._output_words, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
         found.update(zip(self._means, belief.x.tolist(), strict=True))
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         found.update(zip(self._deviations, deviations.tolist(), strict=True))
@@ -210,9 +210,9 @@ class FmuFilterModel:
         first |= zip(self._deviations, np.sqrt(np.diagonal(self._P)).tolist(), strict=True)
         if name in first:
             return float(first[name])
-        if name in self._told:
+        if name in self._output_words:
             _, y = self._model.values_at(0.0, self._start, self._model.start_inputs)
-            return float(y[self._told.index(name)])
+            return float(y[self._output_words.index(name)])
         if name in ("nis", "nis_degrees", MISSED_SAMPLES):
             return 0.0
         raise AttributeError(name)

@@ -126,7 +126,7 @@ class FmuParticleFilter(FmuFilter):
         driven = u[:, None] + (ensemble.drawn(self.noises.inputs, draws) if len(u) else draws)
         states, columns = [], []
         for i, saved in enumerate(belief.states):
-            model.told(partial(model.instance.restore, saved.state))
+            model.called(partial(model.instance.restore, saved.state))
             model.set_inputs(driven[:, i])
             model.advance(t, h)
             states.append(Saved(model.instance))

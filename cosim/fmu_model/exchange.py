@@ -42,9 +42,9 @@ class ExchangeModel(ContinuousModel):
             FmuModelError: states that were set are not there.
         """
         moved = x + 1e-3 * np.maximum(np.abs(x), 1.0)
-        self.told(lambda: self.instance.set_states(moved))
-        found = self.told(self.instance.states)
-        self.told(lambda: self.instance.set_states(x))
+        self.called(lambda: self.instance.set_states(moved))
+        found = self.called(self.instance.states)
+        self.called(lambda: self.instance.set_states(x))
         wrong = np.flatnonzero(np.abs(found - moved) > 1e-9 * np.maximum(np.abs(moved), 1.0))
         if len(wrong):
             i = int(wrong[0])
@@ -62,7 +62,7 @@ class ExchangeModel(ContinuousModel):
         Raises:
             FmuModelError: the FMU refuses, asks for the end, or has more events than can be.
         """
-        self._run.advance(t, h, self.told(self.instance.states), self._inputs.copy())
+        self._run.advance(t, h, self.called(self.instance.states), self._inputs.copy())
 
     def transition_with_slope(self, t: float, h: float, x: Array, u: Array) -> tuple[Array, Array] | None:
         """States after a step, and their Jacobian by the states before it: the variational equation ``dF = A F`` with A
@@ -98,7 +98,7 @@ class ExchangeModel(ContinuousModel):
             unknowns: derivatives of states, or outputs.
         """
         ask = self.instance.directional_derivative
-        columns = self.told(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
+        columns = self.called(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
         return np.array(columns).T.reshape(len(unknowns), len(self.states))
 
     def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:

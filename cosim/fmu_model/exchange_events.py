@@ -25,7 +25,7 @@ class ContinuousModel(SealedModel):
 
     def derivatives(self) -> Array:
         """Derivatives of the states where the instance stands, shape (n,)."""
-        found: Array = self.told(self.instance.derivatives)
+        found: Array = self.called(self.instance.derivatives)
         return found
 
     def move(self, t: float, x: Array, u: Array) -> None:
@@ -42,7 +42,7 @@ class ContinuousModel(SealedModel):
                 self._inputs[:] = u
                 self._write_inputs()
 
-        self.told(move)
+        self.called(move)
 
 
 class EventRun:
@@ -61,7 +61,7 @@ class EventRun:
         """Which event indicators are positive where the instance stands, shape (number of them,)."""
         if not self._indicators:
             return np.zeros(0, dtype=bool)
-        return np.asarray(self._model.told(self._instance.indicators) > 0.0)
+        return np.asarray(self._model.called(self._instance.indicators) > 0.0)
 
     def advance(self, t: float, h: float, x: Array, u: Array) -> None:
         """Integrate from a state to the end of a step, inputs held, and leave the instance there.
@@ -139,13 +139,13 @@ class EventRun:
             found: Array = instance.states()
             return found
 
-        found: Array = model.told(handle)
+        found: Array = model.called(handle)
         if instance.terminated:
             raise FmuModelError(f"{model.path}: at t = {t:.9g} s, at {event}, it asks for the end of the simulation.")
         return found
 
     def _asks_for_events(self) -> bool:
-        enter, terminate = self._model.told(
+        enter, terminate = self._model.called(
             lambda: self._instance.guard("completedIntegratorStep", self._instance.slave.completedIntegratorStep)
         )
         self._instance.terminated |= bool(terminate)

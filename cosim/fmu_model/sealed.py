@@ -69,12 +69,12 @@ class SealedModel(ABC):
         self.inputs = tuple(self._chosen(inputs, real_names(instance, "input"), "input"))
         self.parameters = dict(parameters or {})
         self._chosen(list(self.parameters), [], "parameter")
-        self.told(instance.instantiate)
+        self.called(instance.instantiate)
         self._states_read, self._outputs_read = np.zeros(len(self.states)), np.zeros(len(self.outputs))
         self._read_states = instance.reader(list(self.states), self._states_read)
         self._read_outputs = instance.reader(list(self.outputs), self._outputs_read)
         self._write_inputs, self._inputs = instance.writer(list(self.inputs))
-        self.start, self.start_inputs = self.told(self._begun)
+        self.start, self.start_inputs = self.called(self._begun)
         self._demand_settable()
         self.parameters = {name: value for name, value in self.parameters.items() if name not in self.states}
         starts = self.states if all(map(self._has_start, self.states)) else ()
@@ -143,7 +143,7 @@ class SealedModel(ABC):
         """
         if len(self.inputs):
             self._inputs[:] = u
-            self.told(self._write_inputs)
+            self.called(self._write_inputs)
 
     def values_at(self, t: float, x: Array, u: Array) -> tuple[Array, Array]:
         """States and outputs just after a restart.
@@ -160,7 +160,7 @@ class SealedModel(ABC):
     def read(self) -> tuple[Array, Array]:
         """States, shape (n,), and outputs, shape (q,), where the instance stands."""
 
-        self.told(self._read)
+        self.called(self._read)
         return self._states_read.copy(), self._outputs_read.copy()
 
     def _read(self) -> None:
@@ -205,7 +205,7 @@ class SealedModel(ABC):
         for row, x, driven in zip(found, points.T, repeat(u) if u.ndim == 1 else u.T, strict=False):
             self.restart(t, x, driven)
             self.advance(t, h)
-            self.told(self._read_states)
+            self.called(self._read_states)
             row[:] = self._states_read
         return found.T
 
@@ -223,7 +223,7 @@ class SealedModel(ABC):
         for row, x in zip(found, points.T, strict=True):
             self.restart(t, x, u)
             if self.outputs:
-                self.told(self._read_outputs)
+                self.called(self._read_outputs)
             row[:] = self._outputs_read
         return found.T if chosen is None else np.ascontiguousarray(found[:, chosen]).T
 
@@ -288,7 +288,7 @@ class SealedModel(ABC):
     def _demand_settable(self) -> None:
         """Refuse states that nothing moves; the instance stands at its start."""
 
-    def told(self, call: Callable[[], Any]) -> Any:
+    def called(self, call: Callable[[], Any]) -> Any:
         """What a call of the FMU gives; its failure in words with the file.
 
         Args:

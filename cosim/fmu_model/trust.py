@@ -108,16 +108,16 @@ def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:
             f"{model.path}: it does not declare that its state can be saved and restored, so no particle filter can "
             "select among states. Use 'ekf', 'ukf' or 'ensemble' where its states can be set."
         )
-    saved = model.told(model.instance.save)
+    saved = model.called(model.instance.save)
     runs = []
     for again in (False, True):
         if again:
-            model.told(partial(model.instance.restore, saved))
+            model.called(partial(model.instance.restore, saved))
         for k in range(1, 1 + STEPS):
             model.set_inputs(_moving(model, k))
             model.advance(t + k * h, h)
         runs.append(np.concatenate(model.read()))
-    model.told(partial(model.instance.release, saved))
+    model.called(partial(model.instance.release, saved))
     apart = np.flatnonzero(~((runs[0] == runs[1]) | (np.isnan(runs[0]) & np.isnan(runs[1]))))
     if len(apart):
         i = int(apart[0])

@@ -94,8 +94,8 @@ class System:
         self.balises.begin(t, until)
         self.algorithm.advance(t, until)
         rows = self.balises.rows()
-        if self.balises.touched:
-            self._restart_interpolation_from(self.balises.touched, until)
+        if self.balises.notified:
+            self._restart_interpolation_from(self.balises.notified, until)
         return rows
 
     def restart_interpolation(self, t: float, jumped: np.ndarray, stale: np.ndarray) -> None:

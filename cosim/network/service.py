@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from cosim.balises.delivery import Delivery, Receiver
-from cosim.balises.letter import Letter
+from cosim.balises.event_message import EventMessage
 from cosim.balises.telegram import Mailbox
 from cosim.coupling.chain import Mover, Position, Stage, around
 from cosim.coupling.plan import Plan
@@ -260,8 +260,8 @@ class NetworkService:
             if checked and again:
                 entry.deliveries[listener.component] = "dropped"
             else:
-                letter = self._letter(listener, packet)
-                delivery = entry.deliveries[listener.component] = listener.receiver.tell(t, letter)
+                message = self._message(listener, packet)
+                delivery = entry.deliveries[listener.component] = listener.receiver.notify(t, message)
                 delivery.before = delivery.after = None  # rows tell it; a log of a long run has no room for it
 
     def _arrive(self, t: float, node: int, brought: np.ndarray) -> None:
@@ -274,13 +274,13 @@ class NetworkService:
                 self._plan.values[self._arriving][place] = received[reader.signal]
                 self._reads[place] = reader.next_sample(t, self._start)
 
-    def _letter(self, listener: PacketListener, packet: Packet) -> Letter:
+    def _message(self, listener: PacketListener, packet: Packet) -> EventMessage:
         """What a listener is told: the values of the packet, and of other nodes what was last received."""
         values = self._plan.values[self._held].copy()
         values[self._own[packet.node]] = packet.values
         told = {f.name: f.factor * float(values[f.signal]) + f.offset for f in listener.fields}
         own = {"node": packet.node + 1.0, "number": float(packet.number), "delivered_at": packet.delivered_at}
-        return Letter(listener.event, packet.stamp, packet.delivered_at, own | told)
+        return EventMessage(listener.event, packet.stamp, packet.delivered_at, own | told)
 
     def _move(self, receiver: Receiver, drive: Mover, t: float, until: float) -> None:
         """A receiver that is behind with what it was told is told in its step."""

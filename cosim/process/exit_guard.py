@@ -1,5 +1,5 @@
-"""The sentinel: an FMU that calls exit() ends no script, and no test, as if all were well. For processes that nobody
-watches.
+"""The guard of exits: an FMU that calls exit() ends no script, and no test, as if all were well. For processes that
+nobody watches.
 
 The C library calls it when somebody exits while Python is at work. It also ends a call that takes too long. Imports the
 standard library only.
@@ -23,7 +23,7 @@ _output = [2]
 
 
 def report_to_copy_of_stderr() -> int:
-    """From now on the sentinel writes to what is the error stream now, also if that is captured later; returns the
+    """From now on it writes to what is the error stream now, also if that is captured later; returns the
     descriptor.
     """
     _output[0] = os.dup(2)

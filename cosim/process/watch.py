@@ -122,7 +122,9 @@ class _Watch:
             if select.select([read], [], [], POLL)[0]:
                 with suppress(BlockingIOError):
                     os.read(read, 4096)
-            self._look(min(monotonic() - begin, 2.0 * POLL))  # no longer: this program may have been stopped meanwhile
+            self._check_duration(
+                min(monotonic() - begin, 2.0 * POLL)
+            )  # no longer: this program may have been stopped meanwhile
 
     def _hear(self, number: int, _frame: Any) -> None:
         if number == signal.SIGCHLD:
@@ -131,8 +133,8 @@ class _Watch:
         with suppress(ProcessLookupError):
             os.kill(self.child, number)
 
-    def _look(self, elapsed: float) -> None:
-        """End the process where its present call takes too long; `elapsed` since the last look [s]."""
+    def _check_duration(self, elapsed: float) -> None:
+        """End the process where its present call takes too long; `elapsed` since the last check [s]."""
         now = LAST_CALL.now()
         self._same = self._same + elapsed if now == self._seen and now[0] else 0.0
         self._seen = now

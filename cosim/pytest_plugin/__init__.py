@@ -10,7 +10,7 @@ import os
 
 import pytest
 
-from cosim.process import sentinel
+from cosim.process import exit_guard
 from cosim.pytest_plugin import finish, markers, options, startup
 from cosim.pytest_plugin.fixture import FmuRegression
 from cosim.pytest_plugin.records import Records
@@ -38,7 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config: of the session.
     """
     markers.register(config)
-    config.stash[_ERROR_STREAM] = sentinel.report_to_copy_of_stderr()
+    config.stash[_ERROR_STREAM] = exit_guard.report_to_copy_of_stderr()
 
 
 @pytest.hookimpl(optionalhook=True)

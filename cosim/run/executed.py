@@ -73,7 +73,7 @@ def _step(ready: Ready, interruption: Interruption) -> Executed:
     surroundings = SurroundingsOfSteps()
 
     def between_steps() -> None:
-        surroundings.look()
+        surroundings.compare()
         interruption.check()
 
     ready.master.between_steps = between_steps

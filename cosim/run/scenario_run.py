@@ -12,8 +12,8 @@ from pathlib import Path
 from time import perf_counter
 
 from cosim.diagnostics.call_log import CallLog
+from cosim.process.exit_guard import limited_calls
 from cosim.process.interruption import Interruption
-from cosim.process.sentinel import limited_calls
 from cosim.run.checked import check_task
 from cosim.run.executed import execute
 from cosim.run.outcome import Outcome

@@ -18,7 +18,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import fmi1_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.slave import Slave, answer, make_step
+from fmus.fmi.slave import Slave, make_step, status_of
 from fmus.fmi.values import negative
 
 TRUE = b"\x01"
@@ -88,7 +88,7 @@ class FMI1Slave(Slave):
 
     def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
         self._raise_unless_discarded(error, t)
-        raise self._not_done(error, t, until, answer(self.slave.getRealStatus, fmi1LastSuccessfulTime)) from error
+        raise self._not_done(error, t, until, status_of(self.slave.getRealStatus, fmi1LastSuccessfulTime)) from error
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         raise self.failure(f"an FMI 1.0 slave takes no events (got '{event.name}')", t)

@@ -12,7 +12,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
 from fmus.fmi.native_log import fmi2_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.slave import Slave, answer, make_step
+from fmus.fmi.slave import Slave, make_step, status_of
 from fmus.fmi.standard import TIME_TOLERANCE
 
 
@@ -84,8 +84,8 @@ class FMI2Slave(FMI2Instance, Slave):
     def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
         """A discarded step is the end: the slave has terminated, or it cannot do this step and its state is lost."""
         self._raise_unless_discarded(error, t)
-        reached = answer(self.slave.getRealStatus, fmi2LastSuccessfulTime)
-        if not answer(self.slave.getBooleanStatus, fmi2Terminated):  # one that cannot say why has not terminated
+        reached = status_of(self.slave.getRealStatus, fmi2LastSuccessfulTime)
+        if not status_of(self.slave.getBooleanStatus, fmi2Terminated):  # one that cannot say why has not terminated
             raise self._not_done(error, t, until, reached) from error
         self.time = t if reached is None else min(max(float(reached), t), until)
         if self.time <= t + TIME_TOLERANCE and self._says_why():

@@ -73,7 +73,7 @@ def _listen(listener: Listener) -> int:
     return number
 
 
-def _hear(
+def _take_message(
     environment: int | None, name: bytes | None, status: int, category: bytes | None, message: bytes | None
 ) -> None:
     listener = _listeners.get(environment or 0) or _named(name)
@@ -92,7 +92,7 @@ def _named(name: bytes | None) -> Listener | None:
 
 def _share() -> Any:
     shared = fmi2CallbackFunctions()
-    shared.logger = _heard_from_c
+    shared.logger = _message_from_c
     with suppress(ImportError, OSError, AttributeError):
         from fmpy.logging import addLoggerProxy  # noqa: PLC0415 - there is none for every platform
 
@@ -100,5 +100,5 @@ def _share() -> Any:
     return shared
 
 
-_heard_from_c = fmi2CallbackLoggerTYPE(_hear)  # kept for as long as the process lives
+_message_from_c = fmi2CallbackLoggerTYPE(_take_message)  # kept for as long as the process lives
 _shared = _share()

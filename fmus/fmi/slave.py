@@ -207,7 +207,7 @@ class Slave(Instance):
         return self.discarded(error, f"asked for {until:g} s, {known}", t)
 
 
-def answer(ask: Callable[[int], Any], kind: int) -> Any:
+def status_of(ask: Callable[[int], Any], kind: int) -> Any:
     """What a slave says of its last step.
 
     Args:

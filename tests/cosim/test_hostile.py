@@ -22,7 +22,7 @@ from cosim.cli import main
 from cosim.compiled.library import stepper_library
 from cosim.components import surroundings
 from cosim.components.fmi2 import FMI2Component
-from cosim.process import sentinel, watch
+from cosim.process import exit_guard, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
 from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page
 from cosim.studies.workers import Died, in_processes
@@ -158,8 +158,8 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
 
 def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[str] = []
-    monkeypatch.setattr(sentinel, "_give_up", ended.append)
-    with sentinel.limited_calls(0.1):
+    monkeypatch.setattr(exit_guard, "_give_up", ended.append)
+    with exit_guard.limited_calls(0.1):
         for number in range(1, 6):
             LAST_CALL.call[0] = number
             time.sleep(0.05)

@@ -33,7 +33,7 @@ class Participant:
         self.gate = Gate(self.component, planned.inputs)
         self.wires: dict[int, list[Wire]] = {}
         self.in_event_mode = self.needs_update = False
-        self._unheard = False  # its outputs and clocks have not been passed on in this super-dense instant
+        self._not_passed_on = False  # its outputs and clocks have not been passed on in this super-dense instant
         self._waiting: set[int] = set()
         self._active: set[int] = set()
         self._reported: set[int] = set()
@@ -71,7 +71,7 @@ class Participant:
         """Its own event: enter Event Mode and let the due clocks tick."""
         self._enter()
         self._active.update(self.component.tick_due_clocks())
-        self.needs_update = self._unheard = True
+        self.needs_update = self._not_passed_on = True
 
     def exchange(self) -> bool:
         """Take what the others pass on, and pass on what follows from it; True where anything was new."""
@@ -80,9 +80,9 @@ class Participant:
                 return False
             self._enter()
         self.planned.inputs.gather_now()
-        if not self._take() and not self._unheard:
+        if not self._take() and not self._not_passed_on:
             return False
-        self.needs_update, self._unheard = True, False
+        self.needs_update, self._not_passed_on = True, False
         self._pass_ticks()
         self.planned.read()
         return True
@@ -91,7 +91,7 @@ class Participant:
         """End the super-dense instant."""
         self._active.clear()
         self._reported.clear()
-        self.needs_update = self._unheard = self.component.update_discrete_states()
+        self.needs_update = self._not_passed_on = self.component.update_discrete_states()
         self.planned.read()
 
     def leave(self) -> None:
@@ -122,7 +122,7 @@ class Participant:
         if not self.in_event_mode:
             self.component.enter_event_mode()
             self.in_event_mode, self._flow = True, b""
-            self._unheard = True
+            self._not_passed_on = True
 
     def _take(self) -> bool:
         """Set clocks, then inputs; True where anything was set that the component did not know."""
@@ -136,7 +136,7 @@ class Participant:
         if new:
             self.gate.send()
             self._flow = flow
-        return self.gate.send_clocked(self._active, fresh=bool(ticking) or self._unheard) or new or bool(ticking)
+        return self.gate.send_clocked(self._active, fresh=bool(ticking) or self._not_passed_on) or new or bool(ticking)
 
     def _pass_ticks(self) -> None:
         clocks = [clock for clock in self.wires if clock not in self._reported]

@@ -9,20 +9,21 @@ import numpy as np
 import pytest
 
 from cosim import Scenario
-from cosim.compiled.recorded_returns import Answer
+from cosim.compiled.recorded_returns import RecordedReturn
 
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_answer_is_never_written_into_another_call(version: int) -> None:
     target = np.zeros(3)
     place = target.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-    function, told = {2: "fmi2GetReal", 3: "fmi3GetFloat64"}[version], Answer(values=np.array([1.0, 2.0]).tobytes())
+    function = {2: "fmi2GetReal", 3: "fmi3GetFloat64"}[version]
+    recorded = RecordedReturn(values=np.array([1.0, 2.0]).tobytes())
     for count in (1, 3):
         with pytest.raises(RuntimeError, match=f"{function} for {8 * count} bytes met an answer of 16"):
-            told(
+            recorded(
                 function, None, None, ctypes.c_size_t(count), place, *([ctypes.c_size_t(count)] if version == 3 else [])
             )
-    told(function, None, None, ctypes.c_size_t(2), place, *([ctypes.c_size_t(2)] if version == 3 else []))
+    recorded(function, None, None, ctypes.c_size_t(2), place, *([ctypes.c_size_t(2)] if version == 3 else []))
     assert target.tolist() == [1.0, 2.0, 0.0]
 
 
@@ -43,15 +44,15 @@ def test_a_receiver_that_counts_missing_samples_gives_the_same_numbers_in_both_s
 ) -> None:
     """Its count was read in the middle of a telegram, with the answer that its outputs were to get."""
     astray: list[Exception] = []
-    answer = Answer.__call__
+    answer = RecordedReturn.__call__
 
-    def watched(self: Answer, *arguments: Any) -> int:
+    def watched(self: RecordedReturn, *arguments: Any) -> int:
         try:
             return answer(self, *arguments)
         except RuntimeError as error:
             astray.append(error)
             raise
 
-    monkeypatch.setattr(Answer, "__call__", watched)
+    monkeypatch.setattr(RecordedReturn, "__call__", watched)
     assert run("compiled").tobytes() == run("python").tobytes()
     assert astray == []

@@ -175,7 +175,9 @@ def test_steps_of_its_own_that_do_not_fit_are_told() -> None:
         with pytest.raises(FmuModelError, match=said):
             check_states(model, step)
     assert _objections(model, 0.1) == []
-    assert _objections(model, 0.01)[0].startswith("Do not rely on A and B before this is settled: started again at each")
+    assert _objections(model, 0.01)[0].startswith(
+        "Do not rely on A and B before this is settled: started again at each"
+    )
 
 
 def test_events_of_model_exchange_are_handled() -> None:
