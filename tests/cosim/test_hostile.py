@@ -148,11 +148,11 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(looking, "_end", ended.append)
     for now in [(1, 0.0)] * 3 + [(2, 0.0), (2, 0.1), (2, 0.2)] + [(0, 0.2)] * 4:
         page.call[0], page.time[0] = now
-        looking._look(0.2)
+        looking._check_duration(0.2)
     assert ended == []
     page.call[0] = 1
     for _ in range(4):
-        looking._look(0.2)
+        looking._check_duration(0.2)
     assert ended == ["has not returned for 0.5 s, the limit that master.call_timeout sets"]
 
 
