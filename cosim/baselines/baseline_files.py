@@ -137,9 +137,6 @@ def write_texts(texts: dict[str, str], path: Path) -> None:
 def _demand_free(path: Path) -> None:
     """Refuse to write a table over one that belongs to no baseline: somebody's inputs, say.
 
-    Args:
-        path: of the table.
-
     Raises:
         OutputError: there is one.
     """
@@ -147,8 +144,7 @@ def _demand_free(path: Path) -> None:
         if parts(path)[kind].exists() and not path.exists():
             raise OutputError(
                 f"{parts(path)[kind]} exists and belongs to no baseline ({path.name} is not there); it is not "
-                f"overwritten. "
-                "Give the baseline another name, or remove the file."
+                "overwritten. Give the baseline another name, or remove the file."
             )
 
 

@@ -57,11 +57,7 @@ def _short(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
-    """Plain data of tolerances.
-
-    Args:
-        tolerances: what is allowed, signal by signal.
-    """
+    """Plain data of tolerances."""
     return {
         "default": asdict(tolerances.default),
         "signals": {name: asdict(given) for name, given in tolerances.by_signal.items()},
@@ -71,9 +67,6 @@ def _tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
 
 def _tolerances_from(data: Mapping[str, Any]) -> Tolerances:
     """Tolerances from plain data.
-
-    Args:
-        data: plain data, as from a JSON file.
 
     Raises:
         ComparisonError: they cannot be.

@@ -85,10 +85,6 @@ def regression(
 def _demand_same_models(result: Result, baseline: Baseline) -> None:
     """Refuse a result of another model; the same model with another GUID is a new delivery.
 
-    Args:
-        result: the run.
-        baseline: the baseline.
-
     Raises:
         BaselineError: a component is of another model; says both.
     """

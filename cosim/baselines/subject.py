@@ -45,8 +45,7 @@ def _run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable
     if recipe.kind == "result":
         raise BaselineError(
             "This baseline was made from a result, not from an FMU or a scenario file, so it cannot be run again from "
-            "here; "
-            "give the result to be checked: --against DIR."
+            "here; give the result to be checked: --against DIR."
         )
     if recipe.kind == "fmu":
         scenario = Scenario.fmu(

@@ -44,8 +44,7 @@ ARGUMENTS = (
         type=_names,
         metavar="A,B,...",
         help="components of the scenario or shipped observers (default: the scenario's own, and all shipped train "
-        "observers "
-        "whose inputs and event it can serve)",
+        "observers whose inputs and event it can serve)",
     ),
     one_of(
         argument("--record", metavar="DIR", help="keep the recorded run as a results folder"),

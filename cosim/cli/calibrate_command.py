@@ -22,9 +22,8 @@ DONE, NOT_IDENTIFIED = 0, 1
 
 PARSER = {
     "description": (
-        "Fit parameters of an FMU or a scenario to a recording by least squares, with confidence intervals, and "
-        "tell what cannot be identified. An FMU is driven by the columns of the recording that have the names of "
-        "its inputs."
+        "Fit parameters of an FMU or a scenario to a recording by least squares, with confidence intervals, and tell "
+        "what cannot be identified. An FMU is driven by the columns of the recording that have the names of its inputs."
     ),
     "epilog": "Exit codes: 0 all identified, 1 something is not, 2 error.",
 }

@@ -16,9 +16,8 @@ DONE = 0
 
 PARSER = {
     "description": (
-        "Write a result in another format: the ending of TARGET says which, such as .csv, .mat (MATLAB), "
-        ".modelica.mat (Dymola, OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder, or a table of any "
-        "tool."
+        "Write a result in another format: the ending of TARGET says which, such as .csv, .mat (MATLAB), .modelica.mat "
+        "(Dymola, OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder, or a table of any tool."
     ),
     "epilog": "Exit codes: 0 written, 2 error.",
 }

@@ -185,11 +185,7 @@ def _signal(result: Result, asked: str | None, what: str, option: str) -> str:
 
 
 def _estimate_text(estimate: DavisEstimate) -> str:
-    """The estimate as a table with remarks below.
-
-    Args:
-        estimate: of a run.
-    """
+    """The estimate as a table with remarks below."""
     top = estimate.speeds[1]
     percent = f"{100.0 * estimate.level:g} % interval"
     rows = [["coefficient", "estimate", percent, "unit", f"± at {top:.3g} m/s [m/s2]", "identified"]]
@@ -206,11 +202,7 @@ def _estimate_text(estimate: DavisEstimate) -> str:
 
 
 def _estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
-    """The estimate as plain data.
-
-    Args:
-        estimate: of a run.
-    """
+    """The estimate as plain data."""
     keys = ("mass", "level", "resolution", "noise", "points", "speeds", "duration", "condition", "confusion")
     coefficients = {
         c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit, "identified": c.identified}

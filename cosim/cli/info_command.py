@@ -78,11 +78,7 @@ def _described_model(name: str) -> dict[str, Any]:
 
 
 def _names_a_model(text: str) -> bool:
-    """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file.
-
-    Args:
-        text: as it was typed.
-    """
+    """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file."""
     path = Path(text)
     if names_a_file(text) or path.suffix.lower() in (".fmu", ".ssp"):
         return names_a_file(text)

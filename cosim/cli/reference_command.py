@@ -33,9 +33,8 @@ ACCURACY = 0.5  # of the told location accuracy, a bound, is taken for a standar
 
 PARSER = {
     "description": (
-        "Smooth odometer and balises of a recorded run, forwards and backwards, into the trajectory that it was "
-        "most likely made on: position and speed with standard deviations, for a report that has no truth of its "
-        "own."
+        "Smooth odometer and balises of a recorded run, forwards and backwards, into the trajectory that it was most "
+        "likely made on: position and speed with standard deviations, for a report that has no truth of its own."
     ),
     "epilog": "Exit codes: 0 written, 2 error.",
 }

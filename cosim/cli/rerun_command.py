@@ -15,9 +15,8 @@ from fmus.cli.commands import argument
 EQUAL, DIFFERS, ERROR = 0, 1, 2
 DESCRIPTION = (
     "Run again what a results folder holds, and compare with the results in it. The folder may have been moved, and "
-    "the "
-    "FMUs it was made from may be gone. Exit codes: 0 bit-identical or within the tolerance, 1 differs, 2 it cannot be "
-    "run again."
+    "the FMUs it was made from may be gone. Exit codes: 0 bit-identical or within the tolerance, 1 differs, 2 it "
+    "cannot be run again."
 )
 
 

@@ -37,9 +37,8 @@ def _seeds(text: str) -> list[int]:
 
 PARSER = {
     "description": (
-        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and "
-        "judge the best with other seeds. An observer that only listens is run beside one recording of the plant a"
-        " seed."
+        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and judge "
+        "the best with other seeds. An observer that only listens is run beside one recording of the plant a seed."
     ),
     "epilog": (
         "Exit codes: 0 done, 1 the judging seeds do not show that it became better, 2 error or interrupted; the "

@@ -97,12 +97,7 @@ def compare(
 
 
 def _label_of(given: Result | str | Path | Any, otherwise: str) -> str:
-    """What a result is called in messages.
-
-    Args:
-        given: what the user gave to be compared.
-        otherwise: what is said where that is no path.
-    """
+    """What a result is called in messages."""
     return str(given) if isinstance(given, str | Path) else otherwise
 
 

@@ -62,8 +62,7 @@ def _standing(result: Result, spec: ReportSpec, moving: np.ndarray) -> Iterator[
     if not len(moving):
         yield (
             f"The train never moves: {spec.true_speed} stays below {_STANDSTILL:g} m/s up to {_given(result.time[-1])} "
-            f"s. "
-            "Errors beside it say nothing; let the run go on, or have something drive the train."
+            "s. Errors beside it say nothing; let the run go on, or have something drive the train."
         )
 
 

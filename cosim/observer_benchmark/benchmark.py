@@ -131,21 +131,18 @@ def _loop_notes(parts: ScenarioParts, recording: Result) -> list[str]:
         names = ", ".join(parts.acting)
         notes.append(
             f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer "
-            f"only "
-            "listens to that run. What the train would do with another one in the loop is not told."
+            "only listens to that run. What the train would do with another one in the loop is not told."
         )
     steps = step_count(parts.table.start, parts.table.stop, parts.table.step)
     if len(recording.time) < steps + 1:
         notes.append(
             f"The recording has {len(recording.time)} rows for {steps} steps; inputs between them are interpolated, "
-            f"and numbers "
-            "differ from those of a run by that."
+            "and numbers differ from those of a run by that."
         )
     return notes
 
 
-# -- judging
-# ------------------------------------------------------------------------------------------------------------
+# -- judging ----------------------------------------------------------------------------------------------------------
 
 
 class _Judge:

@@ -129,8 +129,7 @@ def _ancestors(roots: Iterable[str], links: Iterable[Link], components: Iterable
     return tuple(name for name in components if name in found)
 
 
-# -- the two halves
-# -----------------------------------------------------------------------------------------------------
+# -- the two halves ---------------------------------------------------------------------------------------------------
 
 
 def recording_scenario(scenario: Scenario, parts: ScenarioParts) -> Scenario:
@@ -262,8 +261,7 @@ def _table(table: Any) -> dict[str, Any]:
     return data
 
 
-# -- observers
-# ----------------------------------------------------------------------------------------------------------
+# -- observers --------------------------------------------------------------------------------------------------------
 
 SHARED_PARAMETERS = (
     "mass",

@@ -140,9 +140,6 @@ def rerun(
 def _stored_scenario(manifest: Manifest) -> Scenario:
     """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written
     again.
-
-    Args:
-        manifest: of the results.
     """
     scenario = Scenario.load(manifest.directory)
     if scenario.table().master.log_calls:

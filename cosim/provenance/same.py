@@ -28,11 +28,7 @@ def same_result(first: Result, second: Result) -> bool:
 
 
 def _same_table(first: np.ndarray, second: np.ndarray) -> bool:
-    """Whether two tables have the same columns in the same order and the same bits in every row.
-
-    Args:
-        first: one of them. second: the other.
-    """
+    """Whether two tables have the same columns in the same order and the same bits in every row."""
     if first.dtype.names != second.dtype.names or first.shape != second.shape:
         return False
     names = first.dtype.names or ()

@@ -36,9 +36,6 @@ def packet_row(packet: PacketRecord) -> dict[str, str]:
 def _packet_from_row(row: Mapping[str, str]) -> PacketRecord:
     """The packet of a row.
 
-    Args:
-        row: cells by column.
-
     Raises:
         ValueError: a number, the kind or an outcome cannot be read.
     """

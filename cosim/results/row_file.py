@@ -105,9 +105,8 @@ class RowFile:
         reason = error.strerror or str(error)
         return OutputError(
             f"The recording outgrew its memory and cannot continue on disk, in {self._folder}: {reason}. What was "
-            f"recorded so "
-            "far is kept. Free the disk, choose another folder (the environment variable TMPDIR), or record less "
-            "(record_every)."
+            "recorded so far is kept. Free the disk, choose another folder (the environment variable TMPDIR), or "
+            "record less (record_every)."
         )
 
 

@@ -49,10 +49,6 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
 def _close_unfinished(folder: Path, reason: str) -> None:
     """Bring the rows of the block into the table of a folder that was streamed to, and say why the run ended.
 
-    Args:
-        folder: the results folder.
-        reason: why the run ended, in words.
-
     Raises:
         OSError, ValueError: a file cannot be read or written, or is none of a stream.
     """

@@ -224,8 +224,7 @@ class _StreamFile(RowFile):
     def _explained(self, error: OSError) -> OutputError:
         return OutputError(
             f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. What was recorded "
-            f"so far is "
-            "kept. Free the disk, choose another folder, or record less (record_every)."
+            "so far is kept. Free the disk, choose another folder, or record less (record_every)."
         )
 
 

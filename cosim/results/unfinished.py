@@ -22,8 +22,7 @@ SPARE = ".unfinished"
 DID_NOT_END = "the run did not end"
 EXPLAINED = (
     f"{DID_NOT_END}: it is still going on, or its program was stopped from outside or taken along by an FMU. The rows "
-    f"are those "
-    "written until then."
+    "are those written until then."
 )
 
 

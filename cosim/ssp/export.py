@@ -172,8 +172,7 @@ class _Exporter:
         if component.recording is not None:
             raise ScenarioError(
                 f"{place}: a recording is no FMU, and a system structure package holds FMUs; export the scenario with "
-                f"the plant "
-                "that was recorded, or leave the recording out and connect its signals in the other tool."
+                "the plant that was recorded, or leave the recording out and connect its signals in the other tool."
             )
         if component.filter is not None:
             raise ScenarioError(

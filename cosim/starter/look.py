@@ -84,8 +84,7 @@ def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
     offered = " and ".join(text for key, text in kinds.items() if getattr(description, key, None) is not None)
     raise FmuLoadError(
         f"{path} offers {offered or 'no interface'} only; this master steps co-simulation FMUs. Ask its maker for an "
-        f"export for "
-        "co-simulation (most tools offer both)."
+        "export for co-simulation (most tools offer both)."
     )
 
 

@@ -91,8 +91,7 @@ def train_times(look: Look) -> tuple[float, float, str]:
     return HORIZON, STEP, "communication step"
 
 
-# -- connections
-# --------------------------------------------------------------------------------------------------------
+# -- connections ------------------------------------------------------------------------------------------------------
 
 
 def _links(roles: PlantRoles) -> list[GuessedLink]:

@@ -170,21 +170,13 @@ def box_size(part: Part, edges: Sequence[Edge]) -> Size:
 
 
 def _kind_text(part: Part) -> str:
-    """What stands below the name of a component.
-
-    Args:
-        part: component of the structure.
-    """
+    """What stands below the name of a component."""
     what = f"{part.kind}, FMI {part.fmi_version}"
     return f"{what}, {part.rate}" if part.rate else what
 
 
 def _foot_text(part: Part) -> str:
-    """How many ports are not drawn, since nothing is connected there.
-
-    Args:
-        part: component of the structure.
-    """
+    """How many ports are not drawn, since nothing is connected there."""
     inputs, outputs = (sum(not port.connected for port in ports) for ports in (part.inputs, part.outputs))
     counts = [_counted(inputs, "input"), _counted(outputs, "output")]
     texts = [text for text in counts if text]

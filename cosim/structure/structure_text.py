@@ -46,9 +46,8 @@ def _heading(structure: StructureData) -> str:
     count = round((structure.stop - structure.start) / structure.step)
     steps = "1 step" if count == 1 else f"{count} steps"
     return (
-        f"{structure.name}: {structure.title}\n"
-        f"{structure.start:g} s to {structure.stop:g} s in {steps} of {structure.step:g} s; "
-        f"{len(structure.parts)} components, {len(structure.links)} connections"
+        f"{structure.name}: {structure.title}\n{structure.start:g} s to {structure.stop:g} s in {steps} of "
+        f"{structure.step:g} s; {len(structure.parts)} components, {len(structure.links)} connections"
     )
 
 

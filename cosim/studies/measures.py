@@ -79,9 +79,6 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
 def _consistency_measures(outcome: Outcome) -> dict[str, float]:
     """How well the covariances of filters fit their errors.
 
-    Args:
-        outcome: the run.
-
     Returns:
         ``observer.nis``, ``observer.nees`` and ``observer.position_nees`` likewise for other quantities: means of the
         normalised squares over their degrees of freedom, 1 for a consistent filter, and with ``_inside`` the share of

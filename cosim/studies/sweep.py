@@ -185,11 +185,7 @@ def make_sweep(
 
 
 def _settings_text(settings: Mapping[str, Any]) -> str:
-    """Settings in one line.
-
-    Args:
-        settings: values by name.
-    """
+    """Settings in one line."""
     return ", ".join(f"{name} = {value!r}" for name, value in settings.items())
 
 

@@ -77,12 +77,7 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
 
 
 def _setting_unit(result: SweepRuns, name: str) -> str | None:
-    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none.
-
-    Args:
-        result: the runs.
-        name: what was varied.
-    """
+    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none."""
     component, _, variable = name.partition(".")
     table = result.scenario.table().components.get(component)
     if table is None:

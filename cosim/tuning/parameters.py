@@ -99,11 +99,7 @@ def tunable(scenario: Scenario, component: str | None, bounds: Mapping[str, Boun
 
 
 def _scenario_names(scenario: Scenario) -> list[str]:
-    """What the name of a setting may begin with: components and tables.
-
-    Args:
-        scenario: the scenario.
-    """
+    """What the name of a setting may begin with: components and tables."""
     return [*scenario.table().components, *TABLES]
 
 

@@ -236,9 +236,6 @@ def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, 
 def _make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[str, Any]) -> Optimiser:
     """An optimiser of a search space.
 
-    Args:
-        method: its name. space: names and bounds. seed: of its generator. options: keywords of its class.
-
     Raises:
         ScenarioError: there is none of this name, an option is unknown, or its package is not installed.
     """

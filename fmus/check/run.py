@@ -169,11 +169,7 @@ def check_count(archive: Archive) -> int:
 
 
 def _default_step(description: ModelDescription) -> float:
-    """The communication step to check with [s].
-
-    Args:
-        description: model description of the FMU.
-    """
+    """The communication step to check with [s]."""
     experiment = description.defaultExperiment
     if experiment is None:
         return _DEFAULT_STEP

@@ -137,8 +137,7 @@ def _summary(job: _BuildJob, path: Path) -> str:
     return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
 
 
-# -- what to build
-# ------------------------------------------------------------------------------------------------------
+# -- what to build ----------------------------------------------------------------------------------------------------
 
 
 def _jobs(options: argparse.Namespace) -> list[_BuildJob]:

@@ -115,11 +115,7 @@ def one_of(*arguments: Argument) -> ArgumentGroup:
 
 
 def _add_arguments(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions]) -> None:
-    """Add arguments to a parser or to a group of one.
-
-    Args:
-        parser: of argparse. arguments: in the order of the help.
-    """
+    """Add arguments to a parser or to a group of one."""
     for entry in arguments:
         entry.add_to(parser)
 

@@ -75,15 +75,13 @@ def trace_equations(system: HybridSystem) -> Equations:
     if not system.traceable:
         raise GenerationError(
             f"{system.name}: it uses Python that cannot be traced (traceable = False), so no C can be generated from "
-            f"it. "
-            "Step it as a block in Python, or export it with Python inside: fmus build ... --hosted."
+            "it. Step it as a block in Python, or export it with Python inside: fmus build ... --hosted."
         )
     traced = traced_once(system)
     if traced.digest() != TracedSystem(system).digest():
         raise GenerationError(
             f"{system.name}: its functions give other equations each time they are traced. They must depend on t, x, u "
-            f"and p "
-            "only: no random numbers, no clock, nothing kept on self; declare noise at a periodic event."
+            "and p only: no random numbers, no clock, nothing kept on self; declare noise at a periodic event."
         )
     jumps = {event.name: traced.jump(event.name) for event in system.events}
     named = {f"jump_{name}": function for name, function in jumps.items()}
@@ -134,8 +132,7 @@ def generate_model(
     return "\n".join(parts)
 
 
-# -- equations
-# ----------------------------------------------------------------------------------------------------------
+# -- equations --------------------------------------------------------------------------------------------------------
 
 
 def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Function:
@@ -177,8 +174,7 @@ def _with_room(function: ca.Function) -> str:
     return "\n".join([*lines, f"    return {function.name()}(arguments, results, iw, w, mem);", "}"])
 
 
-# -- tables
-# -------------------------------------------------------------------------------------------------------------
+# -- tables -----------------------------------------------------------------------------------------------------------
 
 
 def _start_arrays(system: HybridSystem, preset: str | None) -> str:

@@ -81,8 +81,7 @@ def build_description_xml(identifier: str, sources: Sequence[str]) -> str:
     return _document(root)
 
 
-# -- head
-# ---------------------------------------------------------------------------------------------------------------
+# -- head -------------------------------------------------------------------------------------------------------------
 
 
 def _is_2(description: ModelDescription) -> bool:
@@ -169,8 +168,7 @@ def _base_unit(unit: BaseUnit) -> dict[str, str | None]:
     return attributes
 
 
-# -- variables
-# ----------------------------------------------------------------------------------------------------------
+# -- variables --------------------------------------------------------------------------------------------------------
 
 
 def _variable_2(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
@@ -226,8 +224,7 @@ def _values(variable: ModelVariable, exchanged: bool) -> dict[str, object]:
     return values
 
 
-# -- structure
-# ----------------------------------------------------------------------------------------------------------
+# -- structure --------------------------------------------------------------------------------------------------------
 
 
 def _structure_2(root: Element, description: ModelDescription) -> None:
@@ -268,8 +265,7 @@ def _unknown(parent: Element, tag: str, key: dict[str, int], unknown: Unknown, k
     _element(parent, tag, attributes)
 
 
-# -- elements
-# -----------------------------------------------------------------------------------------------------------
+# -- elements ---------------------------------------------------------------------------------------------------------
 
 
 def _element(parent: Element, tag: str, attributes: Mapping[str, object]) -> Element:

@@ -11,11 +11,7 @@ OWN_PACKAGES = {"plant_models", "fmu_observer", "fmus", "cosim"}
 
 
 def _is_ours(system: HybridSystem) -> bool:
-    """Whether a system ships with this package; any other is its author's.
-
-    Args:
-        system: the hybrid system.
-    """
+    """Whether a system ships with this package; any other is its author's."""
     return type(system).__module__.partition(".")[0] in OWN_PACKAGES
 
 

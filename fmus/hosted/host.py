@@ -142,9 +142,6 @@ def make_hosted_block(recipe: Mapping[str, Any], resources: Path, instance_name:
 def _load_factory(recipe: Mapping[str, Any], resources: Path) -> Any:
     """The class or function of a recipe.
 
-    Args:
-        resources: folder of the FMU's resources.
-
     Raises:
         HostError: the module has no such name, or imports something that is not there.
     """

@@ -99,8 +99,7 @@ def build_hosted_fmu(
     return pack_fmu(content | _front(description), path)
 
 
-# -- parts of the file
-# --------------------------------------------------------------------------------------------------
+# -- parts of the file ------------------------------------------------------------------------------------------------
 
 
 def _pythonfmu_library(platform: Platform) -> bytes:
@@ -205,8 +204,7 @@ def _digest(source: Source, recipe: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
-# -- description
-# --------------------------------------------------------------------------------------------------------
+# -- description ------------------------------------------------------------------------------------------------------
 
 
 def _describe(recipe: Mapping[str, Any], resources: Path, digest: str) -> ModelDescription:
@@ -249,8 +247,7 @@ def _xml(description: ModelDescription) -> str:
     return model_description_xml(description).replace("<CoSimulation ", '<CoSimulation needsExecutionTool="true" ', 1)
 
 
-# -- trial
-# --------------------------------------------------------------------------------------------------------------
+# -- trial ------------------------------------------------------------------------------------------------------------
 
 
 def _try_alone(resources: Path, slave: str) -> None:

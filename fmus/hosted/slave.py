@@ -231,8 +231,7 @@ def describe_failure(host: Any, function: str, error: BaseException, t: float | 
     return text
 
 
-# -- what must be installed
-# -----------------------------------------------------------------------------------------------
+# -- what must be installed -------------------------------------------------------------------------------------------
 
 
 class Missing(RuntimeError):  # noqa: N818 - says what is the matter better than with a suffix
@@ -241,9 +240,6 @@ class Missing(RuntimeError):  # noqa: N818 - says what is the matter better than
 
 def _check_python(recipe: dict[str, Any]) -> None:
     """Refuse a Python that is too old or lacks `fmu-observer`.
-
-    Args:
-        recipe: what hosted.json holds.
 
     Raises:
         Missing: with what is needed and what was found.

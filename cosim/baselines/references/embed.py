@@ -76,8 +76,7 @@ def _demand_own(baseline: Baseline, fmu: Path) -> Component:
     if component.description.modelName != identity.model:
         raise BaselineError(
             f"{baseline.path.name} is a baseline of the model '{identity.model}' (GUID {identity.guid}); {fmu.name} is "
-            f"the model "
-            f"'{component.description.modelName}' (GUID {component.description.guid})."
+            f"the model '{component.description.modelName}' (GUID {component.description.guid})."
         )
     return component
 

@@ -152,11 +152,7 @@ def _centre(finding: ComparisonFinding) -> tuple[float, float]:
 
 
 def _worst_finding(signal: SignalComparison) -> ComparisonFinding | None:
-    """The first finding that has an instant.
-
-    Args:
-        signal: the comparison of one signal.
-    """
+    """The first finding that has an instant."""
     return next((f for f in signal.findings if np.isfinite(f.time)), None)
 
 

@@ -21,11 +21,7 @@ FLOOR = 0.1  # smallest ratio that is drawn
 
 
 def _ratio_signals(result: Result, spec: ReportSpec) -> dict[str, np.ndarray]:
-    """Residuals over their thresholds by signal name, each shape (rows,).
-
-    Args:
-        result: the run. spec: the observers.
-    """
+    """Residuals over their thresholds by signal name, each shape (rows,)."""
     starts = tuple(f"{observer}.{RATIO}" for observer in spec.observers)
     return {name: result[name] for name in result.table.dtype.names or () if starts and name.startswith(starts)}
 

@@ -132,11 +132,7 @@ def draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[st
 
 
 def _comparison_json(comparison: Comparison) -> str:
-    """The comparison as JSON, without curves.
-
-    Args:
-        comparison: what was found.
-    """
+    """The comparison as JSON, without curves."""
     return json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"
 
 
@@ -201,11 +197,7 @@ def _mood(good: bool) -> str:
 
 
 def _verdict_text(comparison: Comparison) -> str:
-    """The outcome in a sentence or two.
-
-    Args:
-        comparison: what was found.
-    """
+    """The outcome in a sentence or two."""
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
     failed, telegrams, packets = comparison.failed, comparison.events, comparison.packets
     text = f"{len(compared)} signals were compared; "

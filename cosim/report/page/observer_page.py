@@ -110,9 +110,6 @@ def _over_time(benchmark: BenchmarkScores) -> bytes | None:
 def _merged_result(benchmark: BenchmarkScores) -> Result | None:
     """One result with the columns of all observers whose rows are at the same times as those of the first one.
 
-    Args:
-        benchmark: with the runs of the observers.
-
     Returns:
         The result, or None where no run has rows.
     """

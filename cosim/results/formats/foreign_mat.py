@@ -53,11 +53,7 @@ def read_foreign_mat(path: Path) -> ResultData:
 
 
 def _read_modelica(path: str | Path) -> ResultData:
-    """Read a Modelica trajectory; see `read_foreign_mat`.
-
-    Args:
-        path: the file.
-    """
+    """Read a Modelica trajectory; see `read_foreign_mat`."""
     return read_foreign_mat(Path(path))
 
 

@@ -59,9 +59,6 @@ def _is_there(path: Path, table: np.ndarray) -> bool:
 def _read_npy(path: str | Path) -> np.ndarray:
     """Read a table written by `_write_npy`; it stays in the file, whose pages are read when they are looked at.
 
-    Args:
-        path: the file.
-
     Raises:
         ValueError: the file is not such a table.
         OSError: the file cannot be read.
