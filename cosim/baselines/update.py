@@ -72,12 +72,16 @@ def plan_update(
         except (BaselineError, ComparisonError) as error:
             notes = [*notes, str(error)]
         if before is not None and _may_stay(before, former, draft):
-            header = former.header
-            kept = replace(draft.header, rows=header.rows, events=header.events, digest=header.digest)
-            draft = BaselineDraft(kept, _text(path, ".csv"), _text(path, ".events.csv"))
+            draft = _with_former_rows(draft, former, path)
     change = change_by(draft, path)
     texts = draft_texts(draft, path) if change != "unchanged" else {}
     return Update(change, texts, check(result, _as_baseline(draft, path)), before, notes)
+
+
+def _with_former_rows(draft: BaselineDraft, former: Baseline, path: Path) -> BaselineDraft:
+    header = former.header
+    kept = replace(draft.header, rows=header.rows, events=header.events, digest=header.digest)
+    return BaselineDraft(kept, _text(path, ".csv"), _text(path, ".events.csv"))
 
 
 def _former(path: Path) -> tuple[Baseline | None, list[str]]:

@@ -173,17 +173,11 @@ def playback_scenario(
     report, balises = _roles(table, [name]), table.balises
     used = [link[0] for link in sources.values()] + [value for value in report.values() if isinstance(value, str)]
     watched = {} if balises is None else {k: v for k in ("position", "speed") if (v := getattr(balises, k)) is not None}
-    used += watched.values()
     network = table.network
-    travels = network is not None and (network.receivers is None or name in network.receivers)
-    used += network.signals if network is not None and travels else []
-    wanted = dict.fromkeys(signal.partition(".")[0] for signal in used)
-    if name in wanted and name in parts.in_loop:
-        raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
-    components: dict[str, Any] = {n: {"recording": str(folder.resolve()), "component": n} for n in wanted if n != name}
-    master = {key: value for key, value in _table(table.master).items() if key in _PLAYED_MASTER}
-    if master.get("algorithm") == "iterate":
-        del master["algorithm"]  # there is no loop any more
+    if network is not None and network.receivers is not None and name not in network.receivers:
+        network = None
+    used += [*watched.values(), *(network.signals if network is not None else ())]
+    components = _recordings(parts, folder, name, used)
     data: dict[str, Any] = {
         "title": f"{table.title}: {observer.label or name}",
         "start": table.start,
@@ -193,19 +187,30 @@ def playback_scenario(
         "certificates": "ignore",
         "components": components | {name: _table(observer)},
         "connections": [connection(link, f"{name}.{signal}") for signal, link in sources.items()],
-        "master": master,
+        "master": _played_master(table),
         "report": report,
     }
     if balises is not None:
-        data["balises"] = {
-            **watched,
-            "timing": balises.timing,
-            "layout": "recorded",
-            "file": str(folder.resolve()),
-        }
-    if travels:
+        recorded = {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
+        data["balises"] = {**watched, **recorded}
+    if network is not None:
         data["network"] = {**_table(network), "receivers": [name]}
     return _scenario(scenario, data)
+
+
+def _recordings(parts: ScenarioParts, folder: Path, name: str, used: Iterable[str]) -> dict[str, Any]:
+    """A recording in place of each component whose signals are used, but for the observer itself."""
+    wanted = dict.fromkeys(signal.partition(".")[0] for signal in used)
+    if name in wanted and name in parts.in_loop:
+        raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
+    return {n: {"recording": str(folder.resolve()), "component": n} for n in wanted if n != name}
+
+
+def _played_master(table: ScenarioTable) -> dict[str, Any]:
+    master = {key: value for key, value in _table(table.master).items() if key in _PLAYED_MASTER}
+    if master.get("algorithm") == "iterate":
+        del master["algorithm"]  # there is no loop any more
+    return master
 
 
 def connection(link: Link, target: str) -> str | dict[str, Any]:

@@ -52,10 +52,12 @@ def load_result(path: str | Path) -> Result:
     except OSError as error:
         raise OutputError(f"{source} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # whatever a broken file leads the libraries into that read it
-        text = str(error)
-        raise OutputError(
-            text if str(source) in text else f"{source} cannot be read: {text or type(error).__name__}."
-        ) from error
+        raise OutputError(_named(source, str(error) or type(error).__name__)) from error
+
+
+def _named(source: Path, text: str) -> str:
+    """What a library says, with the name of the file."""
+    return text if str(source) in text else f"{source} cannot be read: {text}."
 
 
 def _folder(folder: Path) -> ResultData:

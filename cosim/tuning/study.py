@@ -58,6 +58,7 @@ class Study:
         self.options = {name: value for name, value in options.items() if name != "gradients"}  # found out here
         self.done: list[Searched] = []
         self._bar = Bar(progress)
+        self._slopes: LikelihoodSlopes | None = None
         _make_optimiser(method, asked.space, 0, options)  # refused before anything is run
 
     def run(self, searches: int, how: str) -> Tuning:
@@ -71,7 +72,6 @@ class Study:
                 population was done; later, what was found until then is returned.
         """
         self._bar.text = "before"
-        self._slopes: LikelihoodSlopes | None = None
         before = self.evaluator.costs([None], self.training, {"search": "before"}, self._bar.step)[0]
         shown = self._directions(self._inside())
         fixed, why = self._held(shown)
@@ -89,7 +89,6 @@ class Study:
             searches=self.done,
             start=self.asked.start,
             best=self.asked.start if better is None else better,
-            seeds=self.training,
             runs=self.evaluator.runs,
             how=("as members of a batch over what the observer heard" if self.evaluator.replayed else how) + gradients,
             warnings=[*remarks, *self._warnings(shown, at_best)],
@@ -116,6 +115,7 @@ class Study:
         after = self.evaluator.costs([better], self.training, {"search": "after"}, self._bar.step)[0]
         judged = self.evaluator.costs([None, better], judging, {"search": "judge"}, self._bar.step)
         return {
+            "seeds": self.training,
             "judged": judging,
             "before": before,
             "after": after.tolist(),

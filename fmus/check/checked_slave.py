@@ -26,13 +26,7 @@ FmuSlave = FmuSlave2 | FmuSlave3
 def make_slave(
     folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
 ) -> FmuSlave:
-    """A co-simulation instance of an unpacked FMU, not yet instantiated.
-
-    Args:
-        folder: where the FMU was unpacked.
-        description: its model description.
-        name: instance name.
-        logging: whether the FMU is asked to log.
+    """A co-simulation instance of an unpacked FMU, not yet instantiated; arguments as for `FmuInstance`.
 
     Raises:
         SlaveError: the library cannot be loaded.

@@ -69,13 +69,7 @@ def compile_targets(
     """
 
     def build(target: Target) -> bytes:
-        with tempfile.TemporaryDirectory(prefix="fmus-") as name:
-            folder = Path(name)
-            for source, text in files.items():
-                (folder / source).write_bytes(text)
-            library = compile_library(
-                target.compiler, folder, sources, f"{identifier}{target.platform.extension}"
-            ).read_bytes()
+        library = _library(target, files, sources, identifier)
         if progress is not None:
             progress(target.platform.name)
         return library
@@ -84,3 +78,12 @@ def compile_targets(
         return {targets[0].platform: build(targets[0])}
     with ThreadPoolExecutor(min(len(targets), os.cpu_count() or 1)) as pool:
         return dict(zip((t.platform for t in targets), pool.map(build, targets), strict=True))
+
+
+def _library(target: Target, files: Mapping[str, bytes], sources: Sequence[str], identifier: str) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="fmus-") as name:
+        folder = Path(name)
+        for source, text in files.items():
+            (folder / source).write_bytes(text)
+        file = f"{identifier}{target.platform.extension}"
+        return compile_library(target.compiler, folder, sources, file).read_bytes()
