@@ -180,10 +180,7 @@ def playback_scenario(
     components = _recordings(parts, folder, name, used)
     data: dict[str, Any] = {
         "title": f"{table.title}: {observer.label or name}",
-        "start": table.start,
-        "stop": table.stop,
-        "step": table.step,
-        "seed": table.seed,
+        **{key: getattr(table, key) for key in ("start", "stop", "step", "seed")},
         "certificates": "ignore",
         "components": components | {name: _table(observer)},
         "connections": [connection(link, f"{name}.{signal}") for signal, link in sources.items()],
@@ -191,8 +188,7 @@ def playback_scenario(
         "report": report,
     }
     if balises is not None:
-        recorded = {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
-        data["balises"] = {**watched, **recorded}
+        data["balises"] = watched | {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
     if network is not None:
         data["network"] = {**_table(network), "receivers": [name]}
     return _scenario(scenario, data)

@@ -118,9 +118,7 @@ def rerun(
     """
     manifest = read_manifest(directory)
     _check_out(manifest, out)
-    edited = manifest.edited()
-    if edited and not trust:
-        raise ProvenanceError("\n".join([*edited, "Undo that, or say that you trust what is there now (--trust)."]))
+    edited = _edited(manifest, trust)
     scenario = _stored_scenario(manifest)
     settings = dict(overrides or {})
     for name, value in settings.items():
@@ -156,6 +154,14 @@ def _new_ones(warn: Callable[[str], None] | None, stored: Result) -> Callable[[s
             (warn or LOG.warning)(text)
 
     return warn_new
+
+
+def _edited(manifest: Manifest, trust: bool) -> list[str]:
+    """Files that were edited since, in words; refused where nobody trusts them."""
+    edited = manifest.edited()
+    if edited and not trust:
+        raise ProvenanceError("\n".join([*edited, "Undo that, or say that you trust what is there now (--trust)."]))
+    return edited
 
 
 def _demand_all_there(manifest: Manifest, settings: Mapping[str, Any]) -> None:

@@ -107,16 +107,10 @@ def report_page(
         warnings=all_warnings(result, spec),
         metrics=shown,
         errors=errors_table(shown, spec),
-        seed_count=len(mapping_entry(result, "seed_study").get("seeds", [])),
         zooms=zooms,
         figures=figures,
-        phases=phases_table(phase_details(result, spec), spec),
-        gaps=gaps_table(gap_errors(result, spec)),
-        envelope=ENVELOPE,
         counts=counts,
         telegrams=run_tables.telegrams_table(counts.outcomes, spec.labels),
-        compiled=was_compiled(result),
-        notes=list(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")]))),
         **_run_tables(result, spec),
     )
 
@@ -125,7 +119,13 @@ def _run_tables(result: Result, spec: ReportSpec) -> dict[str, Any]:
     """Tables that follow from result and roles alone, by their names in the template."""
     certificates, explained = run_tables.certificates(result, spec)
     return {
+        "seed_count": len(mapping_entry(result, "seed_study").get("seeds", [])),
         "seeds": run_tables.seeds_table(result),
+        "phases": phases_table(phase_details(result, spec), spec),
+        "gaps": gaps_table(gap_errors(result, spec)),
+        "envelope": ENVELOPE,
+        "compiled": was_compiled(result),
+        "notes": list(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")]))),
         "certificates": certificates,
         "explained": explained,
         "packets": run_tables.packets_table(result),
