@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.scenario.shipped import shipped_scenarios
     from cosim.simulation.scenario import Scenario
-    from cosim.studies.sampling import log_uniform, uniform, whole
+    from cosim.studies.sampling_plans import log_uniform, uniform, whole
     from cosim.studies.sweep import Sweep
     from cosim.studies.sweep_result import SweepResult
     from cosim.tuning.tune import tune
@@ -67,13 +67,13 @@ _HOMES = {
     "benchmark_observers": "cosim.observer_benchmark.benchmark",
     "compare": "cosim.comparison.compare",
     "load_result": "cosim.results.load_result",
-    "log_uniform": "cosim.studies.sampling",
+    "log_uniform": "cosim.studies.sampling_plans",
     "rerun": "cosim.provenance",
     "save_result": "cosim.results.save",
     "shipped_scenarios": "cosim.scenario.shipped",
     "tune": "cosim.tuning.tune",
-    "uniform": "cosim.studies.sampling",
-    "whole": "cosim.studies.sampling",
+    "uniform": "cosim.studies.sampling_plans",
+    "whole": "cosim.studies.sampling_plans",
 }
 
 

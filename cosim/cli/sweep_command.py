@@ -15,7 +15,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.results.results_folder import check_writable
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
-from cosim.studies.sampling import MOST, Range, uniform
+from cosim.studies.sampling_plans import MOST, Range, uniform
 from cosim.studies.sweep import Sweep
 from fmus.cli.commands import argument
 from fmus.cli.progress import ProgressBar

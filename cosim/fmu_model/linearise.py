@@ -17,8 +17,8 @@ from cosim.fmu_model.linearisation import Linearisation, Method
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_states
-from fmus.check.differences import RELATIVE_STEP, compare
 from fmus.check.findings import Verdict
+from fmus.check.finite_differences import RELATIVE_STEP, compare
 
 Array = NDArray[np.float64]
 HELD_TYPES = ("Real", "Float64", "Float32")

@@ -30,7 +30,7 @@ from cosim.structure.run_structure import Structure
 
 if TYPE_CHECKING:
     from cosim.components.recording_data import Interpolation
-    from cosim.studies.sampling import Mode, Range
+    from cosim.studies.sampling_plans import Mode, Range
     from cosim.studies.sweep import Sweep
 
 LOG = logging.getLogger("cosim")
@@ -322,7 +322,7 @@ class Scenario:
             values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names
                 to values.
             mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with
-                second; ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling.uniform`
+                second; ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling_plans.uniform`
                 ranges and lists.
             count: number of points, for ``latin`` and ``random``. seed: of the points.
 

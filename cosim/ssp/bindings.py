@@ -15,7 +15,7 @@ from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.package_data import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
-from cosim.ssp.parameter_values import LISTS
+from cosim.ssp.parameter_sets import LISTS
 from cosim.ssp.pipe import BOOLEANS, Pipe
 
 Scalar = float | str

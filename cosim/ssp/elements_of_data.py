@@ -11,7 +11,7 @@ from lxml import etree
 
 from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
 from cosim.ssp.document import NAMESPACES, Node
-from cosim.ssp.parameter_values import LISTS
+from cosim.ssp.parameter_sets import LISTS
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit
 
 TOOL = "fmu-observer"

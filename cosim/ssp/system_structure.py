@@ -23,7 +23,7 @@ from cosim.ssp.package_data import (
     SsdStructure,
     SystemElement,
 )
-from cosim.ssp.parameter_values import read_mapping, read_parameter_set
+from cosim.ssp.parameter_sets import read_mapping, read_parameter_set
 from cosim.ssp.step_annotations import read_step
 
 FMU = "application/x-fmu-sharedlibrary"

@@ -6,7 +6,7 @@ from typing import Any
 
 from cosim.starter.guess import Guess
 from cosim.starter.look import Look
-from cosim.starter.signal_roles import ObserverRoles
+from cosim.starter.starter_roles import ObserverRoles
 from cosim.starter.toml_lines import GuessedLink, guessed, one_line
 from cosim.starter.train_starter import train_times
 

@@ -12,8 +12,8 @@ from cosim.simulation.scenario import Scenario
 from cosim.starter.alone import alone
 from cosim.starter.look import Look, look_into
 from cosim.starter.observer import observer_beside
-from cosim.starter.signal_roles import PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.starter_file import render
+from cosim.starter.starter_roles import PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.toml_lines import LISTED, one_line
 from cosim.starter.train_starter import DEFAULT_OBSERVER, declared_observer, train
 from fmu_observer import OBSERVERS

@@ -9,7 +9,7 @@ from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import step_count
 from cosim.starter.guess import Guess, fits
 from cosim.starter.look import Look, number
-from cosim.starter.signal_roles import PlantRoles
+from cosim.starter.starter_roles import PlantRoles
 from cosim.starter.toml_lines import GuessedLink, guessed, one_line
 from fmus.fmi.capabilities import read_capabilities
 

@@ -16,7 +16,7 @@ from cosim.run.starts import start_values
 from cosim.scenario.override import CASE
 from cosim.studies.measures import Measure, error_measures, own_measures
 from cosim.studies.runnable import RunnableScenario
-from cosim.studies.sampling import Mode, Range, Variation, variations
+from cosim.studies.sampling_plans import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import run_folder, write_index, write_run
 from cosim.studies.sweep_journal import SweepJournal
 from cosim.studies.sweep_result import SweepResult

@@ -16,7 +16,7 @@ from cosim.errors import OutputError
 from cosim.results.summary_file import jsonable, restored
 from cosim.scenario.saving import scenario_text
 from cosim.studies.runnable import RunnableScenario
-from cosim.studies.sampling import Variation
+from cosim.studies.sampling_plans import Variation
 from cosim.studies.sweep_runs import SweepRun
 from plant_models.user_file import option_files
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmus.check.differences import compare
 from fmus.check.findings import CheckOutcome, Verdict
+from fmus.check.finite_differences import compare
 
 CURVES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
     "sine": (np.sin, np.cos),

@@ -29,7 +29,7 @@ from cosim.results.result import Result
 from cosim.scenario.fmu_alone import run_times
 from cosim.ssp.document import parse
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.parameter_values import read_parameter_set
+from cosim.ssp.parameter_sets import read_parameter_set
 
 COMPONENT = "fmu"
 """What the component of an FMU alone is called, see `Scenario.fmu`."""

@@ -9,8 +9,8 @@ import numpy as np
 from fmus.check.check import LIMIT, Check
 from fmus.check.checks.life_checks import real_names
 from fmus.check.context import Context
-from fmus.check.differences import compare
 from fmus.check.findings import CheckOutcome, skipped
+from fmus.check.finite_differences import compare
 from fmus.check.runner import WARM_UP_STEPS
 
 

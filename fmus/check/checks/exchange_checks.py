@@ -11,9 +11,9 @@ from fmus.check.check import DISTRUST, LIMIT, MISSING, Check
 from fmus.check.checks.derivative_checks import nominal_of
 from fmus.check.checks.life_checks import by, exported_symbols, listed, not_finite, real_names
 from fmus.check.context import Context
-from fmus.check.differences import compare
 from fmus.check.exchange_model import FmuModel
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
+from fmus.check.finite_differences import compare
 from fmus.fmi.standard import MODEL_EXCHANGE
 
 _NO_STATES = "has no continuous states"

@@ -16,7 +16,7 @@ from cosim.errors import ComparisonError, CosimError, OutputError, RunError, Sce
 from cosim.master.master import Master
 from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
-from cosim.studies.sampling import uniform
+from cosim.studies.sampling_plans import uniform
 from cosim.studies.seed_rows import seed_file
 from cosim.studies.seed_runs import seed_study
 from cosim.studies.sweep_result import SweepResult
