@@ -322,8 +322,8 @@ class Scenario:
             values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names
                 to values.
             mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with
-                second; ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling_plans.uniform`
-                ranges and lists.
+                second; ``latin`` (Latin hypercube) and ``random``: `count` points of
+                `cosim.studies.sampling_plans.uniform` ranges and lists.
             count: number of points, for ``latin`` and ``random``. seed: of the points.
 
         Raises:
