@@ -179,8 +179,7 @@ def stacked_of(values: Any, signals: Sequence[Signal], prefix: str = "") -> Arra
     Args:
         values: named tuple, of states, inputs or parameters. signals: which ones. prefix: before each name.
     """
-    found = ((getattr(values, f"{prefix}{s.name}"), s.size) for s in signals)
-    return stacked(tuple(v if n is None else v[i] for v, n in found for i in range(1 if n is None else n)))
+    return stacked(tuple(v for s in signals for v in s.entries(getattr(values, f"{prefix}{s.name}"))))
 
 
 def named_as(signals: Sequence[Signal], values: Iterable[Array], prefix: str = "") -> dict[str, Array]:

@@ -37,9 +37,7 @@ def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
     for signal in signals:
         low = -float_info.max if signal.min is None else signal.min
         high = float_info.max if signal.max is None else signal.max
-        values = getattr(p, signal.name)
-        for i, name in enumerate(signal.scalar_names):
-            value = values if signal.size is None else values[i]
+        for name, value in zip(signal.scalar_names, signal.entries(getattr(p, signal.name)), strict=True):
             needed[f"{name} must be {signal.bounds}"] = np.where(value >= low, np.where(value <= high, 1.0, 0.0), 0.0)
     return needed
 

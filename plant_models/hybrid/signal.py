@@ -7,7 +7,7 @@ This file imports NumPy, and the warning that an output may carry.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from keyword import iskeyword
 from typing import Any, Literal
 
@@ -34,7 +34,8 @@ class Signal:
         max: largest legal value [unit], or None.
         description: one line for the user.
         size: None for a scalar, else the number of elements of a vector, named ``name[1]`` ... ``name[size]``.
-        shape: of a state that is a matrix, (rows, columns); outside it is a vector of its entries, row by row.
+        shape: of a state or parameter that is a matrix, (rows, columns); outside it is a vector of its entries, row by
+            row.
         symmetric: whether that vector holds the upper triangle alone.
         display_unit: unit to show at the user's edge, e.g. ``km/h``.
         integer: a whole number to the outside; only a discrete output can be one.
@@ -77,8 +78,8 @@ class Signal:
             raise ValueError(
                 f"Signal {self.name!r} can be missing; only an input, or an output that is no integer, is."
             )
-        if self.shape is not None and self.causality != "local":
-            raise ValueError(f"Signal {self.name!r} has the shape {self.shape}; only a state can be a matrix.")
+        if self.shape is not None and self.causality not in ("local", "parameter"):
+            raise ValueError(f"Signal {self.name!r} has the shape {self.shape}; only a state or parameter is a matrix.")
         if not self.name.isidentifier():
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
@@ -110,6 +111,19 @@ class Signal:
             return (self.name,)
         return tuple(f"{self.name}[{i + 1}]" for i in range(self.size))
 
+    def entries(self, value: Any) -> list[Any]:
+        """The numbers of a value, in the order of `scalar_names`.
+
+        Args:
+            value: of the shape `dimensions`; in a batch with the members as last dimension.
+        """
+        if self.size is None:
+            return [value]
+        if self.shape is None:
+            return [value[i] for i in range(self.size)]
+        rows, columns = self.shape
+        return [value[i, j] for i in range(rows) for j in range(i if self.symmetric else 0, columns)]
+
     @property
     def bounds(self) -> str:
         """Which values are legal, in words."""
@@ -138,14 +152,17 @@ def state(
 
     Args:
         name: of the signal. unit: SI, as FMI writes units (``m/s2``).
-        start: initial value, one for all elements; a sequence for vectors, an array of `shape` for matrices.
+        start: initial value, one for all elements; a sequence for vectors; for a matrix an array of `shape`, a row for
+            all rows, or the sequence of all entries as they stand outside.
         description: one line. size: number of elements of a vector, None for a scalar or a matrix.
         shape: of a matrix, (rows, columns). symmetric: whether only its upper triangle is a state.
 
     Raises:
         ValueError: see `Signal`; or a symmetric state is no square matrix, or its start is not symmetric.
     """
-    return _local(name, unit, start, description, "continuous", size, shape, symmetric)
+    first, count = _entries(name, start, size, shape, symmetric)
+    kept: dict[str, Any] = {"description": description, "size": count, "shape": shape, "symmetric": symmetric}
+    return Signal(name, unit, "local", "continuous", first, **kept)
 
 
 def memory(
@@ -158,43 +175,9 @@ def memory(
     shape: tuple[int, int] | None = None,
     symmetric: bool = False,
 ) -> Signal:
-    """A discrete state: constant between events, changes only in jumps.
-
-    Args:
-        name: of the signal. unit: SI, as FMI writes units (``m/s2``).
-        start: initial value, one for all elements; a sequence for vectors, an array of `shape` for matrices.
-        description: one line. size: number of elements of a vector, None for a scalar or a matrix.
-        shape: of a matrix, (rows, columns). symmetric: whether only its upper triangle is a state.
-
-    Raises:
-        ValueError: see `state`.
-    """
-    return _local(name, unit, start, description, "discrete", size, shape, symmetric)
-
-
-def _local(
-    name: str,
-    unit: str,
-    start: Start | np.ndarray,
-    description: str,
-    variability: Variability,
-    size: int | None,
-    shape: tuple[int, int] | None,
-    symmetric: bool,
-) -> Signal:
-    if shape is None:
-        if symmetric:
-            raise ValueError(f"State {name!r} is symmetric; give its shape (n, n).")
-        first = tuple(start.tolist()) if isinstance(start, np.ndarray) else start
-        return Signal(name, unit, "local", variability, first, description=description, size=size)
-    rows, columns = shape
-    matrix = np.array(np.broadcast_to(start, shape), dtype=float)
-    if symmetric and (rows != columns or not np.array_equal(matrix, matrix.T)):
-        raise ValueError(f"State {name!r} is symmetric; expected a square shape and start, got {shape}, {start}.")
-    entries = matrix[np.triu_indices(rows)] if symmetric else matrix.ravel()
-    first = tuple(entries.tolist())
-    kept: dict[str, Any] = {"description": description, "size": len(first), "shape": shape, "symmetric": symmetric}
-    return Signal(name, unit, "local", variability, first, **kept)
+    """A discrete state: constant between events, changes only in jumps; all else as of a `state`."""
+    flowing = state(name, unit, start, description, size=size, shape=shape, symmetric=symmetric)
+    return replace(flowing, variability="discrete")
 
 
 def input_signal(
@@ -260,13 +243,15 @@ def discrete_output(name: str, unit: str, description: str = "", **further: Any)
 def parameter(
     name: str,
     unit: str,
-    start: Start,
+    start: Start | np.ndarray,
     description: str = "",
     *,
     min: float | None = None,
     max: float | None = None,
     variability: Variability = "fixed",
     size: int | None = None,
+    shape: tuple[int, int] | None = None,
+    symmetric: bool = False,
     display_unit: str | None = None,
 ) -> Signal:
     """A parameter: fixed after initialisation, or tunable between steps.
@@ -274,9 +259,33 @@ def parameter(
     Args:
         name: of the signal. unit: SI, as FMI writes units. start: default. description: one line.
         min, max: bounds, refused beyond them; None for none. variability: ``fixed`` or ``tunable``.
-        size: number of elements, None for a scalar. display_unit: for the user's edge.
+        size: number of elements, None for a scalar or a matrix. shape, symmetric: see `state`.
+        display_unit: for the user's edge.
     """
-    return Signal(name, unit, "parameter", variability, start, min, max, description, size, display_unit)
+    first, count = _entries(name, start, size, shape, symmetric)
+    kept = (first, min, max, description, count, display_unit)
+    return Signal(name, unit, "parameter", variability, *kept, shape=shape, symmetric=symmetric)
+
+
+def _entries(
+    name: str, start: Start | np.ndarray, size: int | None, shape: tuple[int, int] | None, symmetric: bool
+) -> tuple[Start, int | None]:
+    """Start values as they stand outside, and how many; None for a scalar."""
+    if shape is None:
+        if symmetric:
+            raise ValueError(f"Signal {name!r} is symmetric; give its shape (n, n).")
+        return tuple(start.tolist()) if isinstance(start, np.ndarray) else start, size
+    rows, columns = shape
+    asymmetric = f"Signal {name!r} is symmetric; expected a square shape and start, got {shape}, {start}."
+    if symmetric and rows != columns:
+        raise ValueError(asymmetric)
+    count = rows * (rows + 1) // 2 if symmetric else rows * columns
+    if np.shape(start) == (count,):
+        return tuple(np.asarray(start, dtype=float).tolist()), count
+    matrix = np.array(np.broadcast_to(start, shape), dtype=float)
+    if symmetric and not np.array_equal(matrix, matrix.T):
+        raise ValueError(asymmetric)
+    return tuple((matrix[np.triu_indices(rows)] if symmetric else matrix.ravel()).tolist()), count
 
 
 def scalar_names(signals: Sequence[Signal]) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ This file knows signals and events, and nothing of FMI, masters or files.
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -18,8 +18,7 @@ from plant_models.hybrid.arrays import Array, of_length, vector
 from plant_models.hybrid.declaration_checks import check_declarations
 from plant_models.hybrid.declarations import Declarations, Method
 from plant_models.hybrid.missing import is_there, or_else
-from plant_models.hybrid.signal import Signal
-from plant_models.hybrid.state_layout import StateLayout
+from plant_models.hybrid.signal_layout import SignalLayout
 
 __all__ = ["Array", "HybridSystem", "Method", "vector"]
 
@@ -127,11 +126,11 @@ class HybridSystem(Declarations):
         Args:
             held_switches: values of the switches, shape (k,); None where the system has none.
         """
-        return self._input_type(*_split(values, self.input_signals), held_switches)
+        return self._input_type(*self._input_places.values(values), held_switches)
 
     def unpack_parameters(self, values: Array) -> Any:
         """Named tuple `p` from the flat array, shape (k,) or (k, members)."""
-        return self._parameter_type(*_split(values, self.parameter_signals))
+        return self._parameter_places.named(values)
 
     def state_derivative(self, t: Array, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> Array:
         """`flow` on flat arrays: derivatives of the continuous states, shape (nc,).
@@ -153,10 +152,7 @@ class HybridSystem(Declarations):
         if missing or len(values) != len(self.outputs):
             extra = sorted(set(values) - {s.name for s in self.outputs})
             raise ValueError(f"{self.name}: output() leaves out {missing} and returns undeclared {extra}.")
-        parts: list[Array] = []
-        for signal in self.outputs:
-            value = values[signal.name]
-            parts.extend([value] if signal.size is None else [value[i] for i in range(signal.size)])
+        parts = [part for signal in self.outputs for part in signal.entries(values[signal.name])]
         return vector(*parts) if parts else np.zeros(0)
 
     def jump_vector(self, event: str, t: Array, x: Array, u: Array, p: Array) -> Array:
@@ -166,7 +162,7 @@ class HybridSystem(Declarations):
             return self._jumped(event, t, x, given, unpacked)
         count, sampled = self.state_count - 1, self._sampling.get(event)
         names = () if sampled is None else sampled.samples
-        values = [value for name in names for value in _parts(getattr(given, name), self._widths[name])]
+        values = [value for name in names for value in self._sampled[name].entries(getattr(given, name))]
         lacking = sum(1.0 - is_there(value) for value in values)
         whole = sampled is not None and not sampled.leaves_out
         if whole:
@@ -219,35 +215,25 @@ class HybridSystem(Declarations):
         return self._own_places.flat(changed, f"{self.name}: jump({event!r})", own.shape[1:], own)
 
     @cached_property
-    def _own_places(self) -> StateLayout:
-        return StateLayout(self.states[:-1] if self._sampling else self.states)
+    def _own_places(self) -> SignalLayout:
+        return SignalLayout(self.states[:-1] if self._sampling else self.states)
 
     @cached_property
-    def _flowing_places(self) -> StateLayout:
-        return StateLayout([s for s in self.states if s.variability == "continuous"])
+    def _flowing_places(self) -> SignalLayout:
+        return SignalLayout([s for s in self.states if s.variability == "continuous"])
 
     @cached_property
-    def _all_places(self) -> StateLayout:
-        return StateLayout(self.states)
+    def _all_places(self) -> SignalLayout:
+        return SignalLayout(self.states)
 
     @cached_property
     def _input_type(self) -> Any:
         return namedtuple("Inputs", [*(s.name for s in self.input_signals), "held_switches"], defaults=[None])
 
     @cached_property
-    def _parameter_type(self) -> Any:
-        return namedtuple("Parameters", [s.name for s in self.parameter_signals])
+    def _input_places(self) -> SignalLayout:
+        return SignalLayout(self.input_signals)
 
-
-def _parts(value: Array, size: int | None) -> list[Array]:
-    """The elements of a signal's value; of a scalar the value alone."""
-    return [value] if size is None else [value[i] for i in range(size)]
-
-
-def _split(values: Array, signals: Sequence[Signal]) -> list[Array]:
-    parts: list[Array] = []
-    position = 0
-    for signal in signals:
-        parts.append(values[position] if signal.size is None else values[position : position + signal.size])
-        position += signal.width
-    return parts
+    @cached_property
+    def _parameter_places(self) -> SignalLayout:
+        return SignalLayout(self.parameter_signals, "Parameters")

@@ -4,13 +4,10 @@ three. Pure functions that CasADi can trace.
 Where ``P F + F' P + 2 m P <= 0`` holds for ``de = F e + w``, the level ``W = sqrt(e' P e)`` obeys
 ``dW <= -m W + |w|_P``. It needs no factor beta, neither at its start nor at a sample: a sample leaves e as it is. Only
 where one component is told the norm is left: ``|C e| <= sqrt(C inv(P) C') W``.
-
-P is packed: its entries 11, 12, 13, 22, 23, 33.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,34 +15,13 @@ import numpy as np
 from plant_models.hybrid.system import Array
 
 _ORDER = 3
-PACKED = 6  # entries of a symmetric matrix of that order
-
-
-def packed(P: np.ndarray) -> tuple[float, ...]:
-    """Entries 11, 12, 13, 22, 23, 33.
-
-    Args:
-        P: symmetric, shape (3, 3).
-    """
-    return tuple(float(P[i, j]) for i in range(_ORDER) for j in range(i, _ORDER))
-
-
-def unpacked(entries: Sequence[float]) -> np.ndarray:
-    """The symmetric matrix, shape (3, 3).
-
-    Args:
-        entries: of `packed`, shape (6,).
-    """
-    P = np.zeros((_ORDER, _ORDER))
-    P[np.triu_indices(_ORDER)] = np.asarray(entries, dtype=float)
-    return P + np.triu(P, 1).T
 
 
 def level(P: Any, a: Array, b: Array, c: Array) -> Array:
     """``sqrt(z' P z)`` of ``z = (a, b, c)``.
 
     Args:
-        P: packed, shape (6,). a, b, c: components of z.
+        P: symmetric, shape (3, 3). a, b, c: components of z.
     """
     return np.sqrt(np.maximum(level_squared(P, a, b, c), 0.0))
 
@@ -54,16 +30,17 @@ def level_squared(P: Any, a: Array, b: Array, c: Array) -> Array:
     """``z' P z`` of ``z = (a, b, c)``.
 
     Args:
-        P: packed, shape (6,). a, b, c: components of z.
+        P: symmetric, shape (3, 3). a, b, c: components of z.
     """
-    return a * (P[0] * a + 2.0 * (P[1] * b + P[2] * c)) + b * (P[3] * b + 2.0 * P[4] * c) + P[5] * c * c
+    p11, p12, p13, p22, p23, p33 = _upper(P)
+    return a * (p11 * a + 2.0 * (p12 * b + p13 * c)) + b * (p22 * b + 2.0 * p23 * c) + p33 * c * c
 
 
 def level_of_box(P: Any, a: Array, b: Array, c: Array) -> Array:
     """Largest level of all errors with components up to a, b and c in size: that of the worst corner of the box.
 
     Args:
-        P: packed, shape (6,). a, b, c: largest sizes of the components, none negative.
+        P: symmetric, shape (3, 3). a, b, c: largest sizes of the components, none negative.
     """
     corners = [level_squared(P, a, x, y) for x, y in ((b, c), (b, -c), (-b, c), (-b, -c))]
     return np.sqrt(np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3])))
@@ -73,10 +50,10 @@ def first_component(P: Any) -> Array:
     """``sqrt(C inv(P) C')`` with ``C = [1 0 0]``: the largest first component of an error of level 1.
 
     Args:
-        P: packed, shape (6,), positive definite.
+        P: symmetric, shape (3, 3), positive definite.
     """
-    minor = P[3] * P[5] - P[4] * P[4]
-    determinant = _determinant(P)
+    minor = P[1, 1] * P[2, 2] - P[1, 2] * P[1, 2]
+    determinant = _determinant(*_upper(P))
     return np.sqrt(np.maximum(minor, 0.0) / np.where(determinant > 0.0, determinant, 1.0))
 
 
@@ -85,10 +62,10 @@ def decay_proven(P: Any, a11: Array, gain: Any, m: Array) -> Array:
     ``F = [[a11, -1, 0], [-k2, 0, 1], [-k3, 0, 0]]``, by the signs of leading minors.
 
     Args:
-        P: packed, shape (6,). a11: entry of F [1/s], ``-drag slope - k1``. gain: (k2, k3). m: decay rate [1/s].
+        P: symmetric, shape (3, 3). a11: entry of F [1/s], ``-drag slope - k1``. gain: (k2, k3). m: decay rate [1/s].
     """
     k2, k3 = gain
-    p11, p12, p13, p22, p23, p33 = (P[i] for i in range(PACKED))
+    p11, p12, p13, p22, p23, p33 = upper = _upper(P)
     # entries of P F, row by row
     f11, f12, f13 = p11 * a11 - p12 * k2 - p13 * k3, -p11, p12
     f21, f22, f23 = p12 * a11 - p22 * k2 - p23 * k3, -p12, p22
@@ -101,13 +78,18 @@ def decay_proven(P: Any, a11: Array, gain: Any, m: Array) -> Array:
         -(f23 + f32 + 2.0 * m * p23),
         -2.0 * (f33 + m * p33),
     )
-    return _positive_definite(P) * _positive_definite(Q)
+    return _positive_definite(*upper) * _positive_definite(*Q)
 
 
-def _positive_definite(P: Any) -> Array:
-    first, second, third = P[0], P[0] * P[3] - P[1] * P[1], _determinant(P)
-    return np.where(first > 0.0, 1.0, 0.0) * np.where(second > 0.0, 1.0, 0.0) * np.where(third > 0.0, 1.0, 0.0)
+def _upper(P: Any) -> tuple[Array, ...]:
+    """Entries 11, 12, 13, 22, 23, 33."""
+    return tuple(P[i, j] for i in range(_ORDER) for j in range(i, _ORDER))
 
 
-def _determinant(P: Any) -> Array:
-    return P[0] * (P[3] * P[5] - P[4] * P[4]) - P[1] * (P[1] * P[5] - P[4] * P[2]) + P[2] * (P[1] * P[4] - P[3] * P[2])
+def _positive_definite(p11: Array, p12: Array, p13: Array, p22: Array, p23: Array, p33: Array) -> Array:
+    second, third = p11 * p22 - p12 * p12, _determinant(p11, p12, p13, p22, p23, p33)
+    return np.where(p11 > 0.0, 1.0, 0.0) * np.where(second > 0.0, 1.0, 0.0) * np.where(third > 0.0, 1.0, 0.0)
+
+
+def _determinant(p11: Array, p12: Array, p13: Array, p22: Array, p23: Array, p33: Array) -> Array:
+    return p11 * (p22 * p33 - p23 * p23) - p12 * (p12 * p33 - p23 * p13) + p13 * (p12 * p23 - p22 * p13)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from plant_models.hybrid import memory
-from plant_models.hybrid.state_layout import StateLayout
+from plant_models.hybrid.signal_layout import SignalLayout
 from plant_models.hybrid.system import Array
 
 
@@ -68,9 +68,9 @@ class RowLayout:
         return self._columns.flat(row._asdict(), "a row")
 
     @cached_property
-    def _columns(self) -> StateLayout:
+    def _columns(self) -> SignalLayout:
         sizes = {"inputs": self.inputs, "measured": self.measurements, "used": self.measurements}
-        return StateLayout([memory(name, "1", size=sizes.get(name)) for name in WindowRow._fields])
+        return SignalLayout([memory(name, "1", size=sizes.get(name)) for name in WindowRow._fields])
 
     def count(self, rows: Array) -> Array:
         """How many rows have a measurement, shape (1,).

@@ -83,8 +83,8 @@ def unknown_level(p: Any) -> Array:
     Args:
         p: parameters, as in `HybridSystem.flow`.
     """
-    P = p.lyapunov_matrix
-    return np.sqrt(P[0]) * p.unknown_acceleration + np.sqrt(P[3]) * p.unknown_jerk + np.sqrt(P[5]) * p.unknown_jerk_rate
+    p11, p22, p33 = (p.lyapunov_matrix[i, i] for i in range(3))
+    return np.sqrt(p11) * p.unknown_acceleration + np.sqrt(p22) * p.unknown_jerk + np.sqrt(p33) * p.unknown_jerk_rate
 
 
 def position_error(a11: float, p: Any) -> ImpulsiveError:

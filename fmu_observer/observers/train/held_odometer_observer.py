@@ -14,7 +14,7 @@ import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.bounds import ErrorBounds
-from fmu_observer.certificates.bounds.carried import PACKED, first_component, level, level_of_box, unpacked
+from fmu_observer.certificates.bounds.carried import first_component, level, level_of_box
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.observers.innovation_gate import known_accuracy
@@ -143,7 +143,14 @@ class HeldOdometerObserver(TrainObserver):
         parameter("rate_decay_time", "s", 1.0, "Time in which the rate decays while speed is predicted", min=1e-3),
         parameter("start_speed_error", "m/s", 50.0, "Largest speed error before the first sample", min=0.0),
         parameter("start_position_error", "m", 0.0, "Largest position error at the start", min=0.0),
-        parameter("lyapunov_matrix", "1", REPAIRED["lyapunov_matrix"], "P: 11, 12, 13, 22, 23, 33", size=PACKED),
+        parameter(
+            "lyapunov_matrix",
+            "1",
+            REPAIRED["lyapunov_matrix"],
+            "P: 11, 12, 13, 22, 23, 33",
+            shape=(3, 3),
+            symmetric=True,
+        ),
         parameter("bound_decay", "1/s", REPAIRED["bound_decay"], "Decay rate of the error that P proves", min=1e-6),
         parameter("speed_max", "m/s", 50.0, "Speed up to which the carried bound holds", min=1e-3),
         parameter("bound_min_speed", "m/s", 0.5, "Speed below which the train may stand still", min=0.0),
@@ -197,7 +204,7 @@ class HeldOdometerObserver(TrainObserver):
         standing = stands(speed, x.held_speed, x.held_error)
         drifts = rate + p.gain[1] * residual, p.gain[2] * residual - decay
         P = p.lyapunov_matrix
-        own = np.sqrt(P[0]) * np.where(speed > 0.0, 0.0, holding) + np.sqrt(P[5]) * np.abs(decay)
+        own = np.sqrt(P[0, 0]) * np.where(speed > 0.0, 0.0, holding) + np.sqrt(P[2, 2]) * np.abs(decay)
         drift, rate_drift = held_disturbance(standing, *drifts, rate, 1.0 / p.rate_decay_time)
         return {
             "estimated_position": speed,
@@ -336,7 +343,7 @@ class HeldOdometerObserver(TrainObserver):
             sample_error=float(p.published_sample_error),
             noise=float(p.odometer_error),
             disturbances=tuple(map(float, unknown)),  # type: ignore[arg-type]
-            P=unpacked(p.lyapunov_matrix),
+            P=p.lyapunov_matrix,
             decay=float(p.bound_decay),
             drifts=[error_matrix(a11, p) for a11 in slopes],
             gains=gains,

@@ -1,13 +1,13 @@
-"""Where each state stands in the flat array ``x`` of solvers: from there to a named tuple and back.
+"""Where each signal stands in the flat arrays ``x``, ``u``, ``p`` of solvers: from there to a named tuple and back.
 
-A matrix is a state with two dimensions; a symmetric one stands there as its upper triangle, row by row. Equations see
-names and shapes alone. It knows signals and NumPy, and nothing of systems.
+A matrix has two dimensions; a symmetric one stands there as its upper triangle, row by row. Equations see names and
+shapes alone. It knows signals and NumPy, and nothing of systems.
 """
 
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ NUMBERS = (int, float, np.generic, np.ndarray)
 
 
 class _Place(NamedTuple):
-    """Where a state stands.
+    """Where a signal stands.
 
     Attributes:
         first, end: in the flat array. shape: as the equations see it, () for a scalar. read: places in the flat array
@@ -36,15 +36,15 @@ class _Place(NamedTuple):
     written: list[int] | None
 
 
-class StateLayout:
-    """The places of some states, in the order of their declaration.
+class SignalLayout:
+    """The places of some signals, in the order of their declaration.
 
     Args:
-        signals: the states.
+        signals: states, inputs or parameters. kind: which of these, for messages.
     """
 
-    def __init__(self, signals: Sequence[Signal]) -> None:
-        self.signals = tuple(signals)
+    def __init__(self, signals: Sequence[Signal], kind: str = "States") -> None:
+        self.signals, self.kind = tuple(signals), kind
         self.width = width(self.signals)
         self._places: dict[str, _Place] = {}
         first = 0
@@ -53,7 +53,7 @@ class StateLayout:
             first += signal.width
 
     def named(self, flat: Array) -> Any:
-        """Named tuple of the states.
+        """Named tuple of the values.
 
         Args:
             flat: shape (n,), or (n, members) for a batch.
@@ -62,7 +62,15 @@ class StateLayout:
             By name: a scalar as it stands in `flat`; a vector or matrix in its shape, in a batch with the members as
             last dimension.
         """
-        return self._type._make(_read(flat, place) for place in self._places.values())
+        return self._type._make(self.values(flat))
+
+    def values(self, flat: Array) -> Iterator[Array]:
+        """What `named` gives by name, in order.
+
+        Args:
+            flat: see `named`.
+        """
+        return (_read(flat, place) for place in self._places.values())
 
     def flat(self, values: Any, what: str, members: tuple[int, ...] = (), before: Array = None) -> Array:
         """The flat array of values by name, shape (n,), or (n, members) for a batch.
@@ -99,7 +107,7 @@ class StateLayout:
 
     @cached_property
     def _type(self) -> Any:
-        return namedtuple("States", list(self._places))
+        return namedtuple(self.kind, list(self._places))
 
 
 def _place(signal: Signal, first: int) -> _Place:

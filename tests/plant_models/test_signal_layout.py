@@ -1,4 +1,4 @@
-"""States by name: from the flat array to names and shapes and back, whatever is declared, alone and in batches."""
+"""Signals by name: from the flat array to names and shapes and back, whatever is declared, alone and in batches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, Signal, memory, output_signal, parameter, state
-from plant_models.hybrid.state_layout import StateLayout
+from plant_models.hybrid.requirements import unfulfilled, within_bounds
+from plant_models.hybrid.signal_layout import SignalLayout
 from plant_models.hybrid.system import Array
 from plant_models.hybrid.tracing import TracedSystem
 
@@ -28,13 +29,13 @@ def declared(number: int, kind: str, n: int, m: int) -> Signal:
 
 
 @st.composite
-def layouts(draw: st.DrawFn) -> StateLayout:
+def layouts(draw: st.DrawFn) -> SignalLayout:
     kinds = draw(st.lists(st.tuples(PLACES, st.integers(1, 4), st.integers(1, 4)), min_size=1, max_size=6))
-    return StateLayout([declared(k, *kind) for k, kind in enumerate(kinds)])
+    return SignalLayout([declared(k, *kind) for k, kind in enumerate(kinds)])
 
 
 @given(layouts(), st.sampled_from([(), (1,), (3,)]), st.integers(0, 2**32 - 1))
-def test_what_is_named_and_flattened_again_is_the_same(layout: StateLayout, members: Any, seed: int) -> None:
+def test_what_is_named_and_flattened_again_is_the_same(layout: SignalLayout, members: Any, seed: int) -> None:
     flat = np.random.default_rng(seed).standard_normal((layout.width, *members))
     named = layout.named(flat)
     for signal, value in zip(layout.signals, named, strict=True):
@@ -42,10 +43,12 @@ def test_what_is_named_and_flattened_again_is_the_same(layout: StateLayout, memb
         if signal.symmetric:
             np.testing.assert_array_equal(value, np.swapaxes(value, 0, 1))
     np.testing.assert_array_equal(layout.flat(named._asdict(), "it", members), flat)
+    entries = [entry for signal, value in zip(layout.signals, named, strict=True) for entry in signal.entries(value)]
+    np.testing.assert_array_equal(entries, flat)
 
 
 @given(layouts(), st.sampled_from([(), (3,)]), st.data())
-def test_what_is_not_named_is_kept(layout: StateLayout, members: Any, data: st.DataObject) -> None:
+def test_what_is_not_named_is_kept(layout: SignalLayout, members: Any, data: st.DataObject) -> None:
     before = np.arange(float(layout.width * 3))[: layout.width * (members or (1,))[0]].reshape(layout.width, *members)
     changed = data.draw(st.sets(st.sampled_from([s.name for s in layout.signals])))
     values = {name: np.full(getattr(layout.named(before), name).shape, -1.0) for name in changed}
@@ -55,7 +58,7 @@ def test_what_is_not_named_is_kept(layout: StateLayout, members: Any, data: st.D
 
 
 @given(layouts(), st.integers(0, 2**32 - 1))
-def test_symbols_are_laid_out_as_numbers_are(layout: StateLayout, seed: int) -> None:
+def test_symbols_are_laid_out_as_numbers_are(layout: SignalLayout, seed: int) -> None:
     flat = np.random.default_rng(seed).standard_normal(layout.width)
     symbols = ca.ArrayInterface.SX(ca.SX.sym("x", layout.width), shape=(layout.width,))
     doubled = layout.flat({name: 2.0 * value for name, value in layout.named(symbols)._asdict().items()}, "it")
@@ -65,11 +68,11 @@ def test_symbols_are_laid_out_as_numbers_are(layout: StateLayout, seed: int) -> 
 
 @pytest.mark.parametrize("members", [(), (4,)])
 def test_of_no_states_nothing_is_left(members: tuple[int, ...]) -> None:
-    assert StateLayout(()).flat({}, "flow()", members).shape == (0, *members)
+    assert SignalLayout(()).flat({}, "flow()", members).shape == (0, *members)
 
 
 def test_a_constant_is_the_same_for_all_members() -> None:
-    layout = StateLayout([state("a", "1"), state("b", "1", size=2), state("c", "1")])
+    layout = SignalLayout([state("a", "1"), state("b", "1", size=2), state("c", "1")])
     flat = layout.flat({"a": np.array([1.0, 2.0]), "b": np.array([[3.0, 3.0], [4.0, 4.0]]), "c": 5.0}, "it", (2,))
     np.testing.assert_array_equal(flat, [[1.0, 2.0], [3.0, 3.0], [4.0, 4.0], [5.0, 5.0]])
 
@@ -78,6 +81,45 @@ def test_the_upper_triangle_is_what_is_known_outside() -> None:
     covariance = memory("covariance", "1", np.diag([1.0, 2.0, 3.0]), shape=(3, 3), symmetric=True)
     assert covariance.scalar_names == tuple(f"covariance[{k}]" for k in range(1, 7))
     assert covariance.start_values == (1.0, 0.0, 0.0, 2.0, 0.0, 3.0)  # row by row
+
+
+class Weighted(HybridSystem):
+    """Parameters that are matrices."""
+
+    name = "weighted"
+    outputs = (output_signal("y", "1"),)
+    parameters = (
+        parameter("gain", "1/s", 2.0),
+        parameter("weight", "1", (1.0, 0.5, 3.0), shape=(2, 2), symmetric=True, min=0.0),
+        parameter("rows", "1", np.arange(6.0).reshape(2, 3), shape=(2, 3)),
+    )
+    presets: ClassVar[Any] = {"other": {"weight": (4.0, 5.0, 6.0)}}
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        return {"y": p.gain * (p.weight @ p.rows)[1, 2]}
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        return within_bounds(self.parameters, p)
+
+
+def test_a_parameter_is_a_matrix_to_equations_and_a_vector_outside() -> None:
+    system = Weighted()
+    names = [name for signal in system.parameters for name in signal.scalar_names]
+    assert names == ["gain", *(f"weight[{k}]" for k in (1, 2, 3)), *(f"rows[{k}]" for k in range(1, 7))]
+    values = system.start_parameters()
+    np.testing.assert_array_equal(values[:-1], [2.0, 1.0, 0.5, 3.0, *range(6)])
+    p = system.unpack_parameters(values)
+    np.testing.assert_array_equal(p.weight, [[1.0, 0.5], [0.5, 3.0]])
+    np.testing.assert_array_equal(p.rows, [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+    other = system.unpack_parameters(system.start_parameters("other"))
+    np.testing.assert_array_equal(other.weight, [[4.0, 5.0], [5.0, 6.0]])
+    traced = TracedSystem(system)
+    x, u = system.start_state(), system.start_inputs()
+    assert float(traced.output(0.0, x, u, values)) == system.output_vector(0.0, x, u, values)[0] == 32.0
+    values[2] = -1.0
+    assert unfulfilled(system, values).startswith("weight[2] must be a finite number, at least 0")
+    with pytest.raises(ValueError, match="only a state or parameter is a matrix"):
+        Signal("drive", "1", "input", start=(0.0,) * 4, size=4, shape=(2, 2))
 
 
 class Counted(HybridSystem):
@@ -147,6 +189,7 @@ def test_what_is_returned_wrongly_is_named(rates: Any, changes: Any, words: str)
     [
         ({"symmetric": True}, r"symmetric; give its shape \(n, n\)"),
         ({"shape": (2, 3), "symmetric": True}, "expected a square shape"),
+        ({"shape": (2, 3), "symmetric": True, "start": (1.0, 2.0, 3.0)}, "expected a square shape"),
         ({"shape": (2, 2), "symmetric": True, "start": np.array([[0.0, 1.0], [0.0, 0.0]])}, "symmetric; expected"),
     ],
 )
