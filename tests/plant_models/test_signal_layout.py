@@ -116,8 +116,8 @@ def test_a_parameter_is_a_matrix_to_equations_and_a_vector_outside() -> None:
     traced = TracedSystem(system)
     x, u = system.start_state(), system.start_inputs()
     assert float(traced.output(0.0, x, u, values)) == system.output_vector(0.0, x, u, values)[0] == 32.0
-    values[2] = -1.0
-    assert unfulfilled(system, values).startswith("weight[2] must be a finite number, at least 0")
+    values[3] = -1.0
+    assert unfulfilled(system, values).startswith("weight[3] must be a finite number, at least 0")
     with pytest.raises(ValueError, match="only a state or parameter is a matrix"):
         Signal("drive", "1", "input", start=(0.0,) * 4, size=4, shape=(2, 2))
 
