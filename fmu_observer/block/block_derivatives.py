@@ -6,7 +6,7 @@ One evaluation of the traced tangent with the whole seed vector, as in the expor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from math import isfinite
 
@@ -55,10 +55,7 @@ class BlockSensitivity:
         if len(seed) != len(knowns):
             raise BlockError(f"{len(knowns)} knowns but {len(seed)} seeds; all variables are scalars.")
         rows = [self._row(reference) for reference in unknowns]
-        seeds = [np.zeros(1), *(np.zeros(len(values)) for values in (runtime.x, runtime.u, runtime.p))]
-        for reference, value in zip(knowns, seed, strict=True):
-            group, index = self._place(reference)
-            seeds[group][index] += value
+        seeds = self._seeds(runtime, zip(knowns, seed, strict=True))
         values = [float(value) for value in self._tangent(runtime, seeds)[rows]]
         for reference, value in zip(unknowns, values, strict=True):
             if not isfinite(value):
@@ -72,6 +69,14 @@ class BlockSensitivity:
     @cached_property
     def _traced(self) -> TracedSystem:
         return traced_once(self.system)
+
+    def _seeds(self, runtime: Runtime, pairs: Iterable[tuple[int, float]]) -> list[np.ndarray]:
+        """Of time, x, u and p, from pairs of a known's value reference and its seed."""
+        seeds = [np.zeros(1), *(np.zeros(len(values)) for values in (runtime.x, runtime.u, runtime.p))]
+        for reference, value in pairs:
+            group, index = self._place(reference)
+            seeds[group][index] += value
+        return seeds
 
     def _tangent(self, runtime: Runtime, seeds: Sequence[np.ndarray]) -> np.ndarray:
         now = (runtime.t, runtime.x, runtime.u, runtime.p)

@@ -80,25 +80,37 @@ def describe(
     if fmi_version not in VERSION_STRINGS:
         raise ValueError(f"{system.name}: FMI version {fmi_version!r} is unknown; use 2 or 3.")
     protocol = protocol or EventProtocol()
+    description = _without_structure(system, fmi_version, preset, protocol)
+    description.modelName = model_name or system.name
+    description.modelExchange = _model_exchange(system) if model_exchange else None
+    _add_structure(system, description)
+    return description
+
+
+def _without_structure(
+    system: HybridSystem, fmi_version: FmiVersion, preset: str | None, protocol: EventProtocol
+) -> ModelDescription:
+    """All but the model structure and the token."""
     variables = model_variables(system, fmi_version, preset, protocol)
     # text, as fmpy reads it from a file
     experiment = DefaultExperiment(startTime="0.0", stopTime="10.0", stepSize="0.01")
-    description = ModelDescription(
+    return ModelDescription(
         fmiVersion=VERSION_STRINGS[fmi_version],
-        modelName=model_name or system.name,
         description=" ".join(system.description.split()),
         generationTool="fmu-observer",
         variableNamingConvention="structured",
         coSimulation=_co_simulation(system, protocol.counts(fmi_version)),
-        modelExchange=_model_exchange(system) if model_exchange else None,
         typeDefinitions=[late_policy_type()] if system.triggered_events else [],
         defaultExperiment=experiment,
         logCategories=[Category(name=name, description=text) for name, text in LOG_CATEGORIES.items()],
         unitDefinitions=_unit_definitions(variables),
         modelVariables=variables,
     )
-    table = VariableTable.of(system)
-    facts = traced_facts(system)
+
+
+def _add_structure(system: HybridSystem, description: ModelDescription) -> None:
+    """What depends on what, and the token, which follows from it."""
+    table, facts, variables = VariableTable.of(system), traced_facts(system), description.modelVariables
     outputs = unknowns(variables, table.outputs, facts["output"])
     derivatives = unknowns(variables, table.derivatives, facts["derivative"])
     # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
@@ -111,7 +123,6 @@ def describe(
     description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
     description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
     description.instantiationToken = _token(system, description, facts["equations"])
-    return description
 
 
 def can_exchange(system: HybridSystem) -> bool:

@@ -20,21 +20,35 @@ def check_declarations(system: Declarations) -> None:
     where = f"{type(system).__name__} ({system.name!r})"
     if not system.name.isidentifier():
         raise ValueError(f"{where}: the system's name must be a legal identifier.")
+    _check_names(system, where)
+    _check_causalities(system, where)
+    _check_event_prefixes(system, where)
+    _check_order_of_states(system, where)
+    _check_warnings(system, where)
+    _check_references(system, where)
+    _check_presets(system, where)
+
+
+def _check_names(system: Declarations, where: str) -> None:
     names = [s.name for s in (*system.states, *system.input_signals, *system.outputs, *system.parameters)]
     names += [e.name for e in system.events]
     names += [name for e in system.triggered_events for name in e.implied_names]
     repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED_NAMES & set(names)))
     if repeated:
         raise ValueError(f"{where}: names used twice or reserved: {', '.join(repeated)}.")
-    _check_causalities(system, where)
-    _check_event_prefixes(system, where)
+
+
+def _check_order_of_states(system: Declarations, where: str) -> None:
     unknown_stiff = sorted(set(system.stiff) - {s.name for s in system.states if s.variability == "continuous"})
     if unknown_stiff:
         raise ValueError(f"{where}: stiff names {unknown_stiff}; expected names of continuous states.")
     variabilities = [s.variability for s in system.states]
     if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
         raise ValueError(f"{where}: list continuous states before memory.")
-    _check_warnings(system, where)
+
+
+def _check_references(system: Declarations, where: str) -> None:
+    """Periods, offsets and resources are those of parameters."""
     scalars = {s.name for s in system.parameters if s.size is None}
     for event in system.periodic_events:
         for reference in filter(None, (event.period, event.offset)):
@@ -46,6 +60,9 @@ def check_declarations(system: Declarations) -> None:
     for resource in system.resources:
         if resource.parameter not in vectors:
             raise ValueError(f"{where}: {resource.file} is to set {resource.parameter!r}; expected a vector parameter.")
+
+
+def _check_presets(system: Declarations, where: str) -> None:
     known = {s.name for s in (*system.parameter_signals, *system.states)}
     for preset, values in system.presets.items():
         unknown = sorted(set(values) - known)

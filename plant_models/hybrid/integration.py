@@ -8,8 +8,9 @@ the system does; they know nothing of events or of who calls them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,18 @@ from plant_models.hybrid.system import Array, HybridSystem
 
 Derivative = Callable[[Array, Array], Array]  # (t, x) -> derivative of the continuous states
 Jacobian = Callable[[Array, Array], tuple[Array, Array]]  # (t, x) -> (d/dx of shape (nc, nc), d/dt of shape (nc,))
+
+
+class _Linearised(NamedTuple):
+    """Derivatives of the flow: by all states, shape (nc, nc); by those treated implicitly; by time, shape (nc,); and 1
+    for these states.
+    """
+
+    by_all: Array
+    by_state: Array
+    by_time: Array
+    implicit: Array
+
 
 ROSENBROCK_GAMMA = 1.0 - 1.0 / sqrt(2.0)
 
@@ -84,23 +97,12 @@ def step(
             whole = _before_memory([continuous[i] for i in range(count)], x, system)
         return effective_flow(system, time, whole, u, p, sign, switches)
 
-    if system.method == "rk4":
-        moved = rk4_step(derivative, t, h, x[:count])
-    elif system.method == "euler":
-        moved = x[:count] + h * derivative(t, x[:count])
-    elif system.method == "rosenbrock":
-        if jacobian is None:
-            raise ValueError(f"{system.name}: the rosenbrock step needs the Jacobian of the flow.")
-        moved = rosenbrock_step(
-            derivative, jacobian, t, h, x[:count], _at_rest(system, t, x, u, p, sign), system.stiff_mask()
-        )
+    if system.method in EXPLICIT:
+        moved = EXPLICIT[system.method](derivative, t, h, x[:count])
     else:
-        raise ValueError(f"{system.name}: unknown method {system.method!r}; use 'rk4', 'rosenbrock' or 'euler'.")
-    parts = [moved[i] for i in range(count)]
-    if sign is not None:
-        for j, i in enumerate(system.friction_indices()):
-            parts[i] = np.where(sign[j] * parts[i] < 0.0, 0.0, parts[i])
-    return _before_memory(parts, x, system)
+        at_rest = _at_rest(system, t, x, u, p, sign)
+        moved = rosenbrock_step(derivative, _given(jacobian, system), t, h, x[:count], at_rest, system.stiff_mask())
+    return _before_memory(_stopped(system, moved, sign), x, system)
 
 
 def rk4_step(derivative: Derivative, t: Array, h: Array, x: Array) -> Array:
@@ -117,6 +119,14 @@ def rk4_step(derivative: Derivative, t: Array, h: Array, x: Array) -> Array:
     return x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
+def _euler_step(derivative: Derivative, t: Array, h: Array, x: Array) -> Array:
+    return x + h * derivative(t, x)
+
+
+EXPLICIT: Mapping[str, Callable[[Derivative, Array, Array, Array], Array]] = {"rk4": rk4_step, "euler": _euler_step}
+"""Steps that need no Jacobian, by the name of the method."""
+
+
 def rosenbrock_step(
     derivative: Derivative,
     jacobian: Jacobian,
@@ -130,62 +140,83 @@ def rosenbrock_step(
 
     ``(I - g h J) k1 = f(t, x) + g h f_t``, ``(I - g h J) k2 = f(t+h, x + h k1) - 2 k1 - g h f_t``,
     ``x+ = x + h (3 k1 + k2) / 2`` (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456-1480). Linear
-    systems, no iteration: the cost is fixed and the step can be generated as straight-line C.
-
-    The Jacobian knows the slope here and nothing of a steep part that the stage leaps over, such as the rise of a creep
-    curve between two flat branches. There the two stages may cancel, and a sliding wheel would slide for ever. Where
-    the stage has turned a derivative round, by more than the Jacobian explains, `damped_step` takes its place.
-
-    The stages also shoot past the value a stiff state settles at, by 2.4 times the way there and, at the end of the
-    step, by up to a sixth of it. Where such a state pushes another one that dry friction holds, the excess would set it
-    in motion although the push itself can not. So where a stage lets go a state that is held at the start of the step,
-    `damped_step`, which does not shoot past, decides: where the state is still held at its end, it takes the place of
-    the stages.
-
-    The order is 2 with any matrix in place of the Jacobian, so that it may be kept to the states that are stiff.
+    systems, no iteration: the cost is fixed and the step can be generated as straight-line C. The order is 2 with any
+    matrix in place of the Jacobian, so that it may be kept to the states that are stiff.
 
     Args:
         derivative, jacobian: of the flow with dry friction resolved. t: time at the start [s]. h: step [s].
-        x: continuous states, shape (nc,). at_rest: 1 for states at rest under dry friction, else 0, shape (nc,); None
-            without.
-        stiff: 1 for states treated implicitly, else 0, shape (nc,); None for all.
+        x: continuous states, shape (nc,). at_rest: 1 for those at rest under dry friction, else 0, shape (nc,); None
+            without. stiff: 1 for those treated implicitly, else 0, shape (nc,); None for all.
     """
-    implicit = 1.0 if stiff is None else stiff
-    by_all, by_time = jacobian(t, x)
-    by_state = by_all if stiff is None else by_all * np.outer(stiff, stiff)
-    gamma_h = ROSENBROCK_GAMMA * h
-    matrix = np.eye(x.shape[0]) - gamma_h * by_state
+    J = _linearised(jacobian, t, x, stiff)
     flow = derivative(t, x)
+    held, fixed = _held(J, flow, at_rest)
+    k1, ahead, k2 = _stages(derivative, J, fixed, t, h, x, flow)
+    smooth = x + 0.5 * h * (3.0 * k1 + k2)
+    bent, missing = _bend(J, h, k1, flow, ahead, stiff is None)
+    if at_rest is None:
+        return np.where(bent < 0.0, _damped_step(J.by_state, h * k1 * J.implicit, missing, h, x, flow), smooth)
+    damped = _damped_step(J.by_state, h * k1 * J.implicit, np.where(held > 0.0, 0.0, missing), h, x, flow)
+    damped = np.where(fixed > 0.0, x, damped)
+    return np.where(bent - _let_go_too_soon(derivative, held, ahead, t + h, damped) < 0.0, damped, smooth)
+
+
+def _linearised(jacobian: Jacobian, t: Array, x: Array, stiff: np.ndarray | None) -> _Linearised:
+    by_all, by_time = jacobian(t, x)
+    if stiff is None:
+        return _Linearised(by_all, by_all, by_time, 1.0)
+    return _Linearised(by_all, by_all * np.outer(stiff, stiff), by_time, stiff)
+
+
+def _held(J: _Linearised, flow: Array, at_rest: Array | None) -> tuple[Array, Array]:
+    """1 for states that dry friction holds at the start, else 0; the same for those that nothing moves."""
     held = 0.0 * flow if at_rest is None else np.where(flow == 0.0, at_rest, 0.0)
     # A held state whose row of the Jacobian is zero does not move at all; the solution of a larger system would add its
     # rounding.
-    fixed = np.where(np.abs(by_all) @ np.ones(x.shape[0]) == 0.0, held, 0.0)
-    k1 = np.where(fixed > 0.0, 0.0, np.linalg.solve(matrix, flow + gamma_h * by_time))
+    return held, np.where(np.abs(J.by_all) @ np.ones(flow.shape[0]) == 0.0, held, 0.0)
+
+
+def _stages(
+    derivative: Derivative, J: _Linearised, fixed: Array, t: Array, h: Array, x: Array, flow: Array
+) -> tuple[Array, Array, Array]:
+    """Both stages, and between them the derivative that the first one leads to: ``(k1, f(t + h, x + h k1), k2)``."""
+    gamma_h = ROSENBROCK_GAMMA * h
+    matrix = np.eye(x.shape[0]) - gamma_h * J.by_state
+    k1 = np.where(fixed > 0.0, 0.0, np.linalg.solve(matrix, flow + gamma_h * J.by_time))
     ahead = derivative(t + h, x + h * k1)
-    k2 = np.linalg.solve(matrix, ahead - 2.0 * k1 - gamma_h * by_time)
-    k2 = np.where(ahead == 0.0, np.where(fixed > 0.0, 0.0, k2), k2)
-    smooth = x + 0.5 * h * (3.0 * k1 + k2)
-    change, predicted = ahead - flow, h * (by_all @ k1 + by_time)
-    bent = _turned_round(flow, ahead, k1, predicted, implicit)
-    known = predicted if stiff is None else h * (by_state @ k1 + by_time)
-    missing = implicit * np.where(np.sum(bent) < 0.0, BEND_STEEPNESS * change - known, 0.0)
-    if at_rest is None:
-        return np.where(np.sum(bent) < 0.0, damped_step(by_state, h * k1 * implicit, missing, h, x, flow), smooth)
-    damped = damped_step(by_state, h * k1 * implicit, np.where(held > 0.0, 0.0, missing), h, x, flow)
-    damped = np.where(fixed > 0.0, x, damped)
+    k2 = np.linalg.solve(matrix, ahead - 2.0 * k1 - gamma_h * J.by_time)
+    return k1, ahead, np.where(ahead == 0.0, np.where(fixed > 0.0, 0.0, k2), k2)
+
+
+def _let_go_too_soon(derivative: Derivative, held: Array, ahead: Array, end: Array, damped: Array) -> Array:
+    """1 where the first stage lets go a state that is still held where `_damped_step` ends, else 0.
+
+    The stages shoot past the value a stiff state settles at, by 2.4 times the way there and, at the end of the step, by
+    up to a sixth of it. Where such a state pushes another one that dry friction holds, the excess would set it in
+    motion although the push itself can not. So where a stage lets go a state that is held at the start of the step,
+    `_damped_step`, which does not shoot past, decides.
+    """
     let_go = np.where(np.sum(held * np.abs(ahead)) > 0.0, 1.0, 0.0)
-    still_held = np.where(np.sum(held * np.abs(derivative(t + h, damped))) > 0.0, 0.0, 1.0)
-    return np.where(np.sum(bent) - let_go * still_held < 0.0, damped, smooth)
+    still_held = np.where(np.sum(held * np.abs(derivative(end, damped))) > 0.0, 0.0, 1.0)
+    return let_go * still_held
 
 
-def _turned_round(flow: Array, ahead: Array, stage: Array, predicted: Array, implicit: Array) -> Array:
-    """Negative where a stage has turned a derivative round, by more than the Jacobian predicted, shape (nc,)."""
-    change = ahead - flow
-    turned = implicit * np.where(change * stage < 0.0, np.minimum(flow * ahead, 0.0), 0.0)
-    return np.where(np.abs(change - predicted) > np.abs(flow), turned, 0.0)
+def _bend(J: _Linearised, h: Array, k1: Array, flow: Array, ahead: Array, all_implicit: bool) -> tuple[Array, Array]:
+    """Negative where the first stage has turned a derivative round, by more than the Jacobian predicted; and the change
+    that the Jacobian does not explain then, shape (nc,).
+
+    The Jacobian knows the slope here and nothing of a steep part that the stage leaps over, such as the rise of a creep
+    curve between two flat branches. There the two stages may cancel, and a sliding wheel would slide for ever: so
+    `_damped_step` takes their place.
+    """
+    change, predicted = ahead - flow, h * (J.by_all @ k1 + J.by_time)
+    turned = J.implicit * np.where(change * k1 < 0.0, np.minimum(flow * ahead, 0.0), 0.0)
+    bent = np.sum(np.where(np.abs(change - predicted) > np.abs(flow), turned, 0.0))
+    known = predicted if all_implicit else h * (J.by_state @ k1 + J.by_time)
+    return bent, J.implicit * np.where(bent < 0.0, BEND_STEEPNESS * change - known, 0.0)
 
 
-def damped_step(by_state: Array, move: Array, missing: Array, h: Array, x: Array, flow: Array) -> Array:
+def _damped_step(by_state: Array, move: Array, missing: Array, h: Array, x: Array, flow: Array) -> Array:
     """The linearly implicit Euler step with a Jacobian that explains `missing` more change over `move`, by Broyden's
     update; the plain one where nothing is missing.
 
@@ -205,6 +236,24 @@ def damped_step(by_state: Array, move: Array, missing: Array, h: Array, x: Array
 def _friction_sign(system: HybridSystem, x: Array) -> Array | None:
     indices = system.friction_indices()
     return _stack([np.sign(x[i]) for i in indices]) if indices else None
+
+
+def _given(jacobian: Jacobian | None, system: HybridSystem) -> Jacobian:
+    """The Jacobian that ``rosenbrock`` needs, the one method besides the explicit ones."""
+    if system.method != "rosenbrock":
+        raise ValueError(f"{system.name}: unknown method {system.method!r}; use 'rk4', 'rosenbrock' or 'euler'.")
+    if jacobian is None:
+        raise ValueError(f"{system.name}: the rosenbrock step needs the Jacobian of the flow.")
+    return jacobian
+
+
+def _stopped(system: HybridSystem, moved: Array, sign: Array | None) -> list[Array]:
+    """Continuous states after a step; one with dry friction that has changed its direction has stopped instead."""
+    parts = [moved[i] for i in range(system.continuous_count)]
+    if sign is not None:
+        for j, i in enumerate(system.friction_indices()):
+            parts[i] = np.where(sign[j] * parts[i] < 0.0, 0.0, parts[i])
+    return parts
 
 
 def _at_rest(system: HybridSystem, t: Array, x: Array, u: Array, p: Array, sign: Array | None) -> Array | None:

@@ -66,6 +66,16 @@ class ContinuousPart:
         # internal step, seed
         self._runtime_parameters = [value for name, value in every.items() if name not in declared]
 
+    def point(self, x0: Values | None, u0: Values | None) -> tuple[np.ndarray, np.ndarray]:
+        """States, shape (nc,), and inputs, shape (m,): the starts, with some replaced.
+
+        Args:
+            x0, u0: what replaces them, see `filled`.
+        """
+        states = dict(zip(self.states, self.start_state, strict=True))
+        inputs = dict(zip(self.inputs, self.start_inputs, strict=True))
+        return filled(states, x0, f"{self.system.name}: state"), filled(inputs, u0, f"{self.system.name}: input")
+
     @cached_property
     def traced(self) -> TracedSystem:
         """The system's CasADi functions.

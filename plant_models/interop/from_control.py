@@ -183,26 +183,18 @@ def from_nonlinear_io(
     """
     import control  # noqa: PLC0415
 
-    if isinstance(sys, control.StateSpace):
-        return from_state_space(
-            sys,
-            x0,
-            name=name,
-            description=description,
-            units=units,
-            sample_period=sample_period,
-            method=method,
-            internal_step=internal_step,
-        )
-    for what in ("nstates", "ninputs", "noutputs"):
-        if getattr(sys, what) is None:
-            raise ValueError(f"{sys.name}: its {what} is not known; give states, inputs and outputs when you make it.")
-    plain = type(sys) is control.NonlinearIOSystem
-    update, read = (sys.updfcn, _reader(sys)) if plain else (sys.dynamics, sys.output)
     how: dict[str, Any] = {"method": method, "internal_step": internal_step}
-    system = _made(sys, update, read, x0, name, description, units, sample_period, how)
+    if isinstance(sys, control.StateSpace):
+        named: dict[str, Any] = {"name": name, "description": description, "units": units}
+        return from_state_space(sys, x0, sample_period=sample_period, **named, **how)
+    update, read = _functions(sys, type(sys) is control.NonlinearIOSystem)
+    return _usable(_made(sys, update, read, x0, name, description, units, sample_period, how))
+
+
+def _usable(system: ControlSystem) -> ControlSystem:
+    """The system, with what is found out: whether its functions can be traced."""
     system.traceable = _can_be_traced(system)
-    if not system.traceable and method == "rosenbrock":
+    if not system.traceable and system.method == "rosenbrock":
         raise ValueError(
             f"{system.name}: method 'rosenbrock' needs functions that can be traced, and these cannot; use 'rk4'."
         )
@@ -220,37 +212,48 @@ def _made(
     sample_period: float | None,
     how: Mapping[str, Any],
 ) -> ControlSystem:
-    labels = {"input": sys.input_labels, "output": sys.output_labels, "state": sys.state_labels}
     period = _period(sys, sample_period)
-    numbers = {key: value for key, value in getattr(sys, "params", {}).items() if _is_number(value)}
-    labels["parameter"] = list(numbers)
-    for label in units or {}:
-        known(label, [entry for group in labels.values() for entry in group], f"{sys.name}: signal")
-    fields = _legal(labels, _TIMING if period else ())
-    start = filled(dict.fromkeys(labels["state"], 0.0), x0, f"{sys.name}: state")
-    starts = dict(zip(labels["state"], map(float, start), strict=True))
-    unit = dict(units or {})
-    make_state = memory if period else state
-    variability: Variability = "discrete" if period else "continuous"
+    params = getattr(sys, "params", {})
+    numbers = {key: value for key, value in params.items() if _is_number(value)}
     return ControlSystem(
         update,
         read,
         name=_identifier(name or sys.name),
         description=description,
         source=f"python-control, {type(sys).__name__} {sys.name}",
-        states=[make_state(fields["state"][n], unit.get(n, "1"), starts[n], f"State {n}") for n in labels["state"]],
-        inputs=[input_signal(fields["input"][n], unit.get(n, "1"), 0.0, f"Input {n}") for n in labels["input"]],
-        outputs=[
-            output_signal(fields["output"][n], unit.get(n, "1"), f"Output {n}", variability=variability)
-            for n in labels["output"]
-        ],
-        parameters={
-            key: _parameter(fields["parameter"][key], unit.get(key, "1"), key, value) for key, value in numbers.items()
-        },
-        constants={key: value for key, value in getattr(sys, "params", {}).items() if key not in numbers},
+        constants={key: value for key, value in params.items() if key not in numbers},
         sample_period=period,
+        **_signals(sys, numbers, x0, dict(units or {}), period > 0.0),
         **how,
     )
+
+
+def _signals(
+    sys: Any, numbers: Mapping[str, Any], x0: Values | None, unit: Mapping[str, str], sampled: bool
+) -> dict[str, Any]:
+    """States, inputs, outputs and parameters, under legal names.
+
+    Args:
+        numbers: parameters by name. x0: start of the states. unit: by name. sampled: whether the system is discrete.
+    """
+    labels = {"input": sys.input_labels, "output": sys.output_labels, "state": sys.state_labels}
+    labels["parameter"] = list(numbers)
+    for label in unit:
+        known(label, [entry for group in labels.values() for entry in group], f"{sys.name}: signal")
+    fields = _legal(labels, _TIMING if sampled else ())
+    start = map(float, filled(dict.fromkeys(labels["state"], 0.0), x0, f"{sys.name}: state"))
+    make_state = memory if sampled else state
+    variability: Variability = "discrete" if sampled else "continuous"
+
+    def of(kind: str) -> list[tuple[str, str, str]]:
+        return [(fields[kind][n], unit.get(n, "1"), n) for n in labels[kind]]
+
+    return {
+        "states": [make_state(f, unit, next(start), f"State {n}") for f, unit, n in of("state")],
+        "inputs": [input_signal(f, unit, 0.0, f"Input {n}") for f, unit, n in of("input")],
+        "outputs": [output_signal(f, unit, f"Output {n}", variability=variability) for f, unit, n in of("output")],
+        "parameters": {n: _parameter(f, unit, n, numbers[n]) for f, unit, n in of("parameter")},
+    }
 
 
 def _period(sys: Any, given: float | None) -> float:
@@ -287,9 +290,14 @@ def _product(by_state: np.ndarray, by_input: np.ndarray) -> Function:
     return product
 
 
-def _reader(sys: Any) -> Function:
-    function: Function = sys.outfcn or (lambda _t, x, _u, _params: x[: sys.noutputs])
-    return function
+def _functions(sys: Any, plain: bool) -> tuple[Function, Function]:
+    """Update and output functions, of a `plain` system those that it was made of."""
+    for what in ("nstates", "ninputs", "noutputs"):
+        if getattr(sys, what) is None:
+            raise ValueError(f"{sys.name}: its {what} is not known; give states, inputs and outputs when you make it.")
+    if not plain:
+        return sys.dynamics, sys.output
+    return sys.updfcn, sys.outfcn or (lambda _t, x, _u, _params: x[: sys.noutputs])
 
 
 def _can_be_traced(system: HybridSystem) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from plant_models.hybrid import HybridSystem
-from plant_models.interop.continuous_part import ContinuousPart, Values, filled, known
+from plant_models.interop.continuous_part import ContinuousPart, Values, known
 from plant_models.interop.to_control import jacobians
 
 RESIDUAL = 1e-8
@@ -64,27 +64,9 @@ def operating_point(
         OperatingPointError: there is no such point near the guess.
     """
     part = ContinuousPart(system, preset, parameters, memory)
-    x = filled(dict(zip(part.states, part.start_state, strict=True)), x0, f"{system.name}: state")
-    u = filled(dict(zip(part.inputs, part.start_inputs, strict=True)), u0, f"{system.name}: input")
-    wanted = dict(outputs or {})
-    held, drifting = (_indices(names, part.states, f"{system.name}: state") for names in (hold, drift))
-    problem = _Problem(
-        part,
-        x,
-        u,
-        t,
-        unknown_x=[i for i in range(len(x)) if i not in held],
-        unknown_u=_indices(find, part.inputs, f"{system.name}: input"),
-        still=[i for i in range(len(x)) if i not in drifting],
-        rows=_indices(list(wanted), part.outputs, f"{system.name}: output"),
-        targets=np.array(list(wanted.values()), dtype=float),
-    )
+    problem = _problem(part, *part.point(x0, u0), t, hold, drift, find, dict(outputs or {}))
     _check_count(problem)
-    found = problem.guess
-    if found.size:
-        found = scipy.optimize.root(problem.residual, found, jac=problem.slope, tol=1e-13).x
-    _check_found(problem, found)
-    return _point(part, *problem.place(found), t)
+    return _point(part, *problem.place(_solved(problem)), t)
 
 
 @dataclass(frozen=True)
@@ -127,6 +109,31 @@ class _Problem:
         return np.vstack([flow[self.still], y[self.rows]])
 
 
+def _problem(
+    part: ContinuousPart,
+    x: np.ndarray,
+    u: np.ndarray,
+    t: float,
+    hold: Sequence[str],
+    drift: Sequence[str],
+    find: Sequence[str],
+    wanted: Mapping[str, float],
+) -> _Problem:
+    name = part.system.name
+    held, drifting = (_indices(names, part.states, f"{name}: state") for names in (hold, drift))
+    return _Problem(
+        part,
+        x,
+        u,
+        t,
+        unknown_x=[i for i in range(len(x)) if i not in held],
+        unknown_u=_indices(find, part.inputs, f"{name}: input"),
+        still=[i for i in range(len(x)) if i not in drifting],
+        rows=_indices(list(wanted), part.outputs, f"{name}: output"),
+        targets=np.array(list(wanted.values()), dtype=float),
+    )
+
+
 def _check_count(problem: _Problem) -> None:
     unknowns, equations = len(problem.guess), len(problem.labels)
     if unknowns != equations:
@@ -137,9 +144,16 @@ def _check_count(problem: _Problem) -> None:
         )
 
 
-def _check_found(problem: _Problem, found: np.ndarray) -> None:
+def _solved(problem: _Problem) -> np.ndarray:
+    found = problem.guess
     if not found.size:
-        return
+        return found
+    found = scipy.optimize.root(problem.residual, found, jac=problem.slope, tol=1e-13).x
+    _check_found(problem, found)
+    return found
+
+
+def _check_found(problem: _Problem, found: np.ndarray) -> None:
     residual = problem.residual(found)
     size = np.maximum(np.abs(problem.slope(found)) @ np.maximum(np.abs(found), 1.0), 1.0)
     missed = [i for i, r in enumerate(residual) if not abs(r) <= RESIDUAL * size[i]]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_models.hybrid import HybridSystem
-from plant_models.interop.continuous_part import ContinuousPart, Values, filled
+from plant_models.interop.continuous_part import ContinuousPart, Values
 
 if TYPE_CHECKING:
     import control
@@ -40,15 +40,9 @@ def to_nonlinear_io(
     import control  # noqa: PLC0415 - a second to import; only for those who convert
 
     part = ContinuousPart(system, preset, parameters, memory)
+    params = dict(part.parameters)
     return control.NonlinearIOSystem(
-        part.derivative,
-        part.output,
-        states=list(part.states),
-        inputs=list(part.inputs),
-        outputs=list(part.outputs),
-        params=dict(part.parameters),
-        name=system.name,
-        dt=0,
+        part.derivative, part.output, params=params, name=system.name, dt=0, **_labels(part)
     )
 
 
@@ -65,35 +59,33 @@ def to_state_space(
     """Linearisation ``d dx = A dx + B du``, ``dy = C dx + D du`` about a point, by the exact traced Jacobians.
 
     The point need not be an equilibrium; `operating_point` finds one. A state with dry friction keeps the direction it
-    has in
-    `x0`: one at rest that the friction holds stays at rest, so its row of A and B is zero. Events are left out, as in
-    `to_nonlinear_io`.
+    has in `x0`: one at rest that the friction holds stays at rest, so its row of A and B is zero. Events are left out.
 
     Args:
-        system: a traceable hybrid system. x0: continuous states. u0: inputs. preset, parameters, memory: see
-            `to_nonlinear_io`.
-        t: time of the linearisation [s].
+        system: a traceable hybrid system. x0, u0: continuous states and inputs. t: time of the linearisation [s].
+        preset, parameters, memory: see `to_nonlinear_io`.
 
     Returns:
         A continuous-time system in deviations from the point, names kept.
 
     Raises:
-        ValueError: nothing in the system is continuous, it has no inputs or outputs, or a name or a number of values is
-        wrong.
+        ValueError: nothing in the system is continuous, it has no inputs or outputs, or a name or a number is wrong.
         TracingError: the system cannot be traced; ``control.linearize`` of `to_nonlinear_io` works on differences.
     """
     import control  # noqa: PLC0415
 
     part = ContinuousPart(system, preset, parameters, memory)
-    for what, present in (("states", part.states), ("inputs", part.inputs), ("outputs", part.outputs)):
-        if not present:
-            raise ValueError(
-                f"{system.name}: it has no {what}, and a StateSpace needs some; convert it with to_nonlinear_io."
-            )
-    x = filled(dict(zip(part.states, part.start_state, strict=True)), x0, f"{system.name}: state")
-    u = filled(dict(zip(part.inputs, part.start_inputs, strict=True)), u0, f"{system.name}: input")
-    names: dict[str, Any] = {"states": list(part.states), "inputs": list(part.inputs), "outputs": list(part.outputs)}
-    return control.StateSpace(*jacobians(part, x, u, t), 0, name=system.name, **names)
+    labels = _labels(part)
+    lacking = [what for what, names in labels.items() if not names]
+    if lacking:
+        advice = "and a StateSpace needs some; convert it with to_nonlinear_io"
+        raise ValueError(f"{system.name}: it has no {lacking[0]}, {advice}.")
+    return control.StateSpace(*jacobians(part, *part.point(x0, u0), t), 0, name=system.name, **labels)
+
+
+def _labels(part: ContinuousPart) -> dict[str, Any]:
+    """Names of signals, as python-control takes them."""
+    return {"states": list(part.states), "inputs": list(part.inputs), "outputs": list(part.outputs)}
 
 
 def jacobians(
