@@ -38,6 +38,23 @@ class DoublePendulumConstants:
 
 
 SECTION_IV_2_2_3 = DoublePendulumConstants()
+_MEASURED = (
+    output_signal("measured_position", "m", "Measured position of the cart", variability="discrete"),
+    output_signal("measured_first_angle", "rad", "Measured angle of the lower rod", variability="discrete"),
+    output_signal("measured_second_angle", "rad", "Measured angle of the upper rod", variability="discrete"),
+)
+_PARAMETERS = (
+    parameter("cart_mass", "kg", SECTION_IV_2_2_3.cart_mass, "Mass M of the cart", min=1e-3),
+    parameter("first_mass", "kg", SECTION_IV_2_2_3.first_mass, "Mass m1 of the lower rod", min=1e-3),
+    parameter("second_mass", "kg", SECTION_IV_2_2_3.second_mass, "Mass m2 of the upper rod", min=1e-3),
+    parameter("first_length", "m", SECTION_IV_2_2_3.first_length, "Half length l1 of the lower rod", min=1e-3),
+    parameter("second_length", "m", SECTION_IV_2_2_3.second_length, "Half length l2 of the upper rod", min=1e-3),
+    parameter("gravity", "m/s2", SECTION_IV_2_2_3.gravity, "Acceleration of gravity", min=0.0),
+    parameter("coupling_sign", "1", 1.0, "Sign of the coupling to the cart; -1 as (4.11) prints it", min=-1.0, max=1.0),
+    parameter(
+        "centrifugal_sign", "1", 1.0, "Sign of the terms with sin(a2 - a1); -1 as (4.14) prints it", min=-1.0, max=1.0
+    ),
+)
 
 
 class CartDoublePendulum(NoisyPlant):
@@ -88,41 +105,7 @@ class CartDoublePendulum(NoisyPlant):
     default_preset = "repaired"
 
     def __init__(self) -> None:
-        values = SECTION_IV_2_2_3
-        self.declare(
-            (
-                output_signal("measured_position", "m", "Measured position of the cart", variability="discrete"),
-                output_signal("measured_first_angle", "rad", "Measured angle of the lower rod", variability="discrete"),
-                output_signal(
-                    "measured_second_angle", "rad", "Measured angle of the upper rod", variability="discrete"
-                ),
-            ),
-            (
-                parameter("cart_mass", "kg", values.cart_mass, "Mass M of the cart", min=1e-3),
-                parameter("first_mass", "kg", values.first_mass, "Mass m1 of the lower rod", min=1e-3),
-                parameter("second_mass", "kg", values.second_mass, "Mass m2 of the upper rod", min=1e-3),
-                parameter("first_length", "m", values.first_length, "Half length l1 of the lower rod", min=1e-3),
-                parameter("second_length", "m", values.second_length, "Half length l2 of the upper rod", min=1e-3),
-                parameter("gravity", "m/s2", values.gravity, "Acceleration of gravity", min=0.0),
-                parameter(
-                    "coupling_sign",
-                    "1",
-                    1.0,
-                    "Sign of the coupling to the cart; -1 as (4.11) prints it",
-                    min=-1.0,
-                    max=1.0,
-                ),
-                parameter(
-                    "centrifugal_sign",
-                    "1",
-                    1.0,
-                    "Sign of the terms with sin(a2 - a1); -1 as (4.14) prints it",
-                    min=-1.0,
-                    max=1.0,
-                ),
-            ),
-            period=1e-3,
-        )
+        self.declare(_MEASURED, _PARAMETERS, period=1e-3)
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -204,10 +204,7 @@ class MdpeController(HybridSystem):
         level, quiet = next_level(x.held_level, x.quiet_time, u.adhesion_condition, p.control_period, p.recovery_time)
         available = _available(x, u, p, level, sliding)
         wanted = wanted_force(_gains(x.held_mode, x.held_level, p), x.integral, feedforward, error)
-        slower = np.minimum(np.abs(u.speed), np.abs(u.odometer))  # a locked wheel has no electric brake
-        mode = next_mode(
-            Situation(x.held_mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing), p
-        )
+        mode = next_mode(_situation(x, u, level, wanted, error, standing), p)
         limits = _limits(x, u, p, available)
         regulated = _regulate(x, mode, level, error, feedforward, limits, p)
         target = either(standing, 0.0, regulated.target)
@@ -244,6 +241,12 @@ class MdpeController(HybridSystem):
             "speed_error": u.speed_reference - u.speed,
             "drive_power": x.held_effort * u.odometer,
         }
+
+
+def _situation(x: Any, u: Any, level: Array, wanted: Array, error: Array, standing: Array) -> Situation:
+    """What the mode is chosen from."""
+    slower = np.minimum(np.abs(u.speed), np.abs(u.odometer))  # a locked wheel has no electric brake
+    return Situation(x.held_mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing)
 
 
 def _standing(u: Any, p: Any) -> Array:

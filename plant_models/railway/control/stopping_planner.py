@@ -191,11 +191,7 @@ def constant_brake(speed: Array, distance: Array, drag_rate: Array, final_speed:
     share = np.where(legal, drag_rate * way / change, 0.0)  # k
     left = np.where(legal, rest / change, 1.0)  # c = 1 - k, without cancellation where the caller has none
     ratio = np.where(legal, final_speed / change, 0.0)  # q
-    half = left + 2.0 * ratio
-    # s / (2 + s) + q s = k has its root below that of the equation; for q = 0 it is 2 k / c
-    w = np.log1p(4.0 * share / (half + np.sqrt(half * half + 8.0 * ratio * share)))
-    for _ in range(NEWTON_STEPS):
-        w = w - _newton_step(w, share, left, ratio)
+    w = _root(share, left, ratio)
     tiny = w < SMALLEST
     slowness = np.where(tiny, 1.0 / (0.5 + ratio), w / np.where(tiny, 1.0, share))  # w / k
     duration = slowness * way / change
@@ -204,6 +200,16 @@ def constant_brake(speed: Array, distance: Array, drag_rate: Array, final_speed:
         np.where(legal, duration, NEVER),
         possible,
     )
+
+
+def _root(share: Array, left: Array, ratio: Array) -> Array:
+    """The w of ``1 - w/(e^w - 1) + q w = k``."""
+    half = left + 2.0 * ratio
+    # s / (2 + s) + q s = k has its root below that of the equation; for q = 0 it is 2 k / c
+    w = np.log1p(4.0 * share / (half + np.sqrt(half * half + 8.0 * ratio * share)))
+    for _ in range(NEWTON_STEPS):
+        w = w - _newton_step(w, share, left, ratio)
+    return w
 
 
 def _newton_step(w: Array, share: Array, left: Array, ratio: Array) -> Array:

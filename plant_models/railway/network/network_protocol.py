@@ -10,7 +10,16 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    Signal,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.requirements import within_bounds
@@ -97,16 +106,7 @@ class NetworkProtocol(HybridSystem):
             _held_output("sender", "1", "Number of the node that sent last, from 1", None),
             _held_output("stamp", "s", "When what was received of each node was measured", nodes),
         )
-        self.states = (
-            memory("held_value", "1", 0.0, "Values last received", size=signals),
-            memory("sent_value", "1", 0.0, "Values last sent", size=signals),
-            memory("last_error", "1", 0.0, "Network error before the last transmission", size=signals),
-            memory("held_stamp", "s", 0.0, "When they were measured", size=nodes),
-            memory("last_sender", "1", 0.0, "Number of the node that sent last"),
-            memory("turn", "1", 0.0, "Place in the order of the next one"),
-            memory("begun", "1", 0.0, "1 after the first transmission"),
-            *_packets(signals, delay_periods),
-        )
+        self.states = (*_memory(signals, nodes), *_packets(signals, delay_periods))
         super().__init__(signals=signals, nodes=nodes, protocol=protocol, turns=turns, delay_periods=delay_periods)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -223,6 +223,19 @@ def _protocol_parameters(protocol: str, signals: int, nodes: int, turns: int) ->
 
 def _held_output(name: str, unit: str, text: str, size: int | None) -> Any:
     return output_signal(name, unit, text, variability="discrete", size=size)
+
+
+def _memory(signals: int, nodes: int) -> tuple[Signal, ...]:
+    """What was received and sent last, and whose turn it is."""
+    return (
+        memory("held_value", "1", 0.0, "Values last received", size=signals),
+        memory("sent_value", "1", 0.0, "Values last sent", size=signals),
+        memory("last_error", "1", 0.0, "Network error before the last transmission", size=signals),
+        memory("held_stamp", "s", 0.0, "When they were measured", size=nodes),
+        memory("last_sender", "1", 0.0, "Number of the node that sent last"),
+        memory("turn", "1", 0.0, "Place in the order of the next one"),
+        memory("begun", "1", 0.0, "1 after the first transmission"),
+    )
 
 
 def _packets(signals: int, places: int) -> tuple[Any, ...]:

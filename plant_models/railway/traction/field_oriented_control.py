@@ -99,17 +99,7 @@ class FieldOrientedControl(HybridSystem):
         """Voltages of the coming period from the signals of this instant."""
         first, second = (getattr(u, f"current_{axis}") for axis in AXES[self.frame])
         current_d, current_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, u.angle)
-        torque_constant = 1.5 * p.pole_pairs * p.rotor_flux
-        if self.reference == "torque":
-            reference = _limited(u.torque_reference / torque_constant, p.current_limit)
-            speed_integral = 0.0
-        else:
-            push = p.speed_bandwidth * p.inertia / torque_constant * (u.speed_reference - u.speed)
-            reference = _limited(push + x.speed_integral, p.current_limit)
-            # Integrals go back by what a limit cuts off, with the time constant of their own PI.
-            cut = reference - push - x.speed_integral
-            speed_integral = x.speed_integral + p.control_period * p.speed_bandwidth / 5.0 * (push + cut)
-
+        reference, speed_integral = self._asked_current(x, u, p)
         electrical, rate = p.pole_pairs * u.speed, p.current_bandwidth
         errors = (-current_d, reference - current_q)
         inductances = (p.inductance_d, p.inductance_q)
@@ -134,6 +124,17 @@ class FieldOrientedControl(HybridSystem):
             "held_angle": u.angle,
             "held_reference": reference,
         }
+
+    def _asked_current(self, x: Any, u: Any, p: Any) -> tuple[Array, Array]:
+        """The current along q that the torque or the speed asks for [A], and the integral of the speed [A]."""
+        torque_constant = 1.5 * p.pole_pairs * p.rotor_flux
+        if self.reference == "torque":
+            return _limited(u.torque_reference / torque_constant, p.current_limit), 0.0
+        push = p.speed_bandwidth * p.inertia / torque_constant * (u.speed_reference - u.speed)
+        reference = _limited(push + x.speed_integral, p.current_limit)
+        # Integrals go back by what a limit cuts off, with the time constant of their own PI.
+        cut = reference - push - x.speed_integral
+        return reference, x.speed_integral + p.control_period * p.speed_bandwidth / 5.0 * (push + cut)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The voltages of this period in both frames, and the current asked for."""

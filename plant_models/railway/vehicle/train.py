@@ -120,23 +120,7 @@ class Train(HybridSystem):
         self._law = ADHESION_LAWS[adhesion]()
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
         self._pipe = BrakePipe(wagons + 1, delay_samples)
-        self.states = (*train_states(wagons, axles), self._pipe.state, self._pipe.memory)
-        self.frictions = (
-            "train_speed",
-            *(f"wagon_velocity[{i + 1}]" for i in range(wagons)),
-            *(f"axle_rate[{k + 1}]" for k in range(axles)),
-        )
-        self.inputs = train_inputs(axles if effort_per_axle else None)
-        self.outputs = train_outputs(wagons, axles)
-        self.parameters = (*train_parameters(wagons, axles), *self._law.parameters, *self._track.parameters)
-        self.events = (self._pipe.event,)
-        along_track = [f"axle[{k + 1}].{edge}" for k in range(axles) for edge in self._track.edges]
-        self.switchings = tuple(along_track) if zones == "position" else self._track.edges
-        self.presets = {
-            "table_4_2": {},
-            "table_4_2_one_axle": {"wheel_inertia": ONE_WHEEL / axles},
-            "as_published": {"coupler_damping": -5e4},
-        }
+        self._declare_signals()
         super().__init__(
             wagons=wagons,
             axles=axles,
@@ -148,6 +132,27 @@ class Train(HybridSystem):
             gradient_count=gradient_count,
             delay_samples=delay_samples,
         )
+
+    def _declare_signals(self) -> None:
+        """Signals, events, edges and presets of so many wagons and axles."""
+        wagons, axles = self.wagons, self.axles
+        self.states = (*train_states(wagons, axles), self._pipe.state, self._pipe.memory)
+        self.frictions = (
+            "train_speed",
+            *(f"wagon_velocity[{i + 1}]" for i in range(wagons)),
+            *(f"axle_rate[{k + 1}]" for k in range(axles)),
+        )
+        self.inputs = train_inputs(axles if self.effort_per_axle else None)
+        self.outputs = train_outputs(wagons, axles)
+        self.parameters = (*train_parameters(wagons, axles), *self._law.parameters, *self._track.parameters)
+        self.events = (self._pipe.event,)
+        along_track = [f"axle[{k + 1}].{edge}" for k in range(axles) for edge in self._track.edges]
+        self.switchings = tuple(along_track) if self._track.zones == "position" else self._track.edges
+        self.presets = {
+            "table_4_2": {},
+            "table_4_2_one_axle": {"wheel_inertia": ONE_WHEEL / axles},
+            "as_published": {"coupler_damping": -5e4},
+        }
 
     def rolling(self, speed: float, wheel_radius: float = 0.575) -> dict[str, float]:
         """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m].

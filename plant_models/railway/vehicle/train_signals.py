@@ -85,6 +85,10 @@ def train_parameters(wagons: int, axles: int) -> tuple[Signal, ...]:
     Args:
         wagons: number of wagons. axles: wheelsets of the locomotive.
     """
+    return (*_locomotive_parameters(axles), *_wagon_parameters(wagons), *COUPLER_PARAMETERS, *BRAKE_PARAMETERS)
+
+
+def _locomotive_parameters(axles: int) -> tuple[Signal, ...]:
     return (
         parameter("mass", "kg", 90e3, "Mass of the locomotive M_1", min=1.0),
         parameter("length", "m", 19.5, "Length of the locomotive", min=0.0),
@@ -108,12 +112,15 @@ def train_parameters(wagons: int, axles: int) -> tuple[Signal, ...]:
             max=1.0,
             size=axles,
         ),
+    )
+
+
+def _wagon_parameters(wagons: int) -> tuple[Signal, ...]:
+    return (
         parameter("wagon_mass", "kg", 19e3, "Mass of each wagon M_i", min=1.0, size=wagons),
         parameter("wagon_length", "m", 14.06, "Length of a wagon", min=0.0),
         parameter("wagon_braked_mass", "kg", 21e3, "Braked mass of each wagon", min=0.0, size=wagons),
         parameter("wagon_davis_a", "N", 190.0, "Running resistance of a wagon, constant part; dry friction", min=0.0),
         parameter("wagon_davis_b", "N.s/m", 6.8, "Running resistance of a wagon, viscous part", min=0.0),
         parameter("wagon_davis_c", "N.s2/m2", 2.3, "Running resistance of a wagon, aerodynamic part", min=0.0),
-        *COUPLER_PARAMETERS,
-        *BRAKE_PARAMETERS,
     )
