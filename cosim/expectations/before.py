@@ -15,7 +15,7 @@ from cosim.expectations.indicator_levels import BETWEEN_0_AND_1, shipped_thresho
 from plant_models.hybrid.units import UnitError, conversion
 
 if TYPE_CHECKING:
-    from cosim.scenario.schema import ScenarioTable
+    from cosim.scenario.scenario_tables import ComponentTable, ReportTable
 
 SLACK = 1e-9
 
@@ -25,20 +25,28 @@ class Before:
     """What is known before the run.
 
     Args:
-        table: the scenario. components: by name. receivers: of balise telegrams.
+        start, stop: of the run [s]. period: from one recorded row to the next [s].
+        report: roles of signals. tables: of the components, by name. components: by name.
+        receivers: of balise telegrams; None where the scenario has no balises.
+        certificates: what is done about them: ``warn``, ``require`` or ``ignore``.
     """
 
-    table: ScenarioTable
+    start: float
+    stop: float
+    period: float
+    report: ReportTable
+    tables: Mapping[str, ComponentTable]
     components: Mapping[str, Component]
-    receivers: Sequence[str]
+    receivers: Sequence[str] | None
+    certificates: str
 
     @property
     def observers(self) -> list[str]:
         """Those of the report, or else all components that are named as observers."""
-        given = self.table.report.observers
+        given = self.report.observers
         if given is not None:
             return list(given)
-        return [n for n, t in self.table.components.items() if t.observer is not None or t.filter is not None]
+        return [n for n, t in self.tables.items() if t.observer is not None or t.filter is not None]
 
     def demand_within(self, key: str, value: float | None) -> None:
         """An instant lies within the run.
@@ -46,7 +54,7 @@ class Before:
         Args:
             key: of the instant. value: the instant [s], or None.
         """
-        first, last = self.table.start, self.table.stop
+        first, last = self.start, self.stop
         if value is not None and not first - SLACK <= value <= last + SLACK:
             raise ScenarioError(
                 f"{key!r} ({value:g} s) lies outside the run, which lasts from {first:g} to {last:g} s; for a shorter "
@@ -61,7 +69,7 @@ class Before:
         """
         self.demand_within("from", start)
         self.demand_within("to", end)
-        first, last = self.table.start, self.table.stop
+        first, last = self.start, self.stop
         begin = otherwise if start is None else start
         until = last if end is None else end
         if begin > until:
@@ -69,10 +77,9 @@ class Before:
                 f"'to' ({until:g} s) lies before the evaluation begins (report.evaluate_after, {begin:g} s); "
                 "give 'from'"
             )
-        period = self.table.step * self.table.master.record_every
-        recorded = floor((until - first) / period + SLACK) >= ceil((begin - first) / period - SLACK)
+        recorded = floor((until - first) / self.period + SLACK) >= ceil((begin - first) / self.period - SLACK)
         if not recorded and until < last - SLACK:
-            raise ScenarioError(f"no row is recorded between {begin:g} and {until:g} s; one is every {period:g} s")
+            raise ScenarioError(f"no row is recorded between {begin:g} and {until:g} s; one is every {self.period:g} s")
 
     def demand_output(self, component: str, output: str) -> None:
         """A component has an output.
@@ -150,7 +157,7 @@ class Before:
         """Whether an indicator's name tells its levels: of shipped models, and the slip indicator of what plays an
         observer.
         """
-        own = self.table.components.get(component)
+        own = self.tables.get(component)
         return (own is not None and own.fmu is None) or (signal == "slip_indicator" and component in self.observers)
 
 

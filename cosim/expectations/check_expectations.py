@@ -30,7 +30,16 @@ def check_expectations(
             be judged; one line for each expectation at fault.
     """
     faults, items = [], []
-    before = Before(table, components, receivers)
+    before = Before(
+        start=table.start,
+        stop=table.stop,
+        period=table.step * table.master.record_every,
+        report=table.report,
+        tables=table.components,
+        components=components,
+        receivers=None if table.balises is None else receivers,
+        certificates=table.certificates,
+    )
     for place, item in enumerate(table.expect, start=1):
         title = f" ({item.name})" if item.name else ""
         try:

@@ -85,7 +85,7 @@ class WindowExpectation(Expectation):
         Args:
             before: what is known before the run.
         """
-        return before.table.start
+        return before.start
 
 
 class LimitedExpectation(WindowExpectation):

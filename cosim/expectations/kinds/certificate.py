@@ -31,9 +31,9 @@ class CertificateExpectation(Expectation):
         Args:
             before: what is known before the run.
         """
-        if before.table.balises is None:
+        if before.receivers is None:
             raise ScenarioError("this scenario has no balises, so there are no gaps to be certified for")
-        if before.table.certificates == "ignore":
+        if before.certificates == "ignore":
             raise ScenarioError(NEVER_CERTIFIED)
         for name in before.named(self.of, before.receivers, "observer"):
             if name not in before.receivers:

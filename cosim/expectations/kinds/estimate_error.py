@@ -35,7 +35,7 @@ class ErrorExpectation(LimitedExpectation):
         Args:
             before: what is known before the run.
         """
-        return max(before.table.start, before.table.report.evaluate_after)
+        return max(before.start, before.report.evaluate_after)
 
     def prepare(self, before: Before) -> Self:
         """The true value is known, and each observer estimates.
@@ -45,7 +45,7 @@ class ErrorExpectation(LimitedExpectation):
         """
         super().prepare(before)
         role, output, _ = ERRORS[self.check]
-        if getattr(before.table.report, role) is None:
+        if getattr(before.report, role) is None:
             raise ScenarioError(
                 f'the true value is not known; say which signal it is with report.{role} = "component.signal"'
             )

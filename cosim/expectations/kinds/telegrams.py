@@ -61,7 +61,7 @@ class TelegramsExpectation(WindowExpectation):
             before: what is known before the run.
         """
         super().prepare(before)
-        if before.table.balises is None:
+        if before.receivers is None:
             raise ScenarioError("this scenario has no balises; give it a table [balises]")
         if self.of is not None and self.of not in before.receivers:
             raise ScenarioError(f"{self.of!r} is told of no telegrams; {nearest(self.of, before.receivers)}")
