@@ -11,12 +11,12 @@ from cosim.run.balise_service import BaliseRoles, balise_roles
 from cosim.run.checked_observers import Certificates, check_observers
 from cosim.run.checked_tables import Stated, complete_tables, parse_tables
 from cosim.run.coupled import Coupled, couple
-from cosim.run.loaded_components import Loaded, load_components
+from cosim.run.loaded_components import LoadedComponents, load_components
 from cosim.run.network_remarks import network_warnings
 from cosim.run.remarks import Remarks
 from cosim.run.schedule import StepSchedule, make_schedule
 from cosim.run.starts import all_start_values
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class Checked:
         starts: values by component and name. certificates: by component.
     """
 
-    task: Task
+    task: RunTask
     stated: Stated
-    loaded: Loaded
+    loaded: LoadedComponents
     coupled: Coupled
     balises: BaliseRoles
     schedule: StepSchedule
@@ -39,7 +39,7 @@ class Checked:
     certificates: Certificates
 
 
-def check_task(task: Task, building: Callable[[str], None], remarks: Remarks, resources: ExitStack) -> Checked:
+def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks, resources: ExitStack) -> Checked:
     """Load the components of a run, and check all that is said of them.
 
     Args:

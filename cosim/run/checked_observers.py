@@ -11,14 +11,14 @@ from cosim.run.conditions import check_conditions, deaf_receivers, left_working_
 from cosim.run.coupled import Coupled
 from cosim.run.expected_gaps import Sources
 from cosim.run.remarks import Remarks
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 
 Certificates = dict[str, dict[str, Any]]
 """As plain data, by component."""
 
 
 def check_observers(
-    task: Task, coupled: Coupled, stated: Stated, receivers: Collection[str], remarks: Remarks
+    task: RunTask, coupled: Coupled, stated: Stated, receivers: Collection[str], remarks: Remarks
 ) -> Certificates:
     """Judge the observers before the run.
 

@@ -16,7 +16,7 @@ from cosim.run.layouts import Layout, make_layout
 from cosim.run.remarks import Remarks
 from cosim.run.schedule import idle_settings
 from cosim.run.signal_roles import check_roles, inferred_roles, with_roles
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Stated:
     links: Sequence[Link]
 
 
-def parse_tables(task: Task, remarks: Remarks) -> Stated:
+def parse_tables(task: RunTask, remarks: Remarks) -> Stated:
     """What can be checked before a component is loaded.
 
     Args:
@@ -48,7 +48,7 @@ def parse_tables(task: Task, remarks: Remarks) -> Stated:
     return Stated(layout, parse_connections(table.connections, task.where))
 
 
-def complete_tables(task: Task, coupled: Coupled, balises: BaliseRoles, remarks: Remarks) -> Task:
+def complete_tables(task: RunTask, coupled: Coupled, balises: BaliseRoles, remarks: Remarks) -> RunTask:
     """Check roles and expectations against the components, and fill in what was left open.
 
     Args:

@@ -248,7 +248,8 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
     name = table.model or table.observer or ModelName()
-    if name.given is system:
+    lasts_itself = name.given is system
+    if lasts_itself:
         return system
     options = _for_its_period(type(system), table.options, table)
     options = move_option_files(options, lambda path: f"{path} {files_digest(name.folder / path)}")

@@ -14,7 +14,7 @@ from cosim.network.outputs import NAME as NETWORK
 from cosim.run.network import Network, make_network
 from cosim.run.network_connections import connect_over
 from cosim.run.signal_roles import signals_to_record
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from plant_models.hybrid.units import Unit
 
@@ -54,7 +54,7 @@ class Coupled:
         return [c for c in self.routed if c.source[0] != NETWORK]
 
 
-def couple(task: Task, links: Sequence[Link], components: Mapping[str, Component]) -> Coupled:
+def couple(task: RunTask, links: Sequence[Link], components: Mapping[str, Component]) -> Coupled:
     """Check the connections of a scenario, and lead over its network what travels over it.
 
     Args:

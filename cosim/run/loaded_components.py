@@ -19,14 +19,14 @@ from cosim.run.component_models import component_factories
 from cosim.run.coupled import Coupled
 from cosim.run.once_per_process import check_instances
 from cosim.run.remarks import Remarks
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from fmus.fmi.capabilities import tool_warning
 from fmus.fmi.sense import doubled_names
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedComponents:
     """The components of a run.
 
     Args:
@@ -37,7 +37,9 @@ class Loaded:
     factories: Mapping[str, Callable[[], Component]]
 
 
-def load_components(task: Task, building: Callable[[str], None], remarks: Remarks, resources: ExitStack) -> Loaded:
+def load_components(
+    task: RunTask, building: Callable[[str], None], remarks: Remarks, resources: ExitStack
+) -> LoadedComponents:
     """Load the components, with warnings of what their descriptions say.
 
     Args:
@@ -59,7 +61,7 @@ def load_components(task: Task, building: Callable[[str], None], remarks: Remark
         components[name] = factory()
         components[name].configure(table.components[name].parameters)
         _remark(components[name], remarks)
-    return Loaded(components, factories)
+    return LoadedComponents(components, factories)
 
 
 def _remark(component: Component, remarks: Remarks) -> None:

@@ -26,13 +26,17 @@ from cosim.results.result_data import SignalInfo
 from cosim.results.stream import Stream
 from cosim.run.services import Services
 from cosim.run.signal_roles import switching_signals
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
 
 
 def make_master(
-    task: Task, plan: Plan, services: Services, choice: AlgorithmChoice, progress: Callable[[float, float], None] | None
+    task: RunTask,
+    plan: Plan,
+    services: Services,
+    choice: AlgorithmChoice,
+    progress: Callable[[float, float], None] | None,
 ) -> Master:
     """The master that a scenario asks for.
 

@@ -19,7 +19,7 @@ from cosim.run.master_setup import make_master, master_notes
 from cosim.run.remarks import Remarks
 from cosim.run.services import Services, make_services
 from cosim.run.streaming import Streaming, begin_stream
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 
 Progress = Callable[[float, float], None]
 
@@ -39,7 +39,7 @@ class Ready:
     stream: Stream | None
 
     @property
-    def task(self) -> Task:
+    def task(self) -> RunTask:
         """What is to be run, with all roles and thresholds."""
         return self.checked.task
 

@@ -21,7 +21,7 @@ from cosim.run.ready import Progress, make_ready
 from cosim.run.remarks import Remarks
 from cosim.run.run_seeds import with_seeds
 from cosim.run.streaming import Streaming
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 
 LOG = logging.getLogger("cosim")
 CALL_LOG = Path("calls.log")
@@ -29,7 +29,7 @@ Report = Callable[[str], None]
 
 
 def run_scenario(
-    task: Task,
+    task: RunTask,
     progress: Progress | None = None,
     warn: Report | None = None,
     call_log: Path | None = None,

@@ -18,14 +18,14 @@ from cosim.run.movement import movement_chains
 from cosim.run.network import Network
 from cosim.run.schedule import stepping_groups
 from cosim.run.starts import given_values
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.inspect import group_index, make_links, make_part, rate_text
 from cosim.structure.run_structure import Structure
 from cosim.structure.structure_data import Balises, Link, Packets
 
 
-def scenario_structure(task: Task) -> Structure:
+def scenario_structure(task: RunTask) -> Structure:
     """The structure of a validated scenario.
 
     Args:
@@ -45,7 +45,7 @@ def scenario_structure(task: Task) -> Structure:
         return _structure(task, coupled, stepping_groups(table, coupled, roles), _balises(table, roles))
 
 
-def _structure(task: Task, coupled: Coupled, groups: Sequence[Group], balises: Balises | None) -> Structure:
+def _structure(task: RunTask, coupled: Coupled, groups: Sequence[Group], balises: Balises | None) -> Structure:
     table, components, connections, clocks = task.table, coupled.components, coupled.connections, coupled.clocks
     choice, refusal = _choice(table, groups, components)
     order = [n for group in groups for n in group.names]

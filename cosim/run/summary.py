@@ -15,14 +15,14 @@ from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
 from cosim.results.result import Result
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import ComponentTable
 from fmus.versions import versions
 
 MESSAGES_SHOWN = 20
 
 
-def first_summary(task: Task, plan: Plan) -> dict[str, Any]:
+def first_summary(task: RunTask, plan: Plan) -> dict[str, Any]:
     """What is known before the first step.
 
     Args:
@@ -46,7 +46,7 @@ def first_summary(task: Task, plan: Plan) -> dict[str, Any]:
     }
 
 
-def run_summary(task: Task, master: Master, setup_seconds: float) -> dict[str, Any]:
+def run_summary(task: RunTask, master: Master, setup_seconds: float) -> dict[str, Any]:
     """Scenario, times, components, versions.
 
     Args:

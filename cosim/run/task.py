@@ -13,7 +13,7 @@ from cosim.scenario.schema import ScenarioTable, step_count
 
 
 @dataclass(frozen=True)
-class Task:
+class RunTask:
     """What is to be run.
 
     Args:
@@ -39,7 +39,7 @@ class Task:
         except CosimError as error:
             raise error if str(error).startswith(self.where) else type(error)(f"{self.where}: {error}") from error
 
-    def with_table(self, table: ScenarioTable) -> Task:
+    def with_table(self, table: ScenarioTable) -> RunTask:
         """The same task with other tables.
 
         Args:

@@ -16,7 +16,7 @@ from cosim.run.results_manifest import read_manifest
 from cosim.run.scenario_run import run_scenario
 from cosim.run.scenario_structure import scenario_structure
 from cosim.run.streaming import ending, where_to
-from cosim.run.task import Task
+from cosim.run.task import RunTask
 from cosim.scenario.fmu_alone import single_tables
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.origin import Origin
@@ -378,7 +378,7 @@ class Scenario:
         for warning in self._warnings:
             (warn or LOG.warning)(warning)
         with self._places_named():
-            task = Task(table, scenario.name, self.folder, self.where)
+            task = RunTask(table, scenario.name, self.folder, self.where)
             origin = Origin.of(table, task.name, task.folder, task.where, self._files)
             folder, streaming = where_to(stream, spare, origin)
             finish = ending(origin, folder, warn or LOG.warning, finished)
@@ -394,7 +394,7 @@ class Scenario:
             CosimError: the scenario cannot be set up.
         """
         with self._places_named():
-            return scenario_structure(Task(self.table(), self.name, self.folder, self.where))
+            return scenario_structure(RunTask(self.table(), self.name, self.folder, self.where))
 
     @contextmanager
     def _places_named(self) -> Iterator[None]:
