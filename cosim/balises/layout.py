@@ -233,17 +233,15 @@ def aperiodic(
     if not 0.0 < min_gap <= max_gap:
         raise ScenarioError(f"Balise gaps need 0 < min_gap <= max_gap, got {min_gap!r} s and {max_gap!r} s.")
     generator = np.random.Generator(np.random.Philox(seed))
-
-    def following(t: float) -> float:
+    instants: list[float] = []
+    t = start
+    while True:
         gap = generator.uniform(min_gap, max_gap)
         dropped, factor = generator.uniform() < dropout_fraction, generator.uniform(1.2, max(dropout_stretch, 1.2))
-        return t + gap * (factor if dropped and t > dropout_after else 1.0)
-
-    instants, t = list[float](), following(start)
-    while t <= until:
+        t += gap * (factor if dropped and t > dropout_after else 1.0)
+        if t > until:
+            return InstantLayout(np.array(instants))
         instants.append(t)
-        t = following(t)
-    return InstantLayout(np.array(instants))
 
 
 def _row_to_balise(path: Path, number: int, line: int, row: dict[str, str], usual: float) -> Balise:
