@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 
+import clarabel
 import numpy as np
 import scipy
 
@@ -114,8 +115,6 @@ def common_quadratic_form(condition: QuadraticCondition) -> QuadraticForm | None
 
 
 def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:
-    import clarabel  # noqa: PLC0415 - only who certifies pays for the solver's import
-
     variables = matrix.shape[1]
     right = np.zeros(len(matrix))
     right[0] = n

@@ -9,10 +9,9 @@ from typing import NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fmu_observer.identification.acceleration_run import Array
 from fmu_observer.identification.davis_estimate import Coefficient, DavisEstimate, IdentificationError
 from fmu_observer.identification.output_error import RunFits, fit_runs, with_covariance
-
-Array = NDArray[np.float64]
 
 MINIMUM_SPEED = 5.0
 """Below it adhesion, gears and the odometer rule what is measured, not the running resistance [m/s]; (5.2)."""

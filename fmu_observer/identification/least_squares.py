@@ -11,7 +11,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fmu_observer.identification.acceleration_run import Array
+
 Simulation = Callable[[Array], Array]  # parameters of shape (p,) -> signals of shape (q, n)
 
 _DIFFERENCE = 1e-4

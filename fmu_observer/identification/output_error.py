@@ -13,10 +13,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from fmu_observer.identification.acceleration_run import PARAMETERS, integration_grid, speeds_and_sensitivities
+from fmu_observer.identification.acceleration_run import PARAMETERS, Array, integration_grid, speeds_and_sensitivities
 from fmu_observer.identification.least_squares import serial_correlation, serial_enlargement
 
-Array = NDArray[np.float64]
 _COUNT = len(PARAMETERS)
 _ITERATIONS = 25
 _CONVERGED, _ROUNDING = 1e-7, 1e-8  # of the standard deviations of the estimates, and of the estimates themselves
