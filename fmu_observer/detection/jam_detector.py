@@ -17,7 +17,7 @@ from fmu_observer.detection.jam_rules import (
 )
 from fmu_observer.detection.printed_jam_rules import PrintedRules
 from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal
-from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 NOISE = "odometer_noise"
@@ -30,19 +30,6 @@ FAULT_OUTPUTS = (
 )
 SETTLED_TIME = discrete_output("settled_time", "s", "Time with a small residual; without any no fault is ever judged")
 ODOMETER_SAMPLE = PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read")
-
-
-def find_rules(name: str, rules: str) -> Rules:
-    """The rules of a name.
-
-    Args:
-        name: of the system that asks, for the message. rules: ``repaired`` or ``printed``.
-
-    Raises:
-        ValueError: there are no such rules.
-    """
-    require_chosen(name, {"rules": tuple(RULES)}, rules=rules)
-    return RULES[rules]
 
 
 def verdict(rules: Rules, m: Any, p: Any) -> dict[str, Array]:
@@ -124,7 +111,8 @@ class JamDetector(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
 
     def __init__(self, rules: RuleChoice = "repaired") -> None:
-        self.rules = find_rules(self.name, rules)
+        require_choice(self.name, self.option_choices, rules=rules)
+        self.rules = RULES[rules]
         self.states = self.rules.memory
         self.parameters = (*SHARED_PARAMETERS, *self.rules.parameters)
         self.told_bounds = told_bounds(self.rules)

@@ -9,12 +9,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.detection.wheel_classes import CHANGES, DROP, RISE, STEADY, WHEEL_CLASSES
 from fmu_observer.formulas.signatures.classification import Plane, SignatureClassifier
 from fmu_observer.formulas.signatures.clouds import Coordinate
 from fmu_observer.formulas.signatures.pencil import pencil_point
 from fmu_observer.formulas.signatures.properties import PROPERTIES
-from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal, memory, parameter, vector
+from plant_models.hybrid import HybridSystem, discrete_output, input_signal, memory, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -60,7 +61,7 @@ class WheelSignature(HybridSystem):
         memory("told_change", "1", 0.0, "Class of the newest record"),
         memory("held_time", "s", 0.0, "Time since the fault was told"),
     )
-    events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
+    events = (ODOMETER_SAMPLE,)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
 
     def requirements(self, p: Any) -> dict[str, Array]:

@@ -48,6 +48,7 @@ class GatedObserver(HybridSystem):
        the weight of the gate, so its gain is scaled down by it, and never up. ``position``: at a balise it sets
        `weighed_states`, and they go to that value by the weight. ``itself``: it has a variance of the place, and
        `place_deviation` gives it.
+    5. Time does not run where one of its `bounded_parameters` is out of its bounds.
 
     Args:
         options: of the observer, see its `option_choices`.
@@ -56,6 +57,7 @@ class GatedObserver(HybridSystem):
     position_state: str = ""
     gate_start: float = REJECT
     weighing: Weighing = "innovation"
+    bounded_parameters: tuple[Signal, ...] = ()
     weighed_states: ClassVar[tuple[str, ...]] = ("estimated_position",)
 
     def __init__(self, **options: Any) -> None:
@@ -77,8 +79,8 @@ class GatedObserver(HybridSystem):
         raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no update for it.")
 
     def odometer_of(self, u: Any) -> Array | None:
-        """The odometer at the telegram [m/s]; None where the observer has none."""
-        return None
+        """The odometer at the telegram [m/s], by default the input `odometer`; None where the observer has none."""
+        return getattr(u, "odometer", None)
 
     def own_bound(self, x: Any, p: Any) -> Array:
         """What the observer itself says its position may be off [m], of a covariance, say; zero where it does not."""
@@ -91,8 +93,9 @@ class GatedObserver(HybridSystem):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Bounds of the gate's parameters, see `HybridSystem.requirements`."""
-        return super().requirements(p) | (within_bounds(GATE_PARAMETERS, p) if self.gated else {})
+        """Bounds of the gate's parameters and of `bounded_parameters`, see `HybridSystem.requirements`."""
+        of_gate = GATE_PARAMETERS if self.gated else ()
+        return super().requirements(p) | within_bounds((*of_gate, *self.bounded_parameters), p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """`update`, where the gate lets the telegram pass."""

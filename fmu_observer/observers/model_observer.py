@@ -5,35 +5,30 @@ It knows models and hybrid systems, and nothing of how an observer corrects itse
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
-from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
+from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.model_signals import (
+    arrival_event,
+    estimate_outputs,
+    estimate_states,
+    matrix_parameter,
+    measured_inputs,
+    sampling_event,
 )
+from plant_models.hybrid import Signal, discrete_output, memory, output_signal, parameter, state
 from plant_models.hybrid.missing import or_else
-from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array
 
 Timing = Literal["continuous", "periodic", "event"]
 
 
-class ModelObserver(HybridSystem):
+class ModelObserver(JudgedObserver):
     """Base of the observers of a model ``dx = A x + B u + phi(x, u)``, ``y = C x`` (`ObserverModel`).
 
     The contract:
@@ -74,28 +69,16 @@ class ModelObserver(HybridSystem):
         estimates = self._estimates()
         self.states = (*self.extra_states, *estimates) if self.discrete else (*estimates, *self.extra_states)
         self.states = (*self.states, *self.extra_memory)
-        measured = () if self.timing == "event" else tuple(_renamed(s, "measured_") for s in self.model.measurements)
+        measured = () if self.timing == "event" else measured_inputs(self.model.measurements)
         self.inputs = (*self.model.inputs, *measured)
-        moves: Variability = "discrete" if self.discrete else "continuous"
-        self.outputs = (
-            *(
-                output_signal(s.name, s.unit, f"Estimate: {s.description}", variability=moves)
-                for s in self.model.states
-            ),
-            *self.extra_outputs,
-        )
+        kind = discrete_output if self.discrete else output_signal
+        self.outputs = (*estimate_outputs(self.model.states, kind), *self.extra_outputs)
         period = parameter(
             "sample_period", "s", self.model.sample_period, "Sampling period of the measurements", min=1e-6
         )
         self.parameters = (*self.gain_parameters, *((period,) if self.timing == "periodic" else ()))
         self.events = self._events()
         super().__init__(model=self.model.name, **options)
-
-    # -- what a subclass writes -------------------------------------------------------------------------------------
-
-    @abstractmethod
-    def condition_of(self, p: Any) -> Condition:
-        """The condition for the gains in the named tuple `p`."""
 
     # -- what it may use --------------------------------------------------------------------------------------------
 
@@ -128,7 +111,7 @@ class ModelObserver(HybridSystem):
         values = np.asarray(start, dtype=float)
         if values.ndim == 0:
             return parameter(name, unit, float(values), description)
-        return parameter(name, unit, tuple(map(float, values.ravel())), description, size=values.size)
+        return matrix_parameter(name, values, description, unit)
 
     def innovation(self, x: Any, u: Any) -> Array:
         """``C xh - y``, shape (q,); zero where a measurement is missing."""
@@ -141,41 +124,21 @@ class ModelObserver(HybridSystem):
         """The estimates."""
         return named_as(self.model.states, self.estimates(x))
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """Existence or stability condition, as numbers, for the gains of a preset with some replaced.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
-        return self.condition_of(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
-
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _estimates(self) -> tuple[Signal, ...]:
         kind = memory if self.discrete else state
-        return tuple(
-            kind(f"{self.estimate_prefix}{s.name}", s.unit, s.start, f"Estimate: {s.description}")
-            for s in self.model.states
-        )
+        return estimate_states(self.model.states, kind, self.estimate_prefix)
 
     def _events(self) -> tuple[Any, ...]:
-        leaves_out = self.leaves_out
+        measurements, leaves_out = self.model.measurements, self.leaves_out
         if self.timing == "periodic":
-            read, text = tuple(f"measured_{s.name}" for s in self.model.measurements), "The measurements are read"
-            return (PeriodicEvent("sampling", "sample_period", description=text, samples=read, leaves_out=leaves_out),)
+            return (sampling_event([f"measured_{s.name}" for s in measurements], leaves_out=leaves_out),)
         if self.timing == "event":
-            payload = tuple(_renamed(s, f"{self.model.event}_", "discrete") for s in self.model.measurements)
-            read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
-            return (TriggeredEvent(self.model.event, payload, text, samples=read, leaves_out=leaves_out),)
+            return (arrival_event(self.model.event, measurements, leaves_out=leaves_out),)
         return ()
 
 
 def as_matrix(flat: Array, rows: int, columns: int) -> Array:
     """A flat parameter, row by row, as a matrix of shape (rows, columns)."""
     return np.reshape(flat, (rows, columns))
-
-
-def _renamed(signal: Signal, prefix: str, variability: Literal["continuous", "discrete"] = "continuous") -> Signal:
-    return input_signal(
-        f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability
-    )

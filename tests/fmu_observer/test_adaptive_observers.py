@@ -193,7 +193,7 @@ def test_constants_of_theorem_4_1() -> None:
 def test_bad_input_is_told_in_words() -> None:
     with pytest.raises(ValueError, match="Unknown state-affine model 'no_such'; known are: time_varying_oscillator"):
         AdaptivePredictor("no_such")
-    with pytest.raises(ValueError, match="unknown sensitivity 'often'; use 'continuous' or 'sampled'"):
+    with pytest.raises(ValueError, match="unknown sensitivity 'often'; choose one of: continuous, sampled"):
         AdaptivePredictor(sensitivity="often")  # type: ignore[arg-type]
     model = find_state_affine_model("time_varying_oscillator")
     with pytest.raises(ValueError, match=r"regressor\(t, u\) returns shape \(2, 2\), expected \(2, 1\)"):

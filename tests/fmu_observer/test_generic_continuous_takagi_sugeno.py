@@ -90,7 +90,7 @@ def test_bad_input() -> None:
     model = find_takagi_sugeno_model("pendulum")
     with pytest.raises(ValueError, match=r"gain has shape \(2, 2\), expected \(2, 2, 1\)"):
         TakagiSugenoLuenberger(gains=np.ones((2, 2)))
-    with pytest.raises(ValueError, match=r"unknown premise 'frozen'; use 'measured', 'estimated'"):
+    with pytest.raises(ValueError, match=r"unknown premise 'frozen'; choose one of: measured, estimated"):
         TakagiSugenoLuenberger(premise="frozen")  # type: ignore[arg-type]
     blind = replace(model, A=np.stack([np.array([[0.0, 0.0], [s, -0.2]]) for s in (-1.0, 0.2)]))
     with pytest.raises(UnobservableError, match=r"vertex 1: .*rate"):

@@ -37,18 +37,17 @@ from fmu_observer.observers.train.adaptive_davis_states import (
     parts_of,
 )
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
-from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
-from plant_models.hybrid import (
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    matrix,
-    output_signal,
-    parameter,
-    vector,
+from fmu_observer.observers.train.train_signals import (
+    BALISE,
+    INNOVATION_OUTPUT,
+    ODOMETER,
+    ODOMETER_READ,
+    POSITION,
+    POSITION_OUTPUT,
+    SPEED,
+    SPEED_OUTPUT,
 )
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid import Signal, input_signal, matrix, output_signal, parameter, vector
 from plant_models.hybrid.system import Array
 
 BALISE_WEIGHT = 0.1  # [1/m] [ours]: a metre of a balise counts as 0.1 m/s of the odometer
@@ -99,16 +98,17 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
     weighing = "itself"
+    bounded_parameters = ADAPTIVE
     frictions = ("estimated_speed",)
     states = STATES
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort that acts at the wheel rim: traction positive, brake negative"),
-        input_signal("odometer", "m/s", 0.0, "Odometer speed"),
+        ODOMETER,
     )
     outputs = (
-        output_signal("position", "m", "Estimated position"),
-        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
-        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        POSITION_OUTPUT,
+        SPEED_OUTPUT,
+        INNOVATION_OUTPUT,
         output_signal("position_deviation", "m", "Standard deviation of the position's error"),
         *(output_signal(n, unit, f"Estimated coefficient {n[6]}") for n, unit in zip(NAMES, UNITS, strict=True)),
         *(
@@ -134,12 +134,8 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     )
     events = (
         BALISE,
-        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read", samples=("odometer",)),
+        ODOMETER_READ,
     )
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        """The parameters lie within their bounds."""
-        return super().requirements(p) | within_bounds(ADAPTIVE, p)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed, their sensitivities and gain, and what happens since the last sample."""
@@ -235,10 +231,6 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             "rolls_back": rolls_back(x.last_reading),
             "smallest_excitation": smallest_eigenvalue(excitation_now(known, since, p.excitation_time), 3),
         }
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def own_bound(self, x: Any, p: Any) -> Array:
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""

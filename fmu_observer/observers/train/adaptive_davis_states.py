@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_observer.formulas.adaptation.adaptation_at_samples import AtSample, Since, first_covariance
 from fmu_observer.formulas.adaptation.adaptive_law import Sizes
-from fmu_observer.observers.train.train_observer import POSITION, SPEED
+from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
 from plant_models.hybrid import matrix, memory, state, vector
 from plant_models.hybrid.system import Array
 
@@ -43,7 +43,7 @@ STATES = (
     memory("error_covariance", "1", FIRST, f"Covariance of the errors, {UPPER}", **_symmetric(SIZES.error)),
     memory("learnt", "1", 0.0, "1 for each coefficient that is learnt until the next sample", size=3),
     memory("samples_used", "1", 0.0, "Balises and readings used so far", size=2),
-    memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+    LAST_INNOVATION,
     memory("last_reading", "m/s", 0.0, "Last reading of the odometer that was not missing"),
 )
 

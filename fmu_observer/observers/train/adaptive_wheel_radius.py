@@ -24,9 +24,15 @@ from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.standstill import stands
-from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import Signal, discrete_output, input_signal, matrix, memory, output_signal, parameter, state
-from plant_models.hybrid.requirements import within_bounds
+from fmu_observer.observers.train.train_signals import (
+    BALISE,
+    BALISES_USED,
+    INNOVATION_OUTPUT,
+    LAST_INNOVATION,
+    POSITION,
+    POSITION_OUTPUT,
+)
+from plant_models.hybrid import Signal, input_signal, matrix, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
 SIZES = Sizes(1, 1, 1, sampled=True)
@@ -83,6 +89,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
     weighing = "itself"
+    bounded_parameters = ADAPTIVE
     inputs: tuple[Signal, ...] = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed, by the believed wheel radius"),
         input_signal(
@@ -94,9 +101,9 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         ),
     )
     outputs = (
-        output_signal("position", "m", "Estimated position"),
+        POSITION_OUTPUT,
         output_signal("speed", "m/s", "Odometer speed, corrected by the estimate", display_unit="km/h"),
-        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        INNOVATION_OUTPUT,
         output_signal("position_deviation", "m", "Standard deviation of the position's error"),
         output_signal(
             "wheel_radius_error", "1", "Estimate of odometer over true speed, minus 1; worn wheels: positive"
@@ -116,14 +123,10 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
             state("predicted_position", "m", 0.0, "Position predicted since the last balise"),
             state("estimated_scale", "1", 0.0, "Estimate of true speed over odometer, minus 1"),
             *adaptation,
-            memory("balises_used", "1", 0.0, "Balises used so far"),
-            memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+            BALISES_USED,
+            LAST_INNOVATION,
         )
         super().__init__()
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        """The parameters lie within their bounds."""
-        return super().requirements(p) | within_bounds(ADAPTIVE, p)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, scale, adaptation and predicted position."""
@@ -183,10 +186,6 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
             "wheel_radius_learnt": learnt_constants(x.mean_excitation, p.least_excitation, 1)[0],
             "excitation": x.mean_excitation[0, 0],
         }
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def own_bound(self, x: Any, p: Any) -> Array:
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""

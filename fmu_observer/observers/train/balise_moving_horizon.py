@@ -28,6 +28,7 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     ODOMETER_ROW,
     ORDER,
     OWN_PARAMETERS,
+    TUNABLE,
     BaliseOdometerEkf,
     D,
     P,
@@ -37,9 +38,9 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     moving_speed,
     transition,
 )
-from fmu_observer.observers.train.train_observer import BALISE
+from fmu_observer.observers.train.train_signals import BALISE
 from plant_models.hybrid import OutputWarning, discrete_output, memory, parameter, vector
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
@@ -129,7 +130,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     description = "Moving-horizon observer of odometer and balises, with disturbance and creep"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
     parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
-    outputs = (*BaliseOdometerEkf.outputs, *window_outputs(WINDOW), RESTARTS)
+    bounded_parameters = (*TUNABLE, *WINDOW_PARAMETERS)
+    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW), RESTARTS)
     iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
@@ -139,8 +141,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
 
     def __init__(self, window: int = WINDOW, passes: int = PASSES, loss: Loss = "geman_mcclure") -> None:
         require_window(self.name, window, passes)
-        if loss not in LOSSES:
-            raise ValueError(f"{self.name}: loss = {loss!r}; expected one of {', '.join(LOSSES)}.")
+        require_choice(self.name, self.option_choices, loss=loss)
         self.window, self.passes, self.loss = window, passes, loss
         self.gate_start = OFF
         told_of = {s.name: s for s in window_outputs(window)}
@@ -168,10 +169,6 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
             losses=(self.loss,),
             loss_scale=lambda shared: _shared(shared).loss_scale,
         )
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        """The parameters lie within their bounds."""
-        return super().requirements(p) | within_bounds(WINDOW_PARAMETERS, p)
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The window with a row more, and the estimates that it gives."""

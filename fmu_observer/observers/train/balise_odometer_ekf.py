@@ -23,20 +23,20 @@ from fmu_observer.observers.generic.discrete.covariance_requirements import posi
 from fmu_observer.observers.innovation_gate import place_deviation
 from fmu_observer.observers.made_for import MadeFor
 from fmu_observer.observers.train.standstill import stands
-from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import rolling_drag
-from plant_models.hybrid import (
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
+from fmu_observer.observers.train.train_signals import (
+    BALISE,
+    INNOVATION_OUTPUT,
+    LAST_INNOVATION,
+    ODOMETER,
+    ODOMETER_READ,
+    POSITION,
+    POSITION_OUTPUT,
+    SPEED,
+    SPEED_OUTPUT,
+    TRAIN_PARAMETERS,
 )
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
@@ -69,10 +69,7 @@ TUNABLE = (
     parameter("odometer_recover", "s", 15.0, "Time of refused readings after which they are believed", min=0.0),
 )
 OWN_PARAMETERS = (
-    parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
-    parameter("davis_a", "N", 900.0, "Running resistance, constant term", min=0.0),
-    parameter("davis_b", "N.s/m", 32.4, "Running resistance, linear term", min=0.0),
-    parameter("davis_c", "N.s2/m2", 1.65287, "Running resistance, quadratic term", min=0.0),
+    *TRAIN_PARAMETERS,
     parameter("odometer_period", "s", 0.1, "Time between two readings of the odometer", min=1e-4),
     parameter("reading_age", "s", 0.0, "Age of a reading when it is sampled", min=0.0),
     *TUNABLE,
@@ -126,16 +123,17 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "itself"
+    bounded_parameters: tuple[Signal, ...] = TUNABLE
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Applied effort at the wheel rim: traction positive, brake negative"),
-        input_signal("odometer", "m/s", 0.0, "Odometer speed"),
+        ODOMETER,
     )
     outputs: tuple[Signal, ...] = (
-        output_signal("position", "m", "Estimated position"),
-        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
+        POSITION_OUTPUT,
+        SPEED_OUTPUT,
         output_signal("disturbance", "m/s2", "Estimated acceleration that effort and resistance do not explain"),
         output_signal("creep", "m/s", "Estimated creep of the wheel, odometer minus speed"),
-        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        INNOVATION_OUTPUT,
         output_signal("position_std", "m", "Standard deviation of the position's error"),
         output_signal("speed_std", "m/s", "Standard deviation of the speed's error"),
         discrete_output("nis", "1", "Normalised innovation squared of the last measurement used"),
@@ -144,7 +142,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     )
     events = (
         BALISE,
-        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read", samples=("odometer",)),
+        ODOMETER_READ,
     )
     parameters: tuple[Signal, ...] = OWN_PARAMETERS
     presets: Mapping[str, Mapping[str, Any]] = {
@@ -180,15 +178,11 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             state("estimated_creep", "m/s", 0.0, "Creep z of the wheel"),
             memory("estimate_covariance", "1", start, text, shape=(ORDER, ORDER), symmetric=True),
             memory("last_time", "s", 0.0, "Time of the last event"),
-            memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+            LAST_INNOVATION,
             memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
             memory("refused_time", "s", 0.0, "Time for which readings have not been used"),
         )
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        """The parameters lie within their bounds."""
-        return super().requirements(p) | within_bounds(TUNABLE, p)
 
     def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """The covariance of the first estimate is one."""
@@ -271,10 +265,6 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "innovation_likelihood": x.log_likelihood,
             "odometer_fault": np.where(x.refused_time > 0.0, 1.0, 0.0),
         }
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def own_bound(self, x: Any, p: Any) -> Array:
         """Three standard deviations of the position at the last event [m]."""

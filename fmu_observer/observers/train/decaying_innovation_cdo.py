@@ -18,8 +18,8 @@ from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_par
 from fmu_observer.models.observer_model import shift_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
-from fmu_observer.observers.train.train_observer import POSITION, SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range
+from fmu_observer.observers.train.train_signals import POSITION, SPEED
 from plant_models.hybrid import Signal, memory, scalar_names
 from plant_models.hybrid.system import Array
 
@@ -86,14 +86,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
         return decaying_error(np.array(drift), gain, np.array([[1.0, 0.0]]), rate, exponent, (0, 1))
 
     def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """How long a hole may last: (3.109), the exact limit, and a trial beside a train at 20 m/s.
-
-        Args:
-            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
+        """How long a hole may last: (3.109), the exact limit, and a trial beside a train at 20 m/s."""
         values = parameter_values(self, parameters, preset, "to judge")
         p = self.unpack_parameters(values)
         exact = first_unstable_gap(self.vertices(p), LONGEST_HOLE)

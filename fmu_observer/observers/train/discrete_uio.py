@@ -9,9 +9,11 @@ import numpy as np
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.design.uio_design import uio_matrices
+from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.models.observer_model import named_as, stacked_of
-from fmu_observer.observers.train.train_observer import POSITION, Estimate, TrainObserver
-from plant_models.hybrid import PeriodicEvent, memory, parameter, state
+from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
+from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION
+from plant_models.hybrid import parameter, state
 from plant_models.hybrid.system import Array
 
 # Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes
@@ -50,14 +52,14 @@ class DiscreteUio(TrainObserver):
         state("slip_speed_rate", "m/s2", 0.0, "Rate of d1"),
         state("disturbance_rate", "m/s3", 0.0, "Rate of d2"),
     )
-    estimator_memory = (memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),)
+    estimator_memory = (LAST_INNOVATION,)
     estimator_parameters = (
         parameter("linearisation_speed", "m/s", 50.0 / 3.6, "Speed at which the drag slope is taken", min=0.0),
         parameter("odometer_period", "s", 0.1, "Sampling period of the odometer", min=1e-4),
         parameter("odometer_gain", "1", ODOMETER_GAIN, "Gain K_o per odometer sample, state i per m/s", size=ORDER),
         parameter("balise_gain", "1", BALISE_GAIN, "Gain K_b per balise, state i per m", size=ORDER),
     )
-    estimator_events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
+    estimator_events = (ODOMETER_SAMPLE,)
     stability_parameters = ("linearisation_speed", "odometer_period", "odometer_gain", "balise_gain")
 
     def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

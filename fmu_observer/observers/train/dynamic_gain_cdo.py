@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
-from fmu_observer.observers.train.train_observer import BALISE_INNOVATION
+from fmu_observer.observers.train.train_signals import BALISE_INNOVATION
 from plant_models.hybrid import Signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 

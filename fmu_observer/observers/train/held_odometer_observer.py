@@ -17,6 +17,7 @@ from fmu_observer.certificates.bounds import ErrorBounds
 from fmu_observer.certificates.bounds.carried import first_component, level, level_of_box
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.held_odometer_error import (
@@ -29,10 +30,11 @@ from fmu_observer.observers.train.held_odometer_error import (
 )
 from fmu_observer.observers.train.held_odometer_presets import DRAG_SLOPES, HELD_ODOMETER_PRESETS
 from fmu_observer.observers.train.standstill import held_disturbance, stands
-from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
-from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state
-from plant_models.hybrid.option import require_chosen
+from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
+from plant_models.hybrid import input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -125,7 +127,7 @@ class HeldOdometerObserver(TrainObserver):
         memory("held_error", "m/s", 0.0, "Largest error of that reading"),
         memory("sampled_once", "1", 0.0, "1 after the first sample"),
         memory("predicting", "1", 0.0, "1 while no reading acts on the estimate"),
-        memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+        LAST_INNOVATION,
         memory("last_disturbance", "m/s2", 0.0, "Disturbance at the last sample that was used"),
         memory("last_disturbance_rate", "m/s3", 0.0, "Its rate then"),
     )
@@ -158,14 +160,14 @@ class HeldOdometerObserver(TrainObserver):
         parameter("published_decay", "1/s", REPAIRED["published_decay"], "Decay m of the printed formula", min=1e-6),
         parameter("published_sample_error", "m/s", 0.1, "Error norm stated for each sample", min=0.0),
     )
-    estimator_events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
+    estimator_events = (ODOMETER_SAMPLE,)
     stability_parameters = ("gain", "gain_schedule", "speed_max")
     presets: Mapping[str, Mapping[str, Any]] = HELD_ODOMETER_PRESETS
     default_preset = "repaired"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"missing": ("predicted", "held")}
 
     def __init__(self, missing: Missing = "predicted") -> None:
-        require_chosen(self.name, self.option_choices, missing=missing)
+        require_choice(self.name, self.option_choices, missing=missing)
         self.missing = missing
         super().__init__(missing=missing)
 

@@ -16,8 +16,9 @@ from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import certified_gains
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
+from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
 from fmu_observer.observers.train.wheel_stage import WheelStage
 from plant_models.hybrid import Signal, parameter
 from plant_models.hybrid.system import Array

@@ -6,8 +6,8 @@ from typing import Any
 
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import WARN
-from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import discrete_output, input_signal, memory, output_signal
+from fmu_observer.observers.train.train_signals import BALISE, INNOVATION_OUTPUT, LAST_INNOVATION, ODOMETER, POSITION
+from plant_models.hybrid import output_signal
 from plant_models.hybrid.system import Array
 
 
@@ -25,12 +25,12 @@ class OdometerReset(GatedObserver):
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     gate_start = WARN
     weighing = "position"
-    states = (POSITION, memory("last_innovation", "m", 0.0, "Position error seen at the last balise"))
-    inputs = (input_signal("odometer", "m/s", 0.0, "Odometer speed"),)
+    states = (POSITION, LAST_INNOVATION)
+    inputs = (ODOMETER,)
     outputs = (
         output_signal("position", "m", "Position of the odometer"),
         output_signal("speed", "m/s", "Speed of the odometer", display_unit="km/h"),
-        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        INNOVATION_OUTPUT,
     )
     events = (BALISE,)
 
@@ -42,10 +42,6 @@ class OdometerReset(GatedObserver):
         """The position is that of the balise."""
         told = u.balise_position
         return {POSITION.name: told, "last_innovation": x.estimated_position - told}
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and innovation."""

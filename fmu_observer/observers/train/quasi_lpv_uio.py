@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar, Literal
 
@@ -22,24 +21,25 @@ from fmu_observer.design.quasi_lpv_published import (
     QuasiLpvDesign,
     quasi_lpv_vertices,
 )
-from fmu_observer.detection.jam_detector import (
-    FAULT_OUTPUTS,
-    ODOMETER_SAMPLE,
-    RULES,
-    RuleChoice,
-    find_rules,
-    noise_doubts,
-    told_bounds,
-    verdict,
-)
+from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, RULES, RuleChoice, noise_doubts, told_bounds, verdict
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.train.standstill import held_disturbance, stands
-from fmu_observer.observers.train.train_observer import BALISE, POSITION
-from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state, vector
-from plant_models.hybrid.option import require_chosen
+from fmu_observer.observers.train.train_signals import (
+    BALISE,
+    BALISES_USED,
+    INNOVATION_OUTPUT,
+    LAST_INNOVATION,
+    ODOMETER,
+    ODOMETER_READ,
+    POSITION,
+    POSITION_OUTPUT,
+    SPEED_OUTPUT,
+)
+from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 SPEEDS = 21  # between the vertices, for the certificate
@@ -55,11 +55,11 @@ OWN_MEMORY = (
     memory("held_innovation", "m/s", 0.0, "Odometer minus estimate just after the last sample"),
     memory("last_disturbance", "m/s2", 0.0, "Disturbance at the sample before"),
     memory("last_disturbance_rate", "m/s3", 0.0, "Its rate then"),
-    memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+    LAST_INNOVATION,
     memory("balise_stamp", "s", 0.0, "When the last balise was passed"),
     memory("balise_place", "m", 0.0, "Where it was"),
     memory("balise_reading", "m/s", 0.0, "Odometer then"),
-    memory("balises_used", "1", 0.0, "Balises used so far"),
+    BALISES_USED,
     memory("onset_lead", "m", 0.0, "Position minus way of the odometer when the last fault began"),
 )
 
@@ -123,15 +123,15 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "position"
-    events = (BALISE, replace(ODOMETER_SAMPLE, samples=("odometer",)))
+    events = (BALISE, ODOMETER_READ)
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort as commanded: traction positive, brake negative"),
-        input_signal("odometer", "m/s", 0.0, "Odometer speed"),
+        ODOMETER,
     )
     outputs = (
-        output_signal("position", "m", "Estimated position"),
-        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
-        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        POSITION_OUTPUT,
+        SPEED_OUTPUT,
+        INNOVATION_OUTPUT,
         output_signal("disturbance", "m/s2", "Estimated deceleration by what the model does not know"),
         output_signal("residual", "m/s", "M times odometer minus estimated speed"),
         *FAULT_OUTPUTS,
@@ -144,9 +144,9 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES), "hold": HOLDS}
 
     def __init__(self, rules: RuleChoice = "repaired", hold: HoldChoice = "innovation") -> None:
-        self.rules = find_rules(self.name, rules)
+        require_choice(self.name, self.option_choices, rules=rules, hold=hold)
+        self.rules = RULES[rules]
         self.told_bounds = told_bounds(self.rules)
-        require_chosen(self.name, self.option_choices, hold=hold)
         self.hold = hold
         self.repaired = rules == "repaired"
         self.states = (
@@ -222,10 +222,6 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     def own_bound(self, x: Any, p: Any) -> Array:
         """While the odometer is not believed no balise is to be doubted: it is what the speed is corrected by."""
         return OPEN_BOUND * self.rules.fault(x)
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""

@@ -24,7 +24,15 @@ from fmu_observer.detection.threshold_detector import (
 )
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.train.train_observer import BALISE, POSITION
+from fmu_observer.observers.train.train_signals import (
+    BALISE,
+    BALISES_USED,
+    INNOVATION_OUTPUT,
+    LAST_INNOVATION,
+    POSITION,
+    POSITION_OUTPUT,
+    SPEED_OUTPUT,
+)
 from plant_models.hybrid import (
     PeriodicEvent,
     Signal,
@@ -80,8 +88,8 @@ class StoppingUio(GatedObserver, GapCertified):
         state("disturbance_estimate", "m/s2", -0.91, "Estimate of all accelerations that the model does not know"),
         state("disturbance_rate", "m/s3", 0.337, "Estimate of the rate of the disturbance"),
         memory("held_innovation", "m/s", 0.0, "Odometer minus estimate at the last sample"),
-        memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
-        memory("balises_used", "1", 0.0, "Balises used so far"),
+        LAST_INNOVATION,
+        BALISES_USED,
         *THRESHOLD_MEMORY,
         memory("last_reading", "m/s", 0.0, "Odometer at the last sample"),
         memory("unchanged_time", "s", 0.0, "Time for which the odometer has not changed"),
@@ -92,10 +100,10 @@ class StoppingUio(GatedObserver, GapCertified):
         input_signal("odometer", "m/s", 0.0, "Speed, new every 1 to 2 ms"),
     )
     outputs = (
-        output_signal("position", "m", "Estimated position"),
-        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
+        POSITION_OUTPUT,
+        SPEED_OUTPUT,
         output_signal("disturbance", "m/s2", "Estimated acceleration that the model does not know, forward > 0"),
-        discrete_output("innovation", "m", "Estimated minus true position at the last balise"),
+        INNOVATION_OUTPUT,
         discrete_output("balises", "1", "Number of balises used so far"),
         discrete_output("residual", "m/s", "Odometer minus estimate at the last sample"),
         discrete_output("residual_level", "m/s", "Its magnitude as the detector judges it"),
@@ -191,10 +199,6 @@ class StoppingUio(GatedObserver, GapCertified):
             "recovering": x.judged_fault * x.armed,
             "held_odometer": x.held_seen,
         }
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the error of speed, disturbance and its rate, exact for an innovation held between samples.

@@ -12,9 +12,10 @@ from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import balise_family, certified_gains
 from fmu_observer.observers.parameter_values import Value
-from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
+from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
 from plant_models.hybrid import memory, parameter
-from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 Premise = Literal["frozen", "live", "estimated"]
@@ -95,7 +96,7 @@ class TakagiSugenoCdo(TrainObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"premise": ("frozen", "live", "estimated")}
 
     def __init__(self, premise: Premise = "frozen") -> None:
-        require_chosen(self.name, self.option_choices, premise=premise)
+        require_choice(self.name, self.option_choices, premise=premise)
         self.premise = premise
         if premise == "frozen":
             self.estimator_memory = (
@@ -162,11 +163,7 @@ class TakagiSugenoCdo(TrainObserver):
         return certify_sampled_error(vertices, max_gap, model, switching=not frozen)
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
-        """A decay that is consistent with the balise gains in use, else the largest high gain that is certified.
-
-        Args:
-            max_gap: longest gap between two balises [s].
-        """
+        """A decay that is consistent with the balise gains in use, else the largest high gain that is certified."""
         consistent = round(dict(certify({}).parameters)["balise_gain_position[1]"], 1)
         if consistent > 0.0 and certify({"innovation_decay": consistent}).holds:
             return f"innovation_decay = {consistent:g} is certified for {max_gap:.3g} s"

@@ -24,26 +24,9 @@ from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back
-from plant_models.hybrid import (
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    input_signal,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from fmu_observer.observers.train.train_signals import BALISE, POSITION_OUTPUT, SPEED_OUTPUT, TRAIN_PARAMETERS
+from plant_models.hybrid import PeriodicEvent, Signal, TriggeredEvent, input_signal, output_signal, parameter, vector
 from plant_models.hybrid.system import Array
-
-POSITION = state("estimated_position", "m", 0.0, "Estimate of the train position")
-SPEED = state("estimated_speed", "m/s", 1.0, "Estimate of the train speed")
-BALISE_INNOVATION = state("balise_innovation", "m", 0.0, "Position error seen at the last balise, decaying since")
-BALISE = TriggeredEvent(
-    "balise",
-    (input_signal("balise_position", "m", 0.0, "Position of the balise just passed", variability="discrete"),),
-    "A balise is passed, at its own time stamp",
-)
 
 
 class Estimate(NamedTuple):
@@ -87,18 +70,15 @@ class TrainObserver(GatedObserver, GapCertified):
         input_signal("odometer", "m/s", 0.0, "Odometer speed r w"),
     )
     outputs: tuple[Signal, ...] = (
-        output_signal("position", "m", "Estimated position"),
-        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
+        POSITION_OUTPUT,
+        SPEED_OUTPUT,
         *SLIP_OUTPUTS,
         output_signal("adhesion_force", "N", "Estimated adhesion force between wheels and rails"),
         output_signal("innovation", "m", "Estimated minus true position at the last balise, as it acts now"),
         ROLLS_BACK,
     )
     train_parameters: tuple[Signal, ...] = (
-        parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
-        parameter("davis_a", "N", 900.0, "Running resistance, constant term", min=0.0),
-        parameter("davis_b", "N.s/m", 32.4, "Running resistance, linear term", min=0.0),
-        parameter("davis_c", "N.s2/m2", 1.65287, "Running resistance, quadratic term", min=0.0),
+        *TRAIN_PARAMETERS,
         parameter("wheel_radius", "m", 0.575, "Wheel radius", min=1e-3),
         parameter("wheel_inertia", "kg.m2", 225.0, "Rotating inertia of one axle", min=1e-3),
         parameter(
@@ -139,10 +119,6 @@ class TrainObserver(GatedObserver, GapCertified):
             "slip": odometer_slip(u.odometer, estimate.speed, p.slip_floor),
             "slip_indicator": indicator_level(filtered, u.odometer, estimate.speed, p.slip_threshold, p.slip_min_speed),
         }
-
-    def odometer_of(self, u: Any) -> Array:
-        """The odometer [m/s]."""
-        return u.odometer
 
     def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Davis constant and brake as dry friction on the speed, ``(a + max(-F_ad, 0)) / M`` [m/s2], shape

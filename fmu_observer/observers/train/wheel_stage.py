@@ -11,6 +11,7 @@ from typing import Any
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sampled_error import SampledError
+from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
@@ -110,9 +111,7 @@ class MultirateStage(WheelStage):
         parameter("wheel_high_gain", "1", HIGH_GAIN_K, "Shape K of the wheel observer's gain", size=2),
         parameter("odometer_period", "s", 0.1, "Sampling period of the odometer", min=1e-4),
     )
-    events: tuple[PeriodicEvent, ...] = (
-        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),
-    )
+    events: tuple[PeriodicEvent, ...] = (ODOMETER_SAMPLE,)
     stability_parameters: tuple[str, ...] = ("theta_1", "wheel_high_gain", "odometer_period")
 
     def adhesion(self, x: Any, u: Any, p: Any) -> Array:

@@ -46,9 +46,10 @@ from fmu_observer.observers.generic.adaptive.adaptive_certificate import (
     shortest_tried,
 )
 from fmu_observer.observers.generic.adaptive.adaptive_trials import adaptive_trial
+from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.model_signals import arrival_event, estimate_outputs, estimate_states
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, scalar_names, state
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid import Signal, output_signal, parameter, scalar_names
 from plant_models.hybrid.system import Array
 
 LATER, EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
@@ -64,7 +65,7 @@ ADAPTIVE_PARAMETERS = (
 )
 
 
-class AdaptiveObserver(GatedObserver, GapCertified):
+class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
     """Base of the observers of state and unknown constants at once: Hann 2014, chapter 4.
 
     States are the estimates, the constants, the adaptation (`adaptive_law.adaptation_states`), and what a subclass
@@ -98,22 +99,17 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         believed = (*chosen.states, *chosen.unknowns)
         first = start_covariance(chosen.C, (NOTHING_KNOWN,) * len(believed), self.sizes, self.predicts)
         self.states = (
-            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in believed),
+            *estimate_states(believed),
             *adaptation_states(self.sizes, first),
             self.kept_signal(),
         )
         self.inputs = chosen.inputs
         self.outputs = adaptive_outputs(chosen)
-        self.parameters = (
+        self.parameters = self.bounded_parameters = (
             *ADAPTIVE_PARAMETERS,
             parameter("noise_deviation", "1", 0.0, "Standard deviation of the noise of a measurement", min=0.0),
         )
-        payload = tuple(
-            input_signal(f"{chosen.event}_{s.name}", s.unit, s.start, s.description, variability="discrete")
-            for s in chosen.measurements
-        )
-        read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
-        self.events = (TriggeredEvent(chosen.event, payload, text, samples=read),)
+        self.events = (arrival_event(chosen.event, chosen.measurements),)
         super().__init__(model=chosen.name, **options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
@@ -131,10 +127,6 @@ class AdaptiveObserver(GatedObserver, GapCertified):
         """What is kept once the measurements y are known, by name."""
 
     # -- what follows -----------------------------------------------------------------------------------------------
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        """The parameters lie within their bounds."""
-        return super().requirements(p) | within_bounds(self.parameters[: len(ADAPTIVE_PARAMETERS) + 1], p)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, constants, adaptation, and predicted outputs where they are predicted."""
@@ -224,16 +216,8 @@ class AdaptiveObserver(GatedObserver, GapCertified):
             notes=(*found.notes, note),
         )
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`.
-
-        Args:
-            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
-
-        Raises:
-            ValueError: a parameter or the preset is unknown, or has another size.
-        """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+    def condition_of(self, p: Any) -> Condition:
+        """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`."""
         early, late = (adaptive_bounds(self.model, float(p.mu), begin=begin) for begin in (0.5 * LATER, LATER))
         alpha0 = late.alpha0
         values = {"alpha0": alpha0, "least_alpha0": EXCITED * early.alpha0}
@@ -260,14 +244,7 @@ class AdaptiveObserver(GatedObserver, GapCertified):
     # -- limits -----------------------------------------------------------------------------------------------------
 
     def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """Between two samples: (4.63) beside the exact limit of the linear error equations, and trials.
-
-        Args:
-            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
-
-        Raises:
-            ValueError: a parameter or the preset is unknown, or has another size.
-        """
+        """Between two samples: (4.63) beside the exact limit of the linear error equations, and trials."""
         values = parameter_values(self, parameters, preset, "to judge")
         mu = float(self.unpack_parameters(values).mu)
         bounds = adaptive_bounds(self.model, mu)
@@ -319,13 +296,13 @@ def adaptive_outputs(model: StateAffineModel) -> tuple[Signal, ...]:
     of_constants: list[Signal] = []
     for s in model.unknowns:
         of_constants += [
-            output_signal(s.name, s.unit, f"Estimate: {s.description}"),
+            *estimate_outputs([s]),
             output_signal(f"{s.name}_deviation", s.unit, f"Standard deviation of its error: {s.description}"),
             output_signal(f"{s.name}_learnt", "1", f"1 where it is learnt, 0 where it is held: {s.description}"),
         ]
     q = len(model.measurements)
     return (
-        *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in model.states),
+        *estimate_outputs(model.states),
         *of_constants,
         output_signal("smallest_excitation", "1", "Smallest eigenvalue of the mean Gramian of the excitation"),
         output_signal("innovation", "1", "Innovation that acts", size=None if q == 1 else q),

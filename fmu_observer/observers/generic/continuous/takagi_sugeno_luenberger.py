@@ -13,8 +13,10 @@ from fmu_observer.models.checks import checked_matrix
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
-from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, matrix_parameter, measured_inputs
+from plant_models.hybrid import output_signal, state
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 Premise = Literal["measured", "estimated"]
@@ -22,7 +24,7 @@ PREMISES: tuple[Premise, ...] = ("measured", "estimated")
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, ... [ours]
 
 
-class TakagiSugenoLuenberger(HybridSystem):
+class TakagiSugenoLuenberger(JudgedObserver):
     """Takagi-Sugeno Luenberger observer ``dxh = sum_i h_i [A_i xh + B_i u - K_i (C xh - y)]``: Bouchama 2024,
     (1.19)-(1.28).
 
@@ -58,24 +60,21 @@ class TakagiSugenoLuenberger(HybridSystem):
         gains: np.ndarray | None = None,
     ) -> None:
         self.model = chosen = find_takagi_sugeno_model(model)
-        if premise not in PREMISES:
-            raise ValueError(f"{self.name}: unknown premise {premise!r}; use {', '.join(map(repr, PREMISES))}.")
+        require_choice(self.name, self.option_choices, premise=premise)
         self.premise = premise
         n, shape = chosen.order, (chosen.vertices, chosen.order, len(chosen.measurements))
         K = placed_gains(chosen, -SPEED * (1.0 + 0.25 * np.arange(n))) if gains is None else gains
         K = checked_matrix(self.name, "gain", K, shape, "vertices, states, measurements")
         self.states = (
-            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in chosen.states),
+            *estimate_states(chosen.states),
             state("time_outside", "s", 0.0, "For how long a premise was outside its bounds"),
         )
-        measured = (input_signal(f"measured_{s.name}", s.unit, s.start, s.description) for s in chosen.measurements)
-        self.inputs = (*chosen.inputs, *measured)
+        self.inputs = (*chosen.inputs, *measured_inputs(chosen.measurements))
         self.outputs = (
-            *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in chosen.states),
+            *estimate_outputs(chosen.states),
             output_signal("premise_outside_time", "s", "For how long a premise was outside its bounds"),
         )
-        text = "Gains K_i: by vertex, state, measurement, in SI units"
-        self.parameters = (parameter("gain", "1", tuple(map(float, K.ravel())), text, size=K.size),)
+        self.parameters = (matrix_parameter("gain", K, "Gains K_i: by vertex, state, measurement, in SI units"),)
         super().__init__(model=chosen.name, premise=premise)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -97,13 +96,8 @@ class TakagiSugenoLuenberger(HybridSystem):
         estimate = stacked_of(x, self.model.states, "estimated_")
         return named_as(self.model.states, estimate) | {"premise_outside_time": x.time_outside}
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """Whether one quadratic Lyapunov function covers all vertices for the gains in use.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+    def condition_of(self, p: Any) -> Condition:
+        """Whether one quadratic Lyapunov function covers all vertices for the gains in use."""
         found = vertex_decrease(
             self.model, np.stack([np.asarray(self._gain_of(p, i)) for i in range(self.model.vertices)])
         )

@@ -6,13 +6,12 @@ It knows hybrid systems, and nothing of the equations of a differentiator.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
-from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import HybridSystem, Signal, input_signal, memory, output_signal, parameter, state
+from fmu_observer.observers.judged_observer import JudgedObserver
+from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array
@@ -20,7 +19,7 @@ from plant_models.hybrid.system import Array
 LARGEST = len(LEVANT_GAINS) - 1
 
 
-class SignalDifferentiator(HybridSystem):
+class SignalDifferentiator(JudgedObserver):
     """Base of the differentiators of one scalar signal f with ``|f^(n+1)| <= L``.
 
     The contract: a subclass sets `discrete` where the estimates are memory, gives the filter states and further signals
@@ -88,7 +87,7 @@ class SignalDifferentiator(HybridSystem):
         """The signal and its derivatives, as estimated."""
         return {s.name: getattr(x, f"estimated_{s.name}") for s in self.outputs}
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+    def condition_of(self, p: Any) -> Condition:
         """What the differentiator asks of its signal, and how well it can do, for the parameters in use.
 
         The gains are tabulated ones, whose convergence in finite time is Levant's theorem; so the condition is one on
@@ -96,11 +95,7 @@ class SignalDifferentiator(HybridSystem):
         L bounds its derivative n + 1. `unit_sine_rate` is the largest rate [rad/s] of a sine of amplitude 1 that is
         within L, and ``chatter_i = L h^(n+1-i)`` the size of the error of derivative i that a time h between
         evaluations leaves.
-
-        Args:
-            preset: name of a preset that gives the parameters; None for the defaults.
         """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
         bound, h, n = float(p.bound), self.interval(p), self.order
         chatter = {f"chatter_{i}": bound * h ** (n + 1 - i) for i in range(n + 1)}
         return Condition(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.models.observer_model import stacked_of
 from fmu_observer.observers.gated_observer import GATED_EVENT
-from plant_models.hybrid import Event, PeriodicEvent, Signal, TriggeredEvent, input_signal
+from fmu_observer.observers.model_signals import arrival_event, measured_inputs, sampling_event
+from plant_models.hybrid import Event, Signal
 from plant_models.hybrid.system import Array
 
 PERIODIC = "periodic"
@@ -57,27 +59,17 @@ class Arrivals:
     @property
     def inputs(self) -> tuple[Signal, ...]:
         """Inputs that are read at the filter's own period."""
-        return tuple(
-            input_signal(f"measured_{s.name}", s.unit, s.start, s.description)
-            for s, name in zip(self.signals, self.names, strict=True)
-            if name == PERIODIC
-        )
+        return measured_inputs(s for s, name in zip(self.signals, self.names, strict=True) if name == PERIODIC)
 
     @property
     def events(self) -> tuple[Event, ...]:
         """The periodic event, then those from outside with their payloads."""
         text = "The measurements are read" if not self.timed else "The estimate is predicted"
-        own = tuple(s.name for s in self.inputs)
-        found: list[Event] = [PeriodicEvent(SAMPLING, "sample_period", description=text, samples=own, leaves_out=True)]
+        found: list[Event] = [sampling_event([s.name for s in self.inputs], text, leaves_out=True)]
         for name in dict.fromkeys(self.names):
             if name != PERIODIC:
-                payload = tuple(
-                    input_signal(f"{name}_{s.name}", s.unit, s.start, s.description, variability="discrete")
-                    for s in (self.signals[i] for i in self.rows(name))
-                )
-                samples = () if name == GATED_EVENT else tuple(s.name for s in payload)  # a telegram is whole or none
-                what = "A measurement arrives, at its own time stamp"
-                found.append(TriggeredEvent(name, payload, what, samples=samples, leaves_out=True))
+                arrives = arrival_event(name, [self.signals[i] for i in self.rows(name)], leaves_out=True)
+                found.append(replace(arrives, samples=()) if name == GATED_EVENT else arrives)  # telegrams are whole
         return tuple(found)
 
     def rows(self, event: str) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.observers.generic.discrete.arrivals import Arrivals
+from fmu_observer.observers.model_signals import STATISTICS, deviation_outputs, estimate_outputs, estimate_states
 from plant_models.hybrid import OutputWarning, Signal, discrete_output
 from plant_models.hybrid import memory as memory_signal
 
@@ -20,6 +21,7 @@ NOT_POSITIVE = discrete_output(
         "square_root, or noises and first deviations whose sizes differ less"
     ),
 )
+_ROWS = "row by row, SI units"
 
 
 @dataclass(frozen=True)
@@ -42,19 +44,13 @@ class SignalsOf:
         name = "estimate_covariance_factor" if self.rooted else "estimate_covariance"
         text = "Lower factor of the covariance P(k|k)" if self.rooted else "Covariance P(k|k)"
         found = [
-            memory_signal(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}")
-            for s in self.model.states
-        ]
-        found += [
-            memory_signal(name, "1", np.eye(n), f"{text}, row by row, SI units", shape=(n, n)),
+            *estimate_states(self.model.states, memory_signal),
+            memory_signal(name, "1", np.eye(n), f"{text}, {_ROWS}", shape=(n, n)),
             memory_signal("last_innovation", "1", 0.0, "Last measured minus predicted, SI units", size=q),
-            memory_signal(
-                "last_innovation_covariance", "1", 0.0, "Covariance of it, row by row, SI units", shape=(q, q)
-            ),
-            memory_signal("last_nis", "1", 0.0, "Last normalised innovation squared"),
-            memory_signal("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
+            memory_signal("last_innovation_covariance", "1", 0.0, f"Covariance of it, {_ROWS}", shape=(q, q)),
+            *STATISTICS,
+            memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive, or lost a variance"),
         ]
-        found.append(memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive, or lost a variance"))
         if self.arrivals.several:
             found.append(memory_signal("last_count", "1", 0.0, "How many measurements arrived last together"))
         if self.arrivals.timed:
@@ -63,23 +59,22 @@ class SignalsOf:
 
     def outputs(self) -> tuple[Signal, ...]:
         """Estimates, their standard deviations, innovations and how they fit."""
-        n, q, found = self.model.order, len(self.model.measurements), []
-
-        def told(name: str, unit: str, text: str, size: int | None = None) -> None:
-            found.append(discrete_output(name, unit, text, size=size))
-
-        for s in self.model.states:
-            told(s.name, s.unit, f"Estimate: {s.description}")
-        for s in self.model.states:
-            told(f"{s.name}_std", s.unit, f"Standard deviation of the estimate: {s.description}")
-        for s in self.model.measurements:
-            told(f"innovation_{s.name}", s.unit, f"Last measured minus predicted: {s.description}")
-        told("innovation_covariance", "1", "Covariance of the last innovation, row by row, SI units", q * q)
-        told("nis", "1", "Normalised innovation squared of the last measurements")
-        told("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far")
+        model, n, q = self.model, self.model.order, len(self.model.measurements)
+        found = [
+            *estimate_outputs(model.states, discrete_output),
+            *deviation_outputs(model.states, discrete_output),
+            *(
+                discrete_output(f"innovation_{s.name}", s.unit, f"Last measured minus predicted: {s.description}")
+                for s in model.measurements
+            ),
+            discrete_output("innovation_covariance", "1", f"Covariance of the last innovation, {_ROWS}", size=q * q),
+            discrete_output("nis", "1", "Normalised innovation squared of the last measurements"),
+            discrete_output("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far"),
+        ]
         if self.arrivals.several:
-            told("nis_degrees", "1", "Degrees of freedom of the last normalised innovation squared")
+            text = "Degrees of freedom of the last normalised innovation squared"
+            found.append(discrete_output("nis_degrees", "1", text))
         found.append(NOT_POSITIVE)
         if self.covariances:
-            told("covariance", "1", "Covariance of the estimate, row by row, SI units", n * n)
+            found.append(discrete_output("covariance", "1", f"Covariance of the estimate, {_ROWS}", size=n * n))
         return tuple(found)

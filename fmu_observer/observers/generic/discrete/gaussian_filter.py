@@ -27,10 +27,12 @@ from fmu_observer.observers.generic.discrete.filter_signals import NOT_POSITIVE,
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief, chosen
 from fmu_observer.observers.generic.discrete.sample_step import PRIMED
 from fmu_observer.observers.innovation_gate import known_accuracy
+from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
-from fmu_observer.observers.parameter_values import Value, parameter_values
+from fmu_observer.observers.model_signals import matrix_parameter
 from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.missing import is_there
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -43,7 +45,7 @@ LEFT = 8.0 * float(np.finfo(np.float64).eps)  # of a variance, after a subtracti
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 
 
-class GaussianFilter(GatedObserver):
+class GaussianFilter(GatedObserver, JudgedObserver):
     """Base of the Kalman filters of any `FilterModel`.
 
     The contract:
@@ -119,8 +121,7 @@ class GaussianFilter(GatedObserver):
         if unknown:
             self.model = with_unknown(self.model, unknown)
         self.form: Form = self.forms[0] if form is None else form
-        if self.form not in self.forms:
-            raise ValueError(f"{self.name}: unknown form {form!r}; choose one of: {', '.join(self.forms)}.")
+        require_choice(self.name, {"form": self.forms}, form=self.form)
         self.arrivals = Arrivals(self.name, self.model, arrival)
         self.covariances = covariances
         self._declare()
@@ -311,17 +312,6 @@ class GaussianFilter(GatedObserver):
         text = f"{self._spread}: entries below {LARGEST_ENTRY:g}, whose squares are numbers"
         return {text: np.where(np.max(np.abs(spread)) < LARGEST_ENTRY, 1.0, 0.0)}
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """Whether the filter has a stable steady state with the gains of a preset, some replaced.
-
-        Args:
-            parameters: values by name. preset: to start from; None for the default one.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
-        return self.condition_of(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
-
     def condition_of(self, p: Any) -> Condition:
         """Whether the filter linearised at the start of the estimates has a stable steady state.
 
@@ -378,8 +368,8 @@ class GaussianFilter(GatedObserver):
         r, s = self.model.noise_count, self.model.reading_noise_count
         readings = VARIANCE * np.eye(s)
         return (
-            _matrix(self._process_name, *self._default_noise(r)),
-            _matrix("measurement_covariance", readings, "Covariance RN of the measurements, row by row"),
+            matrix_parameter(self._process_name, *self._default_noise(r)),
+            matrix_parameter("measurement_covariance", readings, "Covariance RN of the measurements, row by row"),
         )
 
     def _default_noise(self, r: int) -> tuple[np.ndarray, str]:
@@ -403,10 +393,6 @@ class GaussianFilter(GatedObserver):
         inputs = self.model.start_inputs
         H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
         return self._estimated[int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))]
-
-
-def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
-    return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)
 
 
 def _lost(before: Sequence[Array], after: Sequence[Array], share: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -18,9 +19,17 @@ from fmu_observer.models.traced_system_model import Source, Steps, find_filter_m
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.generic.discrete.sample_step import PRIMED
+from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
-from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import HybridSystem, PeriodicEvent, Signal, discrete_output, input_signal, memory, parameter
+from fmu_observer.observers.model_signals import (
+    deviation_outputs,
+    estimate_outputs,
+    estimate_states,
+    matrix_parameter,
+    measured_inputs,
+    sampling_event,
+)
+from plant_models.hybrid import PeriodicEvent, Signal, discrete_output, input_signal, memory, parameter
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.requirements import within_bounds
@@ -60,7 +69,7 @@ class CorrectedMembers(NamedTuple):
     more: Mapping[str, Array] = {}
 
 
-class MemberFilter(HybridSystem):
+class MemberFilter(JudgedObserver):
     """Base of filters of any `FilterModel` whose belief is a number of members.
 
     The contract:
@@ -200,17 +209,10 @@ class MemberFilter(HybridSystem):
         needed |= positive("start_covariance", p.start_covariance, n, definite=False)
         return needed | positive("measurement_covariance", p.measurement_covariance, q, definite=True)
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+    def condition_of(self, p: Any) -> Condition:
         """Whether the Kalman filter of the model, linearised at the start, has a stable steady state; members add
         sampling errors of ``1 / sqrt(members)``.
-
-        Args:
-            parameters: values by name. preset: to start from; None for the default one.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
         """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
         r, q = self.model.noise_count, len(self.model.measurements)
         noise, readings = (
             as_matrix(np.asarray(v), k, k) for v, k in ((p.process_covariance, r), (p.measurement_covariance, q))
@@ -236,45 +238,46 @@ class MemberFilter(HybridSystem):
         return Known(0.0, inputs, parameters)
 
     def _declare(self) -> None:
-        model, count, normal = self.model, self.members, "Standard normal numbers of this sample"
-        n, q, r = model.order, len(model.measurements), model.noise_count
-        self.states = (
-            *(memory(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in model.states),
+        """Signals and the event, from the model."""
+        model, period = self.model, "Sampling period of the measurements"
+        self.states = self._memory()
+        self.inputs = (*model.inputs, *measured_inputs(model.measurements))
+        self.events = (self._sampling(),)
+        self.outputs = (
+            *estimate_outputs(model.states, discrete_output),
+            *deviation_outputs(model.states, discrete_output),
+            discrete_output("nis", "1", "Normalised innovation squared of the last sample"),
+            discrete_output("nis_degrees", "1", "Degrees of freedom of the normalised innovation squared"),
+            *self.own_outputs,
+        )
+        period_of = parameter("sample_period", "s", model.sample_period, period, min=1e-6)
+        self.parameters = (*self._noises(), *self.own_parameters, *model.parameters, period_of)
+
+    def _memory(self) -> tuple[Signal, ...]:
+        n, q = self.model.order, len(self.model.measurements)
+        return (
+            *estimate_states(self.model.states, memory),
             memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory("deviations", "1", (1.0,) * n, "Standard deviations of the estimates, SI units", size=n),
-            memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", shape=(count, n)),
+            memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", shape=(self.members, n)),
             *self.own_memory,
             memory("last_count", "1", float(q), "How many measurements there were last"),
             PRIMED,
         )
-        self.inputs = (
-            *model.inputs,
-            *(input_signal(f"measured_{s.name}", s.unit, s.start, s.description) for s in model.measurements),
+
+    def _sampling(self) -> PeriodicEvent:
+        """The event of a sample, with the numbers that are drawn for it."""
+        model = self.model
+        q, drawn_for_each = len(model.measurements), {"process_normal": max(model.order, model.noise_count)}
+        if self.perturbs:
+            drawn_for_each["measurement_normal"] = q
+        text = "Standard normal numbers of this sample"
+        noises = tuple(
+            input_signal(name, "1", 0.0, text, variability="discrete", size=k * self.members)
+            for name, k in drawn_for_each.items()
         )
-        sizes = {"process_normal": max(n, r)} | ({"measurement_normal": q} if self.perturbs else {})
-        noises = (
-            input_signal(name, "1", 0.0, normal, variability="discrete", size=k * count) for name, k in sizes.items()
-        )
-        read = tuple(f"measured_{s.name}" for s in model.measurements)
-        text = "The measurements are read"
-        self.events = (
-            PeriodicEvent(
-                "sampling", "sample_period", noises=tuple(noises), description=text, samples=read, leaves_out=True
-            ),
-        )
-        told = [(s.name, s.unit, f"Estimate: {s.description}") for s in model.states]
-        told += [
-            (f"{s.name}_std", s.unit, f"Standard deviation of the estimate: {s.description}") for s in model.states
-        ]
-        told += [("nis", "1", "Normalised innovation squared of the last sample")]
-        told += [("nis_degrees", "1", "Degrees of freedom of the normalised innovation squared")]
-        self.outputs = (*(discrete_output(*words) for words in told), *self.own_outputs)
-        self.parameters = (
-            *self._noises(),
-            *self.own_parameters,
-            *model.parameters,
-            parameter("sample_period", "s", model.sample_period, "Sampling period of the measurements", min=1e-6),
-        )
+        read = [f"measured_{s.name}" for s in model.measurements]
+        return replace(sampling_event(read, leaves_out=True), noises=noises)
 
     def _noises(self) -> tuple[Signal, ...]:
         model, n, r, q = self.model, self.model.order, self.model.noise_count, len(self.model.measurements)
@@ -284,11 +287,9 @@ class MemberFilter(HybridSystem):
         else:
             QN = np.asarray(noise_over(model, model.start, self._at_start(), period, density))
         return (
-            _matrix("process_covariance", QN, "Covariance QN of the process noise of one period, row by row"),
-            _matrix("measurement_covariance", VARIANCE * np.eye(q), "Covariance RN of the measurements, row by row"),
-            _matrix("start_covariance", np.eye(n), "Covariance of the first estimate, row by row"),
+            matrix_parameter("process_covariance", QN, "Covariance QN of the process noise of one period, row by row"),
+            matrix_parameter(
+                "measurement_covariance", VARIANCE * np.eye(q), "Covariance RN of the measurements, row by row"
+            ),
+            matrix_parameter("start_covariance", np.eye(n), "Covariance of the first estimate, row by row"),
         )
-
-
-def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
-    return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)

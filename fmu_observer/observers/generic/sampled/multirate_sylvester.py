@@ -17,9 +17,10 @@ from fmu_observer.design.sylvester import sylvester_design, sylvester_residual
 from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
-from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, state
+from fmu_observer.observers.model_signals import estimate_outputs, matrix_parameter, measured_inputs
+from plant_models.hybrid import Signal, TriggeredEvent, state
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 
@@ -29,7 +30,7 @@ SPEED = 2.0  # [1/s] of the poles of A, at -SPEED, -1.25 SPEED, ... [ours]
 RESIDUAL = 1e-9  # relative: above it (1.46) does not hold for the matrices in use
 
 
-class MultirateSylvester(GapCertified):
+class MultirateSylvester(GapCertified, JudgedObserver):
     """Observer of ``x = [x_R, x_c, x_d]``: x_c measured always, each component of x_d at its own event.
 
     Bouchama 2024, (1.42)-(1.46):
@@ -66,9 +67,9 @@ class MultirateSylvester(GapCertified):
         )
         design = sylvester_design(self.model.A, self.hidden, poles, names, f"{self.name} of {self.model.name}")
         self.parameters = (
-            _matrix("filter_matrix", design.A, "Matrix A of the filter, Hurwitz, row by row [1/s]"),
-            _matrix("filter_gain", design.B, "Gain [B_c B_d] of the filter, row by row"),
-            _matrix("transformation", design.T, "T = [T_R T_c T_d] of the Sylvester equation, row by row"),
+            matrix_parameter("filter_matrix", design.A, "Matrix A of the filter, Hurwitz, row by row [1/s]"),
+            matrix_parameter("filter_gain", design.B, "Gain [B_c B_d] of the filter, row by row"),
+            matrix_parameter("transformation", design.T, "T = [T_R T_c T_d] of the Sylvester equation, row by row"),
         )
         starts = self.model.start
         self.states = (
@@ -78,12 +79,12 @@ class MultirateSylvester(GapCertified):
                 for s in self._slow_states()
             ),
         )
-        self.inputs = (*self.model.inputs, *(_payload(s, f"measured_{s.name}", "continuous") for s in self.always))
-        self.outputs = tuple(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in self.model.states)
+        self.inputs = (*self.model.inputs, *measured_inputs(self.always))
+        self.outputs = estimate_outputs(self.model.states)
         self.events = tuple(
             TriggeredEvent(
                 f"{s.name}_sample",
-                (_payload(s, f"{s.name}_sample_value", "discrete"),),
+                measured_inputs([replace(s, name="value")], f"{s.name}_sample_", "discrete"),
                 f"Sample: {s.description}",
                 samples=(f"{s.name}_sample_value",),
             )
@@ -117,13 +118,9 @@ class MultirateSylvester(GapCertified):
         measured = np.hstack([always, sampled]) if self.always else sampled
         return np.hstack([np.linalg.solve(T[:, :r], x.filter - T[:, r:] @ measured), measured])
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """(1.46) by its residual, A Hurwitz by its abscissa, T_R invertible by its condition number.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
-        r, A, B, T = self._numbers(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
+    def condition_of(self, p: Any) -> Condition:
+        """(1.46) by its residual, A Hurwitz by its abscissa, T_R invertible by its condition number."""
+        r, A, B, T = self._numbers(p)
         residual = sylvester_residual(self.model.A, A, B, T)
         abscissa, spread = float(np.linalg.eigvals(A).real.max()), float(np.linalg.cond(T[:, :r]))
         return Condition(
@@ -142,10 +139,8 @@ class MultirateSylvester(GapCertified):
         generator = np.block([[A, B_d], [read, own]])
         reset = np.diag(np.r_[np.ones(r), np.zeros(count)])
         residual = sylvester_residual(self.model.A, A, B, T)
-        model = (
-            f"error equations of the model {self.model.name!r}, exact if it is linear; noise and model errors are "
-            f"left out"
-        )
+        left_out = "noise and model errors are left out"
+        model = f"error equations of the model {self.model.name!r}, exact if it is linear; {left_out}"
         found = certify_sampled_error((ImpulsiveError.of(generator, reset),), max_gap, model)
         note = f"the Sylvester equation holds with the residual {residual:.1e}"
         found = replace(found, holds=found.holds and residual < RESIDUAL, notes=(note,))
@@ -200,11 +195,3 @@ def _find(model: str | ObserverModel) -> ObserverModel:
         known = ", ".join(MULTIRATE_MODELS)
         raise ValueError(f"Unknown multirate model {model!r}; known are: {known}. Or give an ObserverModel.")
     return MULTIRATE_MODELS[model]()
-
-
-def _matrix(name: str, values: np.ndarray, description: str) -> Signal:
-    return parameter(name, "1", tuple(map(float, values.ravel())), description, size=values.size)
-
-
-def _payload(signal: Signal, name: str, variability: Any) -> Signal:
-    return input_signal(name, signal.unit, signal.start, signal.description, variability=variability)

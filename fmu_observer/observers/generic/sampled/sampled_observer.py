@@ -49,14 +49,7 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
         return with_switching_noted(certificate, vertices, "slopes") if len(vertices) > 1 else certificate
 
     def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """How long the observer may wait for a sample: printed bounds, the certificate, and a trial beside its model.
-
-        Args:
-            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
+        """How long it may wait for a sample: printed bounds, the certificate, and a trial beside its model."""
         values = parameter_values(self, parameters, preset, "to judge")
         certificate = self.certify(self.model.sample_period, parameters, preset)
         longest = certificate.constant_limit

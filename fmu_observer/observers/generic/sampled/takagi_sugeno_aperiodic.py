@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.observers.generic.sampled.takagi_sugeno_held import TakagiSugenoHeld
-from plant_models.hybrid import Event, Signal, TriggeredEvent, memory, vector
+from plant_models.hybrid import Signal, memory, vector
 from plant_models.hybrid.system import Array
 
 
@@ -37,15 +37,6 @@ class TakagiSugenoAperiodic(TakagiSugenoHeld):
         measured, count = self.measured(u), len(self.model.sampled)
         best = self.model.informed(estimate, measured[:count], measured[count:] if self.model.continuous else None)
         return {"weight": vector(*self.model.weights(self.model.premise_values(best, self.known(u))))}
-
-    def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
-        """Triggered."""
-        read, text = tuple(s.name for s in payload), "A measurement arrives, at its own time stamp"
-        return TriggeredEvent(self.model.event, payload, text, samples=read)
-
-    def measurement_name(self, name: str) -> str:
-        """A payload of the event."""
-        return f"{self.model.event}_{name}"
 
     def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
         """Weights of the last sample."""

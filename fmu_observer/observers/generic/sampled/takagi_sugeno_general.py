@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from math import isfinite
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -14,33 +13,25 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error, with_swit
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.observer_limits import Limit
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
-from fmu_observer.observers.gap_certified import ASKED_GAP, limits_of
+from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import GAINS, TakagiSugenoGains
+from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, measured_inputs
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import (
-    Signal,
-    TriggeredEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import Signal, TriggeredEvent, discrete_output, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 Premise = Literal["estimated", "live", "frozen"]
 PREMISES: tuple[Premise, ...] = ("estimated", "live", "frozen")
 
 
-class GeneralTakagiSugenoCdo(GatedObserver):
+class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
     """Takagi-Sugeno observer with continuous and aperiodic sampled outputs: Bouchama 2024, (2.6).
 
     ``dxh = sum_i h_i [A_i xh + B_i u - K_i2 (C2 xh - y2) - K_i1 c]``, ``dc = -eta c``, ``c = C1 xh - y1`` at a sample.
@@ -85,8 +76,7 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         gains: TakagiSugenoGains | None = None,
     ) -> None:
         self.model = chosen = find_takagi_sugeno_model(model)
-        if premise not in PREMISES:
-            raise ValueError(f"{self.name}: unknown premise {premise!r}; use {', '.join(map(repr, PREMISES))}.")
+        require_choice(self.name, self.option_choices, premise=premise)
         if not chosen.sampled:
             raise ValueError(
                 f"{self.name}: model {chosen.name!r} has no sampled measurement; use an observer of continuous ones."
@@ -104,13 +94,13 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         self.default_preset = next(iter(self.presets))
         self.parameters = self._gain_parameters()
         self.states = (*self._estimator_states(), *self._memory())
-        self.inputs = (*chosen.inputs, *(_renamed(s, "measured_", "continuous") for s in chosen.continuous))
+        self.inputs = (*chosen.inputs, *measured_inputs(chosen.continuous))
         self.outputs = (
-            *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in chosen.states),
+            *estimate_outputs(chosen.states),
             discrete_output("premise_violations", "1", "Samples at which a premise was outside its bounds"),
             output_signal("premise_outside_time", "s", "For how long a premise was outside its bounds"),
         )
-        payload = tuple(_renamed(s, f"{chosen.event}_", "discrete") for s in chosen.sampled)
+        payload = measured_inputs(chosen.sampled, f"{chosen.event}_", "discrete")
         self.events = (TriggeredEvent(chosen.event, payload, "A sampled measurement arrives, at its own time stamp"),)
         super().__init__(model=chosen.name, premise=premise)
 
@@ -163,60 +153,27 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         p = self.unpack_parameters(parameter_values(self, parameters, preset))
         return tuple(self._error_at(h, p) for h in np.eye(self.model.vertices))
 
-    def certify(
-        self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None
-    ) -> Certificate:
-        """Exact stability check of the gains in use for gaps up to `max_gap` between samples.
-
-        Args:
-            max_gap: longest expected gap [s]. parameters: values by name that replace those of the preset.
-            preset: preset to start from.
-
-        Raises:
-            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or
-            the preset
-                is unknown.
-        """
-        if not (isfinite(max_gap) and max_gap > 0.0):
-            raise ValueError(f"{self.name}: max_gap must be positive and finite [s], got {max_gap!r}.")
-        p = self.unpack_parameters(parameter_values(self, parameters, preset))
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate over the vertices and halfway between every two, in the coordinates of the model."""
         N = self.model.vertices
         pairs = [0.5 * (np.eye(N)[i] + np.eye(N)[j]) for i, j in combinations(range(N), 2)]
         errors = tuple(self._error_at(h, p) for h in (*np.eye(N), *pairs))
         left_out = (
             f"error of {self.model.name} at its {N} vertices and halfway between them, weights constant over a gap; "
-            f"the change "
-            "of the weights and their difference to the plant's, which act as inputs to it, are left out"
+            "the change of the weights and their difference to the plant's, which act as inputs to it, are left out"
         )
-        found = certify_sampled_error(errors, float(max_gap), left_out)
+        found = certify_sampled_error(errors, max_gap, left_out)
         if self.premise != "frozen":
             found = with_switching_noted(found, errors, "weights")
         T = np.asarray(self.model.scaling)
         P = tuple(
             tuple(float(v * T[i] * T[j]) for j, v in enumerate(row)) for i, row in enumerate(found.lyapunov_matrix)
         )
-        values = tuple((name, float(v)) for s in self.parameters for name, v in self._named(s, p))
-        chosen = preset or self.default_preset or ""
-        return replace(found, observer=self.name, preset=chosen, parameters=values, lyapunov_matrix=P)
+        return replace(found, lyapunov_matrix=P)
 
-    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """Gaps by the certificate, see `limits_of`.
-
-        Args:
-            parameters: values by name that replace those of the preset. preset: to start from.
-
-        Raises:
-            ValueError: as `certify`.
-        """
-        return limits_of(self.certify(ASKED_GAP, parameters, preset))
-
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """Whether every vertex error decays for infinitely frequent samples: ``A_i - K_i1 C1 - K_i2 C2`` is Hurwitz.
-
-        Args:
-            preset: name of a preset that gives the parameters; None for the defaults.
-        """
-        limits = [error.continuous_limit for error in self.vertex_errors(parameters, preset)]
+    def condition_of(self, p: Any) -> Condition:
+        """Whether every vertex error decays for infinitely frequent samples: ``A_i - K_i1 C1 - K_i2 C2`` is Hurwitz."""
+        limits = [self._error_at(h, p).continuous_limit for h in np.eye(self.model.vertices)]
         abscissas = [float(np.linalg.eigvals(limit).real.max()) for limit in limits if limit is not None]
         return Condition(
             holds=max(abscissas) < 0.0,
@@ -292,7 +249,7 @@ class GeneralTakagiSugenoCdo(GatedObserver):
     def _estimator_states(self) -> tuple[Signal, ...]:
         model = self.model
         return (
-            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in model.states),
+            *estimate_states(model.states),
             *(
                 state(f"innovation_{s.name}", s.unit, 0.0, f"Error at the last sample, decaying: {s.name}")
                 for s in model.sampled
@@ -310,12 +267,3 @@ class GeneralTakagiSugenoCdo(GatedObserver):
             counted,
             *(memory(f"held_{s.name}", s.unit, float(v), f"At the last sample: {s.description}") for s, v in held),
         )
-
-    def _named(self, signal: Signal, p: Any) -> zip[tuple[str, Any]]:
-        return zip(signal.scalar_names, np.atleast_1d(getattr(p, signal.name)), strict=True)
-
-
-def _renamed(signal: Signal, prefix: str, variability: Literal["continuous", "discrete"]) -> Signal:
-    return input_signal(
-        f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability
-    )

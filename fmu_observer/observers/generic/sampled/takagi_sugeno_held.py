@@ -25,8 +25,16 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Event, Signal, input_signal, memory, output_signal, parameter, state
+from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.model_signals import (
+    arrival_event,
+    estimate_outputs,
+    estimate_states,
+    matrix_parameter,
+    measured_inputs,
+    sampling_event,
+)
+from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 
 SPEED, SPEED_GAP = 2.0, 0.4  # default poles from -min(SPEED [1/s], SPEED_GAP / longest gap) on [ours]
@@ -34,11 +42,11 @@ SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certi
 SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
 
 
-class TakagiSugenoHeld(GatedObserver, GapCertified):
+class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
     """Base of ``dxh = sum_i h_i [A_i xh + B_i u - L_i eta]``, ``eta = C xh - y`` set at samples and held between them.
 
-    All measurements of the model are sampled together. A subclass says when (`sampling_event`), and from what the
-    weights come (`weights`).
+    All measurements of the model are sampled together, at the event of the model or, where `periodic` is set, at a
+    period. A subclass says from what the weights come (`weights`).
 
     Default L_i: poles of ``A_i - L_i C`` the same at every vertex, real from ``-min(2, 0.4 / longest gap)`` 1/s on
     [ours].
@@ -46,37 +54,30 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
 
     internal_step = 5e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": SUITED}
-    payload_in_event: ClassVar[bool] = True
+    periodic: ClassVar[bool] = False
     extra_memory: tuple[Signal, ...] = ()
 
     def __init__(self, model: str | TakagiSugenoModel = "pendulum") -> None:
         self.model = find_takagi_sugeno_model(model)
         self.parameters = (self._gain_parameter(), *self.timing_parameters())
         self.states = (
-            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states),
+            *estimate_states(self.model.states),
             *(
                 memory(f"innovation_{s.name}", s.unit, 0.0, f"Held error: {s.description}")
                 for s in self.model.measurements
             ),
             *self.weight_memory(),
         )
-        measured = tuple(
-            _renamed(s, self.measurement_name(s.name), self.payload_in_event) for s in self.model.measurements
-        )
-        self.inputs = self.model.inputs if self.payload_in_event else (*self.model.inputs, *measured)
-        self.outputs = tuple(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in self.model.states)
-        self.events = (self.sampling_event(measured if self.payload_in_event else ()),)
+        measurements = self.model.measurements
+        self.outputs = estimate_outputs(self.model.states)
+        if self.periodic:
+            self.inputs = (*self.model.inputs, *measured_inputs(measurements))
+            self.events = (sampling_event([f"measured_{s.name}" for s in measurements]),)
+        else:
+            self.inputs, self.events = self.model.inputs, (arrival_event(self.model.event, measurements),)
         super().__init__(model=self.model.name)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
-
-    @abstractmethod
-    def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
-        """The event at which the measurements are taken."""
-
-    @abstractmethod
-    def measurement_name(self, name: str) -> str:
-        """How the input of a measurement is called."""
 
     @abstractmethod
     def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
@@ -128,7 +129,8 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
 
     def measured(self, u: Any) -> Array:
         """The measurements at a sample, shape (q,)."""
-        return stacked_of(u, self.model.measurements, self.measurement_name(""))
+        prefix = "measured_" if self.periodic else f"{self.model.event}_"
+        return stacked_of(u, self.model.measurements, prefix)
 
     def gains(self, p: Any) -> tuple[Array, ...]:
         """L_i, N of them, each of shape (n, q)."""
@@ -136,13 +138,9 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         shape = (self.model.order, len(self.model.measurements))
         return tuple(np.reshape(p.gain[i * size : (i + 1) * size], shape) for i in range(self.model.vertices))
 
-    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """One quadratic function for all ``A_i - L_i C``, and the unknown slope it tolerates: samples without gaps.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
-        """
-        closed = self._closed(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
+    def condition_of(self, p: Any) -> Condition:
+        """One quadratic function for all ``A_i - L_i C``, and the unknown slope it tolerates: samples without gaps."""
+        closed = self._closed(p)
         inequalities = reduce(Inequalities.joined, (flow_condition(matrix) for matrix in closed))
         candidate = common_quadratic_form(inequalities)
         margin = -np.inf if candidate is None else -float(decrease(inequalities, candidate.P).max())
@@ -195,10 +193,4 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         states, who = tuple(s.name for s in model.states), f"{self.name} of {model.name}"
         gains = np.concatenate([observer_gain(A, model.C, poles, states, who).ravel() for A in model.A])
         text = "Gains L_i, vertex after vertex, each row by row"
-        return parameter("gain", "1", tuple(map(float, gains)), text, size=gains.size)
-
-
-def _renamed(signal: Signal, name: str, discrete: bool) -> Signal:
-    return input_signal(
-        name, signal.unit, signal.start, signal.description, variability="discrete" if discrete else "continuous"
-    )
+        return matrix_parameter("gain", gains, text)

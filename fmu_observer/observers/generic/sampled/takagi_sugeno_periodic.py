@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from fmu_observer.observers.generic.sampled.takagi_sugeno_held import TakagiSugenoHeld
-from plant_models.hybrid import Event, PeriodicEvent, Signal, parameter
+from plant_models.hybrid import Signal, parameter
 from plant_models.hybrid.system import Array
 
 
@@ -20,20 +20,11 @@ class TakagiSugenoPeriodic(TakagiSugenoHeld):
     name = "takagi_sugeno_periodic"
     description = "Takagi-Sugeno observer at periodic samples, innovation held"
     source = "Bouchama 2024, (1.38)-(1.41)"
-    payload_in_event: ClassVar[bool] = False
+    periodic = True
 
     def timing_parameters(self) -> tuple[Signal, ...]:
         """The sampling period."""
         return (parameter("sample_period", "s", self.model.max_gap, "Sampling period of the measurements", min=1e-6),)
-
-    def sampling_event(self, payload: tuple[Signal, ...]) -> Event:
-        """Periodic."""
-        read = tuple(self.measurement_name(s.name) for s in self.model.measurements)
-        return PeriodicEvent("sampling", "sample_period", description="The measurements are read", samples=read)
-
-    def measurement_name(self, name: str) -> str:
-        """An input that is there always."""
-        return f"measured_{name}"
 
     def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
         """Weights at the estimate."""
