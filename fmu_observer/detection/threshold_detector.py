@@ -56,9 +56,7 @@ def judge(x: Any, residual: Array, sample_period: Array, p: Any) -> dict[str, Ar
 
     Source: Aguiar Cota 2019, (3.18) and 3.2.2.3.
     """
-    unfiltered = p.residual_filter_time <= 0.0
-    weight = np.where(unfiltered, 1.0, -np.expm1(-sample_period / np.where(unfiltered, 1.0, p.residual_filter_time)))
-    level = x.filtered_residual + weight * (np.abs(residual) - x.filtered_residual)
+    level = _filtered(x, residual, sample_period, p)
     time = np.where(x.judged_fault > 0.0, x.fault_time + sample_period, 0.0)
     begins = np.where(level > p.threshold_start, x.armed * (1.0 - x.judged_fault), 0.0)
     ends = np.where(level > p.threshold_end, x.armed * x.judged_fault, 0.0)
@@ -73,6 +71,13 @@ def judge(x: Any, residual: Array, sample_period: Array, p: Any) -> dict[str, Ar
         "armed": armed,
         "fault_time": np.where(fault > 0.0, time, 0.0),
     }
+
+
+def _filtered(x: Any, residual: Array, sample_period: Array, p: Any) -> Array:
+    """Magnitude of the residual behind the low-pass filter [m/s]."""
+    unfiltered = p.residual_filter_time <= 0.0
+    weight = np.where(unfiltered, 1.0, -np.expm1(-sample_period / np.where(unfiltered, 1.0, p.residual_filter_time)))
+    return x.filtered_residual + weight * (np.abs(residual) - x.filtered_residual)
 
 
 def threshold_requirements(p: Any) -> dict[str, Array]:

@@ -31,15 +31,9 @@ from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.pneumatic_brake import filling, limited
 
-SPEED_PAIRS = 6  # residuals of speed stand first in `MOTION`
-PAIRS_OF_SOURCES = (
-    (0, 1),
-    (0, 2),
-    (1, 2),
-    (0, 3),
-    (1, 3),
-    (2, 3),
-)  # of odometers, radar and satellites, in their order
+_SPEED_PAIRS = 6  # residuals of speed stand first in `MOTION`
+_SOURCES = ((0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3))  # of these pairs: odometers, radar and satellites
+_MEANS = ("mean_speed", "mean_drive", "mean_measured", "mean_demanded", "mean_other")
 
 
 class TrainDiagnosis(HybridSystem):
@@ -167,7 +161,7 @@ class TrainDiagnosis(HybridSystem):
 
     def _at_sample(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         read = readings(u)
-        speed = voted_speed(read, x.raised[:SPEED_PAIRS])
+        speed = voted_speed(read, x.raised[:_SPEED_PAIRS])
         count = np.where(read.has_gps > 0.0, x.gps_samples + 1.0, 0.0)
         gps_full = np.where(count > x.lead_first.shape[0] + 0.5, 1.0, 0.0)
         can = availability(read, gps_full, x.telegrams, x.disagree)
@@ -177,7 +171,7 @@ class TrainDiagnosis(HybridSystem):
         held = dict(zip(RESIDUALS, x.ratio, strict=True))
         held["gps_position"] = off / (p.threshold_position + p.balise_share * np.abs(x.estimated_position - x.mark))
         held["pressure"] = np.abs(read.pressure - x.modelled_pressure) / p.threshold_pressure
-        held |= dict(zip(MOTION.residuals[:SPEED_PAIRS], speeds, strict=True)) | forces
+        held |= dict(zip(MOTION.residuals[:_SPEED_PAIRS], speeds, strict=True)) | forces
         ratios = [held[name] * there for name, there in zip(RESIDUALS, can.residuals, strict=True)]
         new = {"voted_speed": speed, "samples": x.samples + 1.0, "gps_samples": count, **windows, **shares}
         new |= alarms_after(x, t, ratios, p)
@@ -191,51 +185,50 @@ class TrainDiagnosis(HybridSystem):
         self, x: Any, read: Readings, speed: Array, u: Any, p: Any
     ) -> tuple[dict[str, Array], dict[str, Array]]:
         """Residuals of the shares of force over their thresholds, and new values of states after a coarse step."""
-        mass = p.mass + p.rotating_mass
-        now = [
-            speed,
-            np.maximum(u.effort, 0.0) / mass,
-            self._brake_force(read.pressure, p) / mass,
-            self._brake_force(x.modelled_pressure, p) / mass,
-            (np.minimum(u.effort, 0.0) - u.gradient_force) / mass,
-        ]
-        sums = [total + value for total, value in zip(x.coarse_sum, now, strict=True)]
+        sums = [total + value for total, value in zip(x.coarse_sum, self._forces(x, read, speed, u, p), strict=True)]
         count = x.coarse_samples + 1.0
-        full = np.where(count * p.sample_period >= p.coarse_step - 1e-9, 1.0, 0.0)
-        known = [np.where(code >= WHEEL, 1.0, 0.0) for code in x.code[:3]]  # these are not believed
-        sound = [1.0 - np.maximum(known[i], known[j] if j < len(known) else 0.0) for i, j in PAIRS_OF_SOURCES]
-        loud = largest([on * both for on, both in zip(x.raised[:SPEED_PAIRS], sound, strict=True)])
-        quiet = np.where(loud > 0.0, 0.0, x.quiet_steps + full)
-        names = ("mean_speed", "mean_drive", "mean_measured", "mean_demanded", "mean_other")
-        rings = []
-        for name, total in zip(names, sums, strict=True):
-            ring = getattr(x, name)
-            rings.append(
-                [np.where(full > 0.0, new, old) for old, new in zip(ring, [*ring[1:], total / count], strict=True)]
-            )
-        usable = full * np.where(quiet > len(rings[0]) - 0.5, 1.0, 0.0)
-        window, before = MotionWindow(*rings), x.share
         step = count * p.sample_period
-        found = [
-            traction_share(window, before[0], step, mass, p),
-            brake_share(window.measured, window, before[1], step, mass, p),
-            brake_share(window.demanded, window, before[2], step, mass, p),
-        ]
-        found[1] = Share(found[1].value, found[1].found * read.has_pressure, found[1].bracketed)
-        told = [usable * one.found for one in found]
-        shares = [np.where(on > 0.0, one.value, old) for on, one, old in zip(told, found, before, strict=True)]
-        sought = zip(told, found, x.share_found, strict=True)
+        full = np.where(step >= p.coarse_step - 1e-9, 1.0, 0.0)
+        quiet = np.where(_loud(x) > 0.0, 0.0, x.quiet_steps + full)
+        means = [_moved_on(getattr(x, n), total / count, full) for n, total in zip(_MEANS, sums, strict=True)]
+        found = self._found_shares(x, MotionWindow(*means), read, step, p)
+        usable = full * np.where(quiet > len(means[0]) - 0.5, 1.0, 0.0)
+        counts = [usable * one.found for one in found]
+        shares = [np.where(on > 0.0, one.value, old) for on, one, old in zip(counts, found, x.share, strict=True)]
+        sought = zip(counts, found, x.share_found, strict=True)
         after = {
             "coarse_sum": vector(*((1.0 - full) * total for total in sums)),
             "coarse_samples": (1.0 - full) * count,
             "quiet_steps": quiet,
             "share": vector(*shares),
             "share_found": vector(*(np.where(on > 0.0, one.bracketed, old) for on, one, old in sought)),
-            **{name: vector(*ring) for name, ring in zip(names, rings, strict=True)},
+            **{name: vector(*values) for name, values in zip(_MEANS, means, strict=True)},
         }
         pulls, measured, demanded = (np.abs(1.0 - share) for share in shares)
         brakes = (measured / p.threshold_brake, demanded / p.threshold_brake)
         return {"traction": pulls / p.threshold_traction, **dict(zip(BRAKE.residuals[1:], brakes, strict=True))}, after
+
+    def _forces(self, x: Any, read: Readings, speed: Array, u: Any, p: Any) -> list[Array]:
+        """Speed, and the accelerations that forces would give now, in the order of `MotionWindow`."""
+        mass = p.mass + p.rotating_mass
+        return [
+            speed,
+            np.maximum(u.effort, 0.0) / mass,
+            self._brake_force(read.pressure, p) / mass,
+            self._brake_force(x.modelled_pressure, p) / mass,
+            (np.minimum(u.effort, 0.0) - u.gradient_force) / mass,
+        ]
+
+    @staticmethod
+    def _found_shares(x: Any, window: MotionWindow, read: Readings, step: Array, p: Any) -> list[Share]:
+        """Shares of traction, of the brake by the measured and by the demanded pressure, of a window."""
+        mass, (pulled, measured, demanded) = p.mass + p.rotating_mass, x.share
+        by_pressure = brake_share(window.measured, window, measured, step, mass, p)
+        return [
+            traction_share(window, pulled, step, mass, p),
+            by_pressure._replace(found=by_pressure.found * read.has_pressure),
+            brake_share(window.demanded, window, demanded, step, mass, p),
+        ]
 
     @staticmethod
     def _brake_force(pressure: Array, p: Any) -> Array:
@@ -271,6 +264,18 @@ class TrainDiagnosis(HybridSystem):
             "mark": np.where(used > 0.0, u.balise_position, x.mark),
             "way_mark": np.where(used > 0.0, x.way, x.way_mark),
         }
+
+
+def _loud(x: Any) -> Array:
+    """1 where two sources of speed disagree of which neither is known to be at fault."""
+    known = [np.where(code >= WHEEL, 1.0, 0.0) for code in x.code[:3]]  # these are not believed
+    sound = [1.0 - np.maximum(known[i], known[j] if j < len(known) else 0.0) for i, j in _SOURCES]
+    return largest([on * both for on, both in zip(x.raised[:_SPEED_PAIRS], sound, strict=True)])
+
+
+def _moved_on(means: Array, newest: Array, full: Array) -> list[Array]:
+    """The means of a window, moved on by one where its coarse step is full."""
+    return [np.where(full > 0.0, new, old) for old, new in zip(means, [*means[1:], newest], strict=True)]
 
 
 def _nearest_way(x: Any, read: Readings) -> Array:

@@ -27,9 +27,12 @@ from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable, Isol
 from fmu_observer.formulas.diagnosis.windowed_residual import Alarm, judge
 from plant_models.hybrid.system import Array, vector
 
-GROUPS = (MOTION, BRAKE, TRACTION)
-UNPROVED = 3.0  # telegrams
-OF_ODOMETER = (("odometers", "odometer_1_radar", "odometer_1_gps"), ("odometers", "odometer_2_radar", "odometer_2_gps"))
+_GROUPS = (MOTION, BRAKE, TRACTION)
+_UNPROVED = 3.0  # telegrams
+_OF_ODOMETER = (
+    ("odometers", "odometer_1_radar", "odometer_1_gps"),
+    ("odometers", "odometer_2_radar", "odometer_2_gps"),
+)
 
 
 class Availability(NamedTuple):
@@ -89,7 +92,7 @@ def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Ar
         for residual, asked in (("gps_position", read.fitted), ("balise", disagree))
     }
     # A first balise that is false misplaces the train until two others have said so.
-    apart["gps_position"]["balise"] = np.where(telegrams > UNPROVED + 0.5, 1.0, 0.0)
+    apart["gps_position"]["balise"] = np.where(telegrams > _UNPROVED + 0.5, 1.0, 0.0)
     return Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source], apart)
 
 
@@ -143,7 +146,7 @@ def contradicted_wheels(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[
     for k, before in enumerate(x.against_wheel):
         ahead = read.speeds[k] - x.voted_speed
         may_be: Array = np.where(ahead < 0.0, wheel.slow, wheel.fast)
-        quick, way = largest([raised[name] for name in OF_ODOMETER[k]]), raised[f"way_{k + 1}"]
+        quick, way = largest([raised[name] for name in _OF_ODOMETER[k]]), raised[f"way_{k + 1}"]
         off = np.where(np.maximum(quick, way) > 0.0, read.fitted[k], 0.0)
         now: Array = np.where(np.abs(ahead) > tolerance(x.voted_speed, p), 1.0 - may_be, 0.0)
         # Once a wheel cannot explain it the verdict stays until the alarm ends: the same fault goes on under effort.
@@ -198,66 +201,119 @@ def codes_after(
     Returns:
         New values of states by name.
     """
-    raised, ratios = x.raised, x.ratio
-    there = dict(zip(FAULTS, can.faults, strict=True))
-    there["adhesion"] = there["adhesion"] * (1.0 - largest(wrong))
-    codes: list[Array] = []
-    begun, unexplained, trusts, counted, named = [], [], [], [], []
-    place = first = 0
-    for group, since in zip(GROUPS, x.group_since, strict=True):
-        own = slice(place, place + len(group.residuals))
-        possible = [there[fault] for fault in group.faults]
-        any_alarm = largest([a * b for a, b in zip(raised[own], can.residuals[own], strict=True)])
-        start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
-        said = group.judge(raised[own], can.residuals[own], possible, can.apart)
-        sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
-        known = x.code[first : first + len(group.faults)]
-        fresh = largest([now * (1.0 - old) for now, old in zip(raised[own], before[own], strict=True)])
-        stays, several = _stays(group, known, said, raised[own], possible, fresh)
-        kept = largest(stays)
-        for fault, isolated, suspected, stay in zip(group.faults, said.isolated, said.suspected, stays, strict=True):
-            told = np.where(kept > 0.0, stay, isolated * sure)
-            maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
-            codes.append(told * _isolated_code(fault, wrong) + SUSPECTED * maybe)
-            named.append(told + maybe)
-            margin, seen = _margin(group, fault, ratios[own], can.residuals[own])
-            trusts.append(named[-1] * seen * margin)
-            counted.append(named[-1] * seen)
-        begun.append(start)
-        unexplained.append(several)
-        place, first = own.stop, first + len(group.faults)
-    for fault, still in zip(("odometer_1", "odometer_2", "radar", "gps", "pressure_sensor"), stuck, strict=True):
-        k = FAULTS.index(fault)
-        codes[k] = np.where(still > 0.0, STUCK, codes[k])
+    found = _verdicts(x, t, can, wrong, before, p)
+    codes = _with_stuck([code for verdict in found for code in verdict.codes], stuck)
     newest = x.detected_at
-    for old, now in zip(x.group_since, begun, strict=True):
-        newest = np.where(now >= 0.0, np.where(old < 0.0, now, newest), newest)
-    seen = sum(counted, 0.0)
-    # An alarm outlasts its residual: while it does the confidence is the last that a residual gave.
-    trust = np.where(seen > 0.5, sum(trusts, 0.0) / np.maximum(seen, 1.0), x.trust)
-    trust = np.where(largest(named) > 0.5, trust, 0.0)
-    slips = codes[FAULTS.index("adhesion")]
-    bad = [np.maximum(codes[0], slips), np.maximum(codes[1], slips), codes[2]]
-    faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(x.faulty, bad, strict=True)]
+    for old, verdict in zip(x.group_since, found, strict=True):
+        newest = np.where(verdict.since >= 0.0, np.where(old < 0.0, verdict.since, newest), newest)
     return {
-        "faulty": vector(*faulty),
+        "faulty": _faulty_speeds(x, codes),
         "code": vector(*codes),
-        "group_since": vector(*begun),
-        "several": largest(unexplained),
-        "trust": trust,
+        "group_since": vector(*(verdict.since for verdict in found)),
+        "several": largest([verdict.several for verdict in found]),
+        "trust": _confidence(x, found),
         "detected_at": newest,
     }
 
 
+def _with_stuck(codes: list[Array], stuck: list[Array]) -> list[Array]:
+    """The codes, with those of sensors that stand still."""
+    for fault, still in zip(("odometer_1", "odometer_2", "radar", "gps", "pressure_sensor"), stuck, strict=True):
+        k = FAULTS.index(fault)
+        codes[k] = np.where(still > 0.0, STUCK, codes[k])
+    return codes
+
+
+class _GroupVerdict(NamedTuple):
+    """What follows for a group of faults.
+
+    Attributes:
+        codes: of its faults. named: 1 for each that is isolated or suspected. margins: of their weakest alarm.
+        seen: 1 for each whose residual is above its threshold. since: when its alarms began [s], -1 without any.
+        several: 1 where no single fault explains them.
+    """
+
+    codes: list[Array]
+    named: list[Array]
+    margins: list[Array]
+    seen: list[Array]
+    since: Array
+    several: Array
+
+
+def _verdicts(x: Any, t: Array, can: Availability, wrong: list[Array], before: Array, p: Any) -> list[_GroupVerdict]:
+    """What follows for each group, see `codes_after`."""
+    there = dict(zip(FAULTS, can.faults, strict=True))
+    there["adhesion"] = there["adhesion"] * (1.0 - largest(wrong))
+    found: list[_GroupVerdict] = []
+    place = first = 0
+    for group, since in zip(_GROUPS, x.group_since, strict=True):
+        places = slice(place, place + len(group.residuals)), slice(first, first + len(group.faults))
+        possible = [there[fault] for fault in group.faults]
+        found.append(_group_verdict(group, x, t, can, places, possible, since, wrong, before, p))
+        place, first = places[0].stop, places[1].stop
+    return found
+
+
+def _group_verdict(
+    group: IsolationTable,
+    x: Any,
+    t: Array,
+    can: Availability,
+    places: tuple[slice, slice],
+    possible: list[Array],
+    since: Array,
+    wrong: list[Array],
+    before: Array,
+    p: Any,
+) -> _GroupVerdict:
+    """The verdict of a group; `places` are those of its residuals and of its faults among all."""
+    own, faults = places
+    raised, available = x.raised[own], can.residuals[own]
+    any_alarm = largest([a * b for a, b in zip(raised, available, strict=True)])
+    start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
+    judged = group.judge(raised, available, possible, can.apart)
+    sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
+    fresh = largest([now * (1.0 - old) for now, old in zip(raised, before[own], strict=True)])
+    stays, several = _stays(group, x.code[faults], judged, raised, possible, fresh)
+    kept = largest(stays)
+    found = _GroupVerdict([], [], [], [], start, several)
+    for fault, isolated, suspected, stay in zip(group.faults, judged.isolated, judged.suspected, stays, strict=True):
+        certain = np.where(kept > 0.0, stay, isolated * sure)
+        maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
+        margin, seen = _margin(group, fault, x.ratio[own], available)
+        found.codes.append(certain * _isolated_code(fault, wrong) + SUSPECTED * maybe)
+        found.named.append(certain + maybe)
+        found.margins.append(margin)
+        found.seen.append(seen)
+    return found
+
+
+def _confidence(x: Any, found: list[_GroupVerdict]) -> Array:
+    """Mean margin of the faults that are named; while an alarm outlasts its residual the last that a residual gave."""
+    rows = [row for verdict in found for row in zip(verdict.named, verdict.seen, verdict.margins, strict=True)]
+    seen = sum((named * above for named, above, _ in rows), 0.0)
+    trusts = sum((named * above * margin for named, above, margin in rows), 0.0)
+    trust = np.where(seen > 0.5, trusts / np.maximum(seen, 1.0), x.trust)
+    return np.where(largest([named for named, *_ in rows]) > 0.5, trust, 0.0)
+
+
+def _faulty_speeds(x: Any, codes: list[Array]) -> Array:
+    """1 for odometers and radar that were at fault since the last balise, shape (3,)."""
+    slips = codes[FAULTS.index("adhesion")]
+    bad = [np.maximum(codes[0], slips), np.maximum(codes[1], slips), codes[2]]
+    return vector(*(np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(x.faulty, bad, strict=True)))
+
+
 def _stays(
-    group: IsolationTable, known: Array, said: IsolationVerdict, alarms: Array, possible: list[Array], fresh: Array
+    group: IsolationTable, known: Array, judged: IsolationVerdict, alarms: Array, possible: list[Array], fresh: Array
 ) -> tuple[list[Array], Array]:
     """For each fault 1 where it was isolated and stays so: alarms only go, or others come beside its own, which it does
     not explain; and 1 where there are several: no single fault explains the alarms, or not the one that is isolated.
     """
     by_name = dict(zip(group.residuals, alarms, strict=True))
-    stays, several = [], said.unexplained
-    for fault, code, cover, there in zip(group.faults, known, said.covers, possible, strict=True):
+    stays, several = [], judged.unexplained
+    for fault, code, cover, there in zip(group.faults, known, judged.covers, possible, strict=True):
         on = np.where(code >= WHEEL, there, 0.0)
         beside = on * (1.0 - cover) * largest([by_name[residual] for residual in group.must[fault]])
         stays.append(np.maximum(on * cover * (1.0 - fresh), beside))

@@ -85,7 +85,7 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
     ) -> None:
         self.effort = checked_effort(self.name, tolerance, max_iterations, deadline)
         super().__init__(model, **options)
-        self.options |= told_effort(self.effort)
+        self.options |= _effort_options(self.effort)
 
     def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
         """See `iterated_fully`."""
@@ -132,7 +132,7 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     ) -> None:
         self.effort = checked_effort(self.name, tolerance, max_iterations, deadline)
         super().__init__(**options)
-        self.options |= told_effort(self.effort)
+        self.options |= _effort_options(self.effort)
 
     def own_states(self) -> tuple[Any, ...]:
         """States of the observer, then how the last search ended."""
@@ -173,19 +173,22 @@ def iterated_fully(
         if layout.unpacked(rows[k]).moves <= 0.5:
             guesses[k] = guesses[k - 1] if k else before.mean
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
+    remembered = (np.hstack([*before]), rows.ravel(), found.states.ravel(), _last_pass(found, layout.count(rows)))
+    kept = dict(zip(WINDOW_MEMORY, remembered, strict=True)) | {LAST_SEARCH.name: _how_it_ended(found)}
+    return Iterated(found.estimate, found.covariance.ravel(), kept)
+
+
+def _last_pass(found: Any, counts: Sequence[Array]) -> np.ndarray:
+    """What is remembered of the last pass; `converged` judges its step."""
     step = found.step if found.iterations else 0.0  # no step, no change: the prediction is the answer
     bounds, far, broken = (np.array([value]) for value in (found.active, found.far, found.broken))
-    last = [found.residual, step, float(found.iterations), *layout.count(rows), float(found.active)]
-    last += [
-        *contradicted(bounds, far, broken),
-        found.broken,
-        *unsettled(np.zeros(1), broken),
-    ]  # `converged` judges the step
+    last = [found.residual, step, float(found.iterations), *counts, float(found.active)]
+    return np.array([*last, *contradicted(bounds, far, broken), found.broken, *unsettled(np.zeros(1), broken)])
+
+
+def _how_it_ended(found: Any) -> np.ndarray:
     early = not found.converged and not found.timed_out
-    ended = [float(said) for said in (found.converged, found.timed_out, early, found.feasible)]
-    remembered = (np.hstack([*before]), rows.ravel(), found.states.ravel(), np.array(last))
-    kept = dict(zip(WINDOW_MEMORY, remembered, strict=True)) | {LAST_SEARCH.name: np.array(ended)}
-    return Iterated(found.estimate, found.covariance.ravel(), kept)
+    return np.array([float(word) for word in (found.converged, found.timed_out, early, found.feasible)])
 
 
 def checked_effort(who: str, tolerance: float, max_iterations: int, deadline: float | None) -> Effort:
@@ -206,7 +209,7 @@ def checked_effort(who: str, tolerance: float, max_iterations: int, deadline: fl
     return Effort(float(tolerance), int(max_iterations), inf if deadline is None else float(deadline))
 
 
-def told_effort(effort: Effort) -> dict[str, Any]:
+def _effort_options(effort: Effort) -> dict[str, Any]:
     """The options that give an effort.
 
     Args:

@@ -21,10 +21,8 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.signal import Variability
 
-STATISTICS = (
-    memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
-    memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
-)
+LAST_NIS = memory("last_nis", "1", 0.0, "Last normalised innovation squared")
+LOG_LIKELIHOOD = memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far")
 
 
 def estimate_states(

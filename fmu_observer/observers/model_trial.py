@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -13,7 +13,7 @@ from fmu_observer.certificates.observer_limits import Trial, Varied
 from fmu_observer.observers.model_observer import ModelObserver
 
 WRONG_START = 0.5  # of every estimate, in its own unit
-DRIVE_SIZE, DRIVE_FREQUENCY = 0.1, 1.0  # [1], [rad/s] of all inputs; Hann 2014, section 2.5
+_DRIVE_SIZE, _DRIVE_FREQUENCY = 0.1, 1.0  # [1], [rad/s] of all inputs; Hann 2014, section 2.5
 
 
 def model_trial(
@@ -26,30 +26,16 @@ def model_trial(
     delayed: bool = False,
     **further: Any,
 ) -> Trial:
-    """A trial in which the plant is the model, from its starts, and all estimates start 0.5 beside them.
-
-    All inputs are ``0.1 sin t`` in their units. The motion is solved by DOP853 to 1e-9.
+    """A trial in which the plant is the model, from its starts, and all estimates start 0.5 beside them; all inputs are
+    ``0.1 sin t`` in their units.
 
     Args:
-        observer: told of its measurements at the event of its model. varied, low, high: see `Trial`.
-        settings: parameters by scalar name. delayed: whether the outputs ``delayed_...`` are looked at, with the truth
-            a delay ago. further: as for `Trial`, such as `nodes`, `period`, `stop`.
+        observer: at the event of its model. varied, low, high, further: as for `Trial`. settings: parameters by scalar
+            name. delayed: whether the outputs ``delayed_...`` are compared, with the truth a delay ago.
     """
-    model = observer.model
-    start = model.start
-    stop = float(further.get("stop", Trial.stop))
-
-    def drive(t: np.ndarray) -> np.ndarray:
-        return DRIVE_SIZE * np.sin(DRIVE_FREQUENCY * np.asarray(t))
-
-    @cache
-    def motion() -> Any:
-        known = np.ones(len(model.inputs))
-        flow = lambda t, x: np.asarray(model.flow(x, known * drive(t)), dtype=float)  # noqa: E731
-        return scipy.integrate.solve_ivp(
-            flow, (0.0, stop), start, "DOP853", rtol=1e-9, atol=1e-11, dense_output=True
-        ).sol
-
+    model, known = observer.model, np.ones(len(observer.model.inputs))
+    start, stop = model.start, float(further.get("stop", Trial.stop))
+    motion = solved_motion(lambda t, x: model.flow(x, known * _drive(t)), start, stop, rtol=1e-9, atol=1e-11)
     names = [f"delayed_{s.name}" if delayed else s.name for s in model.states]
     starts = {s.name: v + WRONG_START for s, v in zip(observer.states[: model.order], start, strict=True)}
     return Trial(
@@ -58,10 +44,32 @@ def model_trial(
         low=low,
         high=high,
         event=model.event,
-        payload=lambda t: {s.name: row for s, row in zip(model.measurements, model.C @ motion()(t), strict=True)},
-        inputs=lambda t: {s.name: drive(t) for s in model.inputs},
-        truth=lambda t: dict(zip(names, motion()(t), strict=True)),
+        payload=lambda t: {s.name: row for s, row in zip(model.measurements, model.C @ motion(t), strict=True)},
+        inputs=lambda t: {s.name: _drive(t) for s in model.inputs},
+        truth=lambda t: dict(zip(names, motion(t), strict=True)),
         settings={**settings, **starts},
         delayed_truth=delayed,
         **further,
     )
+
+
+def solved_motion(
+    flow: Callable[[float, np.ndarray], Any], start: np.ndarray, stop: float, **options: float
+) -> Callable[[np.ndarray], np.ndarray]:
+    """States of a motion by instants, solved by DOP853 when they are first asked for.
+
+    Args:
+        flow: derivative by time and state. start: state at time 0, shape (n,). stop: its end [s]. options: of
+            `scipy.integrate.solve_ivp`: tolerances and the longest step.
+    """
+
+    @cache
+    def solution() -> Any:
+        rates = lambda t, x: np.asarray(flow(t, x), dtype=float)  # noqa: E731
+        return scipy.integrate.solve_ivp(rates, (0.0, stop), start, "DOP853", dense_output=True, **options).sol
+
+    return lambda t: np.asarray(solution()(t))
+
+
+def _drive(t: np.ndarray | float) -> np.ndarray:
+    return _DRIVE_SIZE * np.sin(_DRIVE_FREQUENCY * np.asarray(t))

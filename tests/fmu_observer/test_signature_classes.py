@@ -188,8 +188,8 @@ def test_the_track_is_not_ready_where_nothing_oscillates():
     ("options", "said"),
     [
         ({"long_order": 10, "short_order": 20}, "exchange them"),
-        ({"next_scaling": "Norm"}, "unknown next_scaling .*; choose one of: norm, literal"),
-        ({"reading": "printed"}, "unknown reading .*; choose one of: repaired, as_published"),
+        ({"next_scaling": "Norm"}, "choose one of: norm, literal"),
+        ({"reading": "printed"}, "choose one of: repaired, as_published"),
     ],
 )
 def test_options_that_are_wrong_are_told(options, said):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -21,15 +21,15 @@ from plant_models.hybrid.system import Array
 ORDER, POINTS = 6, 2  # printed N; N_O = 8
 NOMINAL = 32
 """Places of the nominal run that are kept."""
-HOURS, LEAST_GLYCEROL = 7.5, 0.09  # of the nominal run [h], [kg/m3]
-LEAST_ENZYME = 1e-4  # [kg/m3]
+_HOURS, _LEAST_GLYCEROL = 7.5, 0.09  # of the nominal run [h], [kg/m3]
+_LEAST_ENZYME = 1e-4  # [kg/m3]
 FINE = 13  # values an axis of the network as refined for the weights
 SHARPNESS = 20.0  # where `look_up_errors` is smallest under noise of 1 %
 
-RUN_ERROR = 5e-3
+_RUN_ERROR = 5e-3
 """Of its range, that the end of the nominal run may be off; trapezoids between its places leave 2.8e-3 [ours]."""
 
-LookUp = Literal["weighted", "cell"]
+_LookUp = Literal["weighted", "cell"]
 
 
 class CultureSignature(SignatureObserver):
@@ -67,15 +67,15 @@ class CultureSignature(SignatureObserver):
         "look_up": ("weighted", "cell"),
     }
 
-    def __init__(self, nodes: int = 3, next_scaling: NextScaling = "literal", look_up: LookUp = "weighted") -> None:
+    def __init__(self, nodes: int = 3, next_scaling: NextScaling = "literal", look_up: _LookUp = "weighted") -> None:
         require_whole(self.name, 2, 7, nodes=nodes)
         require_choice(self.name, self.option_choices, look_up=look_up)
-        self.look_up: LookUp = look_up
+        self.look_up: _LookUp = look_up
         self.nodes, fine = np.linspace(-1.0, 1.0, nodes), np.linspace(-1.0, 1.0, FINE)
         self._fine_nodes = np.stack(np.meshgrid(fine, fine, indexing="ij"), axis=-1).reshape(-1, 2)
         along = polynomial_refinement(self.nodes, fine)
         self._refinement = np.kron(along, along)
-        biomass, glycerol, enzyme = nominal_run()
+        biomass, glycerol, enzyme = _nominal_run()
         self.declare(
             EcoliCulture(),
             ORDER + POINTS,
@@ -107,11 +107,11 @@ class CultureSignature(SignatureObserver):
         Raises:
             ValueError: a parameter is unknown, not finite or of another size; or the run has no rising biomass.
         """
-        p, hours = self.model_values(parameters, preset), HOURS
-        run = nominal_run(p=p)
-        while run[1][-1] < LEAST_GLYCEROL and hours > 1.0:
+        p, hours = self.model_values(parameters, preset), _HOURS
+        run = _nominal_run(p=p)
+        while run[1][-1] < _LEAST_GLYCEROL and hours > 1.0:
             hours *= 0.95
-            run = nominal_run(hours=hours, p=p)
+            run = _nominal_run(hours=hours, p=p)
         biomass, glycerol, enzyme = run
         if not np.all(np.diff(biomass) > 0.0):
             raise ValueError(f"{self.name}: with these parameters biomass does not rise along the nominal run.")
@@ -127,7 +127,7 @@ class CultureSignature(SignatureObserver):
             slope = rates[i] / np.where(np.abs(rates[0]) > 0.0, rates[0], 1e-300)
             lacks = places[i][1:] - places[i][:-1] - 0.5 * (slope[1:] + slope[:-1]) * grown
             size = np.max(places[i]) - np.min(places[i])
-            offs.append(np.abs(np.sum(lacks)) / (RUN_ERROR * np.maximum(size, 1e-300)))
+            offs.append(np.abs(np.sum(lacks)) / (_RUN_ERROR * np.maximum(size, 1e-300)))
         return {"nominal run": np.max(np.stack(offs))}
 
     def inverted(self, past: Sequence[Array], x: Any, p: Any) -> InvertedWindow:
@@ -138,43 +138,40 @@ class CultureSignature(SignatureObserver):
             enclosed(course, np.stack([X]), p.nominal_biomass, values)[0][0]
             for values in (p.nominal_glycerol, p.nominal_enzyme)
         )
-        model = self.model_parameters((), p)
-        fields = self._model._fields
-        places = [(a, b) for a in self.nodes for b in self.nodes]
+        model = (getattr(self.model_parameters((), p), name) for name in self._model._fields)
+        tube = (X, S0, P0, p.glycerol_width, p.enzyme_width)
+        found = Found(*enclosed(self._network(), vector(*model, *tube, p.regularisation, p.sharpness), target))
+        state = _in_tube(X, S0 + p.glycerol_width * found.values[0], P0 + p.enzyme_width * found.values[1])
+        return InvertedWindow(state, found.outside[0])
+
+    def _network(self) -> Callable[[Array, Array], tuple[Array, ...]]:
+        """Place in the tube, and how far outside, of what is shared and the properties of a window; for `enclosed`.
+
+        Shared are the parameters of the model, biomass, glycerol and enzyme of the nominal run with their widths,
+        regularisation and sharpness.
+        """
+        count = len(self._model._fields)
 
         def sample(carry: Any, row: Any, shared: Any) -> Any:
-            given, begins = shared[0], row[0][0]
-            values = self._model(*(given[i] for i in range(len(fields))))
-            X_, S_, P_, wide, narrow = (given[len(fields) + i] for i in range(5))
-            start = in_tube(X_, S_ + wide * row[0][1], P_ + narrow * row[0][2])
-            now = np.where(begins > 0.5, start, self.moved(carry[0], 1, values)[-1])
+            values = self._model(*(shared[0][i] for i in range(count)))
+            X_, S_, P_, wide, narrow = (shared[0][count + i] for i in range(5))
+            start = _in_tube(X_, S_ + wide * row[0][1], P_ + narrow * row[0][2])
+            now = np.where(row[0][0] > 0.5, start, self.moved(carry[0], 1, values)[-1])
             return (now,), (np.stack([self.plant.measured(self.plant.named(now), values)[1]]),)
 
         def read(_carry: Any, row: Any, shared: Any) -> Any:
             return (), (self.properties(row[0], shared[0][-2]),)
 
         def network(shared: Array, target: Array) -> tuple[Array, ...]:
+            places = [(a, b) for a in self.nodes for b in self.nodes]
             rows = [(np.array([k == 0, *place], dtype=float),) for place in places for k in range(self.window)]
             light = [found[0] for found in scan(sample, (np.ones(3),), rows, (shared,))[1]]
             windows = [(np.hstack(light[i : i + self.window]),) for i in range(0, len(light), self.window)]
             found = [result[0] for result in scan(read, (), windows, (shared,))[1]]
-            table = [np.hstack([r[k] for r in found]) for k in range(2)]
-            told = self.looked_up(table, target, shared[-1])
-            return told.values, np.stack([told.outside])
+            place = self.looked_up([np.hstack([r[k] for r in found]) for k in range(2)], target, shared[-1])
+            return place.values, np.stack([place.outside])
 
-        shared = vector(
-            *(getattr(model, name) for name in fields),
-            X,
-            S0,
-            P0,
-            p.glycerol_width,
-            p.enzyme_width,
-            p.regularisation,
-            p.sharpness,
-        )
-        told = Found(*enclosed(network, shared, target))
-        state = in_tube(X, S0 + p.glycerol_width * told.values[0], P0 + p.enzyme_width * told.values[1])
-        return InvertedWindow(state, told.outside[0])
+        return network
 
     def looked_up(self, network: Sequence[Array], target: Array, sharpness: Array) -> Found:
         """Places of glycerol and enzyme in the tube, from -1 to 1, shape (2,).
@@ -227,7 +224,7 @@ class CultureSignature(SignatureObserver):
         """States at places of the tube, of shape (2, ..., m) from -1 to 1, shape (3, ..., m)."""
         S = np.interp(X, p.nominal_biomass, p.nominal_glycerol) + p.glycerol_width * places[0]
         P = np.interp(X, p.nominal_biomass, p.nominal_enzyme) + p.enzyme_width * places[1]
-        return in_tube(*np.broadcast_arrays(X, S, P))
+        return _in_tube(*np.broadcast_arrays(X, S, P))
 
     def _light(self, start: np.ndarray, last: int, p: Any) -> np.ndarray:
         """Light of windows that begin at these states, the oldest first."""
@@ -247,13 +244,13 @@ class CultureSignature(SignatureObserver):
         return np.stack([np.mean(points[0], axis=0), np.mean(points[1], axis=0)])
 
 
-def in_tube(X: Array, S: Array, P: Array) -> Array:
+def _in_tube(X: Array, S: Array, P: Array) -> Array:
     """A state with glycerol not negative and some enzyme, shape (3,).
 
     Args:
         X: biomass. S: glycerol. P: enzyme [kg/m3].
     """
-    return vector(X, np.maximum(S, 0.0), np.maximum(P, LEAST_ENZYME))
+    return vector(X, np.maximum(S, 0.0), np.maximum(P, _LEAST_ENZYME))
 
 
 def course(X: Array, biomass: Array, values: Array) -> tuple[Array]:
@@ -269,7 +266,7 @@ def course(X: Array, biomass: Array, values: Array) -> tuple[Array]:
     return (np.stack([values[0] + np.sum(shares * (values[1:] - values[:-1]))]),)
 
 
-def nominal_run(start: Sequence[float] = (0.05, 2.0, 0.01), hours: float = HOURS, p: Any = None) -> np.ndarray:
+def _nominal_run(start: Sequence[float] = (0.05, 2.0, 0.01), hours: float = _HOURS, p: Any = None) -> np.ndarray:
     """Biomass, glycerol and enzyme of a nominal run at places evenly spread in time, shape (3, NOMINAL).
 
     Args:

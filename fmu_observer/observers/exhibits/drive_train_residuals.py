@@ -114,32 +114,36 @@ def sample_speeds(
         New values of the memory by name.
     """
     now = (rotor[0], rotor[1], generator[0], generator[1], rotor_torque, torque)
-    histories = {
-        name: [*(np.where(starts > 0.0, value, before) for before in getattr(m, name)), value]
-        for name, value in zip(_HISTORIES, now, strict=True)
-    }
-    gains: tuple[Array, ...] = (p.rotor_speed_gain, p.rotor_speed_gain, p.generator_speed_gain, p.generator_speed_gain)
-    gains += (p.rotor_torque_gain, p.generator_torque_gain)
-    r1, r2, g1, g2, driving, braking = (
-        _weighted(gain, histories[name]) for name, gain in zip(_HISTORIES, gains, strict=True)
-    )
-    torsions = _beside(r1, r2, g1, g2, 1.0)
+    histories = _moved_on(m, now, starts)
+    *by_speeds, driving, braking = _weighted_windows(histories, p)
+    torsions = _beside(*by_speeds, 1.0)
     rates = _beside(rotor[0], rotor[1], generator[0], generator[1], -1.0 / p.gear_ratio)
     coefficients = residual_filter(p.speed_filter_time, p.sample_period)
-    filters, squares, residuals = [], [], []
-    for i, (torsion, rate) in enumerate(zip(torsions, rates, strict=True)):
-        out = rate_residual(coefficients, m.speed_filter[i], torsion + driving + braking, rate, starts)
-        window = windowed_square(m.speed_squares[i : i + 1], out.value)
-        filters.append(out.memory)
-        squares.append(window.memory[0])
-        residuals.append(window.value)
+    sensors = zip(m.speed_filter, [torsion + driving + braking for torsion in torsions], rates, strict=True)
+    found = [rate_residual(coefficients, *sensor, starts) for sensor in sensors]
+    windows = [windowed_square(m.speed_squares[i : i + 1], out.value) for i, out in enumerate(found)]
     return {
         **{name: vector(*values[1:]) for name, values in histories.items()},
-        "speed_filter": matrix(*filters),
-        "speed_squares": vector(*squares),
+        "speed_filter": matrix(*(out.memory for out in found)),
+        "speed_squares": vector(*(window.memory[0] for window in windows)),
         "held_speed_difference": vector(disagreement(*rotor), disagreement(*generator)),
-        "held_speed_residual": vector(*residuals),
+        "held_speed_residual": vector(*(window.value for window in windows)),
         "held_estimated_torsion": 0.5 * (torsions[0] + torsions[1]) + driving + braking,
+    }
+
+
+def _weighted_windows(histories: dict[str, list[Array]], p: Any) -> list[Array]:
+    """What each window adds to the torsion [rad]."""
+    gains: tuple[Array, ...] = (p.rotor_speed_gain, p.rotor_speed_gain, p.generator_speed_gain, p.generator_speed_gain)
+    gains += (p.rotor_torque_gain, p.generator_torque_gain)
+    return [_weighted(gain, histories[name]) for name, gain in zip(_HISTORIES, gains, strict=True)]
+
+
+def _moved_on(m: Any, now: Sequence[Array], starts: Array) -> dict[str, list[Array]]:
+    """Windows of the readings with those of now; the first ones stand for all before them."""
+    return {
+        name: [*(np.where(starts > 0.0, value, before) for before in getattr(m, name)), value]
+        for name, value in zip(_HISTORIES, now, strict=True)
     }
 
 

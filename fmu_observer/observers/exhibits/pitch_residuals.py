@@ -18,6 +18,7 @@ from plant_models.hybrid.system import Array
 
 BLADES, SENSORS = 3, 6
 BLOCKS = 10  # of the long window
+_FILTERS = ("sensor_filter", "brief_filter", "long_filter")
 
 PITCH_PARAMETERS = (
     parameter("pitch_frequency", "rad/s", 11.11, "Natural frequency of a healthy pitch actuator", min=1e-3),
@@ -68,36 +69,34 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
     Returns:
         New values of the memory by name.
     """
-    sharp = residual_filter(p.sensor_filter_time, p.sample_period)
-    brief = residual_filter(p.brief_filter_time, p.sample_period)
-    long = residual_filter(p.long_filter_time, p.sample_period)
-    filters: dict[str, list[tuple[Array, Array]]] = {"sensor_filter": [], "brief_filter": [], "long_filter": []}
-    squares, single, triple, quick, slow = [], [], [], [], []
-    for i in range(SENSORS):
-        found = []
-        previous = np.where(starts > 0.0, readings[i], m.previous_pitch[i])
-        for name, coefficients in (("sensor_filter", sharp), ("brief_filter", brief), ("long_filter", long)):
-            late = readings[i] if name == "sensor_filter" else centred(readings[i], previous, p.centring)
-            model = (late, reference, p.pitch_frequency, p.pitch_damping, starts)
-            out = second_order_residual(coefficients, getattr(m, name)[i], *model)
-            filters[name].append(out.memory)
-            found.append(out.value)
-        window = windowed_square(m.sensor_squares[i], found[0])
-        squares.append(window.memory)
-        single.append(found[0] * found[0])
-        triple.append(window.value)
-        quick.append(found[1] - p.mean_residual)
-        slow.append(found[2] - p.mean_residual)
+    times = (p.sensor_filter_time, p.brief_filter_time, p.long_filter_time)
+    coefficients = [residual_filter(time, p.sample_period) for time in times]
+    found = [_residuals(m, i, readings[i], reference, coefficients, p, starts) for i in range(SENSORS)]
+    windows = [windowed_square(m.sensor_squares[i], found[i][0].value) for i in range(SENSORS)]
+    quick, slow = ([outs[k].value - p.mean_residual for outs in found] for k in (1, 2))
     return {
-        **{name: matrix(*rows) for name, rows in filters.items()},
+        **{name: matrix(*(outs[k].memory for outs in found)) for k, name in enumerate(_FILTERS)},
         "previous_pitch": readings,
-        "sensor_squares": matrix(*squares),
+        "sensor_squares": matrix(*(window.memory for window in windows)),
         "long_partial": vector(*(m.long_partial[i] + _smaller(slow, i) for i in range(BLADES))),
         "held_pitch_difference": vector(*(disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES))),
-        "held_pitch_single": vector(*single),
-        "held_pitch_triple": vector(*triple),
+        "held_pitch_single": vector(*(outs[0].value * outs[0].value for outs in found)),
+        "held_pitch_triple": vector(*(window.value for window in windows)),
         "held_pitch_brief": vector(*(_smaller(quick, i) for i in range(BLADES))),
     }
+
+
+def _residuals(
+    m: Any, i: int, reading: Array, reference: Array, coefficients: Sequence[Any], p: Any, starts: Array
+) -> list[Any]:
+    """Residuals of a sensor by each of the three filters; those of actuators are centred."""
+    previous = np.where(starts > 0.0, reading, m.previous_pitch[i])
+    late = centred(reading, previous, p.centring)
+    model = (reference, p.pitch_frequency, p.pitch_damping, starts)
+    return [
+        second_order_residual(of, getattr(m, name)[i], reading if name == "sensor_filter" else late, *model)
+        for name, of in zip(_FILTERS, coefficients, strict=True)
+    ]
 
 
 def end_block(m: Any) -> dict[str, Array]:

@@ -18,17 +18,9 @@ from fmu_observer.formulas.filtering.kalman import correct, log_likelihood, norm
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
+from fmu_observer.observers.model_signals import LOG_LIKELIHOOD, sampling_event
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-)
+from plant_models.hybrid import HybridSystem, Signal, discrete_output, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -67,37 +59,23 @@ class MotorFilter(HybridSystem):
         self.frame, self.known_load = frame, known_load
         axes, estimated = AXES[frame], STATES if known_load else (*STATES, LOAD)
         self.order = n = len(estimated)
+        P, text = np.diag(start_variance), "Covariance P, row by row, SI units"
         self.states = primed_memory(
             *(memory(f"estimated_{s.name}", s.unit, 0.0, f"Estimate: {s.description}") for s in estimated),
-            memory(
-                "estimate_covariance",
-                "1",
-                np.diag(start_variance),
-                "Covariance P, row by row, SI units",
-                shape=(n, n),
-            ),
+            memory("estimate_covariance", "1", P, text, shape=(n, n)),
             *(memory(f"held_innovation_{a}", "A", 0.0, f"Innovation of the current along {a}") for a in axes),
             memory("held_nis", "1", 0.0, "Normalised square of the innovation"),
-            memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
+            LOG_LIKELIHOOD,
         )
         self.inputs = (
             *(input_signal(f"voltage_{axis}", "V", 0.0, f"Voltage along {axis}, of the past period") for axis in axes),
             *((_load_input(),) if known_load else ()),
             *(input_signal(f"measured_current_{axis}", "A", 0.0, f"Measured current along {axis}") for axis in axes),
         )
-        self.outputs = (
-            *(
-                discrete_output(s.name, s.unit, f"Estimate: {s.description}", display_unit=s.display_unit)
-                for s in estimated
-            ),
-            *(discrete_output(f"{s.name}_std", s.unit, f"Standard deviation of the {s.name}") for s in estimated),
-            *(discrete_output(f"innovation_{a}", "A", f"Measured less predicted current, {a}") for a in axes),
-            discrete_output("nis", "1", "Normalised square of the innovation, two degrees"),
-            discrete_output("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far"),
-        )
+        self.outputs = _outputs(estimated, axes)
         self.parameters = (*_variances(estimated), *MOTOR_PARAMETERS)
-        read, text = tuple(f"measured_current_{axis}" for axis in axes), "The currents are read"
-        self.events = (PeriodicEvent("sampling", "sample_period", description=text, samples=read, leaves_out=True),)
+        read = [f"measured_current_{axis}" for axis in axes]
+        self.events = (sampling_event(read, "The currents are read", leaves_out=True),)
         super().__init__(**options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
@@ -188,6 +166,18 @@ class MotorFilter(HybridSystem):
             ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        matrix = self._observability(speed, current_q, p)
+        rank, smallest = int(np.linalg.matrix_rank(matrix)), float(np.linalg.svd(matrix, compute_uv=False)[-1])
+        steady = {"speed": speed, "current_q": current_q}
+        return Condition(
+            holds=rank == self.order,
+            values={"rank": rank, "order": self.order, "smallest_singular_value": smallest} | steady,
+            statement="n samples of the motor at a steady speed show all states (rank = order)",
+            source=self.source,
+        )
+
+    def _observability(self, speed: float, current_q: float, p: Any) -> np.ndarray:
+        """``[H_0; H_1 F_0; H_2 F_1 F_0; ...]`` over n samples at a steady speed, shape (2 n, n)."""
         electrical = p.pole_pairs * speed
         voltage_d = -electrical * p.inductance_q * current_q
         voltage_q = p.stator_resistance * current_q + electrical * p.rotor_flux
@@ -199,20 +189,7 @@ class MotorFilter(HybridSystem):
             rows.append(np.asarray(self.measure(estimate, u, p)[1]) @ Phi)
             estimate, F = self.predict(estimate, u, p)
             Phi = np.asarray(F) @ Phi
-        matrix = np.vstack(rows)
-        rank = int(np.linalg.matrix_rank(matrix))
-        return Condition(
-            holds=rank == self.order,
-            values={
-                "rank": rank,
-                "order": self.order,
-                "smallest_singular_value": float(np.linalg.svd(matrix, compute_uv=False)[-1]),
-                "speed": speed,
-                "current_q": current_q,
-            },
-            statement="n samples of the motor at a steady speed show all states (rank = order)",
-            source=self.source,
-        )
+        return np.vstack(rows)
 
     def steady_inputs(self, voltage_d: float, voltage_q: float, load: float, angle: float) -> Any:
         """Inputs at a steady speed.
@@ -253,26 +230,29 @@ def _load_input() -> Signal:
     return input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, as it is known")
 
 
+def _outputs(estimated: Sequence[Signal], axes: Sequence[str]) -> tuple[Signal, ...]:
+    """Estimates, their standard deviations, innovations and how they fit."""
+    return (
+        *(
+            discrete_output(s.name, s.unit, f"Estimate: {s.description}", display_unit=s.display_unit)
+            for s in estimated
+        ),
+        *(discrete_output(f"{s.name}_std", s.unit, f"Standard deviation of the {s.name}") for s in estimated),
+        *(discrete_output(f"innovation_{a}", "A", f"Measured less predicted current, {a}") for a in axes),
+        discrete_output("nis", "1", "Normalised square of the innovation, two degrees"),
+        discrete_output("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far"),
+    )
+
+
 def _variances(estimated: tuple[Signal, ...]) -> tuple[Signal, ...]:
-    names = ", ".join(s.name for s in estimated)
+    names, count = ", ".join(s.name for s in estimated), len(estimated)
+    of_process, of_currents = (
+        f"Diagonal of QN, per sample: {names}, in squares of their units",
+        "both measured currents",
+    )
+    tuned: dict[str, Any] = {"variability": "tunable"}
     return (
         parameter("sample_period", "s", 1e-4, "Time between two samples T_s", min=1e-7),
-        parameter(
-            "process_variance",
-            "1",
-            1e-3,
-            f"Diagonal of QN, per sample: {names}, in squares of their units",
-            min=0.0,
-            size=len(estimated),
-            variability="tunable",
-        ),
-        parameter(
-            "measurement_variance",
-            "A2",
-            0.1,
-            "Diagonal of RN: both measured currents",
-            min=1e-30,
-            size=2,
-            variability="tunable",
-        ),
+        parameter("process_variance", "1", 1e-3, of_process, min=0.0, size=count, **tuned),
+        parameter("measurement_variance", "A2", 0.1, f"Diagonal of RN: {of_currents}", min=1e-30, size=2, **tuned),
     )

@@ -21,27 +21,18 @@ def rotor_jacobian(current_d: Array, current_q: Array, speed: Array, period: Arr
     """
     electrical, saliency = p.pole_pairs * speed, p.inductance_d - p.inductance_q
     share_d, share_q = period / p.inductance_d, period / p.inductance_q
-    torque = period * 1.5 * p.pole_pairs / p.inertia
+    torque, pairs = period * 1.5 * p.pole_pairs / p.inertia, p.pole_pairs
+    by_speed = (
+        share_d * p.inductance_q * pairs * current_q,
+        -share_q * pairs * (p.inductance_d * current_d + p.rotor_flux),
+        1.0 - period * p.viscous_friction / p.inertia,
+        period * pairs,
+    )
     return [
-        [
-            1.0 - share_d * p.stator_resistance,
-            share_d * p.inductance_q * electrical,
-            share_d * p.inductance_q * p.pole_pairs * current_q,
-            0.0,
-        ],
-        [
-            -share_q * p.inductance_d * electrical,
-            1.0 - share_q * p.stator_resistance,
-            -share_q * p.pole_pairs * (p.inductance_d * current_d + p.rotor_flux),
-            0.0,
-        ],
-        [
-            torque * saliency * current_q,
-            torque * (saliency * current_d + p.rotor_flux),
-            1.0 - period * p.viscous_friction / p.inertia,
-            0.0,
-        ],
-        [0.0, 0.0, period * p.pole_pairs, 1.0],
+        [1.0 - share_d * p.stator_resistance, share_d * p.inductance_q * electrical, by_speed[0], 0.0],
+        [-share_q * p.inductance_d * electrical, 1.0 - share_q * p.stator_resistance, by_speed[1], 0.0],
+        [torque * saliency * current_q, torque * (saliency * current_d + p.rotor_flux), by_speed[2], 0.0],
+        [0.0, 0.0, by_speed[3], 1.0],
     ]
 
 

@@ -169,13 +169,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         row = 0 if event == BALISE.name else 1
         known, since = parts_of(x)
         now = constants_now(known, since)
-        if row == 0:
-            measured = u.balise_position
-            deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
-            gain = gain_ratio(self.own_bound(x, p), deviation, p.balise_deviation)
-        else:
-            measured = u.odometer + p.reading_age * self._acceleration(x, now, u, p)
-            deviation, gain = p.odometer_deviation, 1.0
+        measured, deviation, gain = self._measured(row, x, now, u, p)
         used, estimate = [*x.samples_used], [x.estimated_position, x.estimated_speed]
         first = np.where(used[row] > 0.0, 0.0, 1.0)
         weight = float(C[row, row]) * gain
@@ -192,7 +186,6 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         moved = covariance_at_sample(before, gain * C, row, reads, (weight * deviation) ** 2, SIZES)
         begun = covariance_at_first(before, row, row, deviation**2, SIZES)
         excitation = excitation_now(known, since, p.excitation_time)
-        told = {"last_innovation": x.estimated_position - measured} if row == 0 else {"last_reading": u.odometer}
         return {
             **named_as((POSITION, SPEED), estimate),
             **just_sampled(),
@@ -205,8 +198,14 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             "error_covariance": np.where(first > 0.0, begun, moved),
             "learnt": self._learnt(excitation, estimate[1], p),
             "samples_used": vector(*used),
-            **told,
-        }
+        } | ({"last_innovation": x.estimated_position - measured} if row == 0 else {"last_reading": u.odometer})
+
+    def _measured(self, row: int, x: Any, now: Constants, u: Any, p: Any) -> tuple[Array, Array, Array]:
+        """The place of a balise [m] or the reading now [m/s], its deviation, and the share of the full gain [1]."""
+        if row == 0:
+            deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
+            return u.balise_position, deviation, gain_ratio(self.own_bound(x, p), deviation, p.balise_deviation)
+        return u.odometer + p.reading_age * self._acceleration(x, now, u, p), p.odometer_deviation, 1.0
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and coefficients with their uncertainty."""

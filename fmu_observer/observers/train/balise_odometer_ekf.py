@@ -22,6 +22,7 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.innovation_gate import place_deviation
 from fmu_observer.observers.made_for import MadeFor
+from fmu_observer.observers.model_signals import LAST_NIS, LOG_LIKELIHOOD
 from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from fmu_observer.observers.train.train_signals import (
@@ -179,8 +180,8 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             memory("estimate_covariance", "1", start, text, shape=(ORDER, ORDER), symmetric=True),
             memory("last_time", "s", 0.0, "Time of the last event"),
             LAST_INNOVATION,
-            memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
-            memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
+            LAST_NIS,
+            LOG_LIKELIHOOD,
             memory("refused_time", "s", 0.0, "Time for which readings have not been used"),
         )
 
@@ -308,23 +309,25 @@ def transition(elapsed: Array, speed: Array, effort: Array, p: Any) -> Transitio
     Args:
         elapsed: time since the last event [s]. speed: [m/s]. effort: [N]. p: parameters of `BaliseOdometerEkf`.
     """
-    T = elapsed
+    moves, fade = _moves(speed, p), np.exp(-elapsed * _fading(speed, p))
+    return Transition(_error_transition(elapsed, speed, moves, fade, p), _noise(elapsed, speed, effort, moves, fade, p))
+
+
+def _error_transition(T: Array, speed: Array, moves: Array, fade: Array, p: Any) -> Array:
+    """F over a time T [s], by a series of the drag slope to its third order, shape (4, 4)."""
     slope = -(p.davis_b + 2.0 * p.davis_c * np.abs(speed)) / p.mass
     z = slope * T
-    moves = _moves(speed, p)
-    fade = np.exp(-T * _fading(speed, p))
     stays = moves * (1.0 + z * (1.0 + z * (0.5 + z / 6.0)))
     once, twice = moves * T * (1.0 + z * (0.5 + z / 6.0)), moves * 0.5 * T * T * (1.0 + z / 3.0)
     zero = 0.0 * T
     one = 1.0 + zero
-    F = np.vstack(
-        [
-            np.hstack([one, once, twice, zero]),
-            np.hstack([zero, stays, once, zero]),
-            np.hstack([zero, zero, one, zero]),
-            np.hstack([zero, zero, zero, fade]),
-        ]
-    )
+    rows = ([one, once, twice, zero], [zero, stays, once, zero], [zero, zero, one, zero], [zero, zero, zero, fade])
+    return np.vstack([np.hstack(row) for row in rows])
+
+
+def _noise(T: Array, speed: Array, effort: Array, moves: Array, fade: Array, p: Any) -> Array:
+    """QN over a time T [s] as if there were no drag, shape (4, 4)."""
+    zero = 0.0 * T
     by_acceleration = integrated_noise(2, T, moves * p.acceleration_density)
     by_disturbance = integrated_noise(3, T, moves * (p.disturbance_density + _drift(speed, effort, p)))
     driven = np.minimum(np.abs(effort) / (p.mass * p.creep_effort), 1.0)
@@ -335,34 +338,22 @@ def transition(elapsed: Array, speed: Array, effort: Array, p: Any) -> Transitio
         shared = [by_acceleration[i, j] if max(i, j) < 2 else zero for j in range(3)]
         shared[i] = shared[i] + (unseen if i == V else zero)
         rows.append(np.hstack([*(by_disturbance[i, j] + shared[j] for j in range(3)), zero]))
-    QN = np.vstack([*rows, np.hstack([zero, zero, zero, creep])])
-    return Transition(F, QN)
+    return np.vstack([*rows, np.hstack([zero, zero, zero, creep])])
 
 
 def _moves(speed: Array, p: Any) -> Array:
-    """1 where the train is faster than a reading can tell from standing, else 0.
-
-    Args:
-        speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
-    """
+    """1 where the train is faster than a reading can tell from standing, else 0."""
     return np.where(np.abs(speed) > p.odometer_deviation, 1.0, 0.0)
 
 
 def _fading(speed: Array, p: Any) -> Array:
-    """Rate at which a creep fades [1/s]; a wheel that stands does not creep.
-
-    Args:
-        speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
-    """
+    """Rate at which a creep fades [1/s]; a wheel that stands does not creep."""
     return 1.0 / np.where(_moves(speed, p) > 0.0, p.creep_time, p.odometer_period)
 
 
 def _drift(speed: Array, effort: Array, p: Any) -> Array:
     """Spectral density with which the disturbance drifts since gradient and effort change [m2/s5]: twice the variance
     over the time in which each becomes another one.
-
-    Args:
-        speed: [m/s]. effort: [N]. p: parameters of `BaliseOdometerEkf`.
     """
     by_gradient = np.square(GRAVITY * p.gradient_deviation) * np.abs(speed) / p.gradient_length
     return 2.0 * (by_gradient + np.square(p.effort_share * effort / p.mass) / p.effort_time)

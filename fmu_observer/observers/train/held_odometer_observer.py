@@ -38,6 +38,15 @@ from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
+_BOUND_NUMBERS = {  # of `ErrorBounds`: by which parameter
+    "period": "odometer_period",
+    "rate": "acceleration_max",
+    "beta": "published_beta",
+    "m": "published_decay",
+    "sample_error": "published_sample_error",
+    "noise": "odometer_error",
+    "decay": "bound_decay",
+}
 Missing = Literal["predicted", "held"]
 
 REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
@@ -333,22 +342,17 @@ class HeldOdometerObserver(TrainObserver):
             gain = [float(k) for k in p.gain]
             raise ValueError(f"{self.name}: {PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {gain}).")
         gains = [np.array([float(first_gain(z, p)), *map(float, p.gain[1:])]) for z in (0.0, float(p.speed_max))]
-        unknown = (p.unknown_acceleration, p.unknown_jerk, p.unknown_jerk_rate)
+        numbers = {name: float(getattr(p, of)) for name, of in _BOUND_NUMBERS.items()}
+        unknown = (float(p.unknown_acceleration), float(p.unknown_jerk), float(p.unknown_jerk_rate))
         return ErrorBounds(
             observer=self.name,
             preset=preset or self.default_preset or "",
-            period=float(p.odometer_period),
-            rate=float(p.acceleration_max),
-            beta=float(p.published_beta),
-            m=float(p.published_decay),
             gain=max(sqrt(float(K @ K)) for K in gains),
-            sample_error=float(p.published_sample_error),
-            noise=float(p.odometer_error),
-            disturbances=tuple(map(float, unknown)),  # type: ignore[arg-type]
+            disturbances=unknown,
             P=p.lyapunov_matrix,
-            decay=float(p.bound_decay),
             drifts=[error_matrix(a11, p) for a11 in slopes],
             gains=gains,
+            **numbers,
         )
 
     # -- internals --------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -226,41 +226,31 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""
         errors, gains = speed_errors(p)
-        held = self.hold == "innovation"
-        found = polytope_stability(errors - gains @ SEEN)
-        sampled = _sampled(errors, gains, float(p.odometer_period)) if held else None
         period = f"{float(p.odometer_period):g} s"
-        between = (
-            f"the innovation held for {period}"
-            if held
-            else f"what the speed changes while a reading is held, {period}, an input to it, whatever the period"
-        )
+        if self.hold == "innovation":
+            found, between = (
+                _held_stability(errors, gains, float(p.odometer_period)),
+                f"the innovation held for {period}",
+            )
+        else:
+            found = _read_stability(errors, gains, max_gap)
+            between = f"what the speed changes while a reading is held, {period}, an input to it, whatever the period"
         model = (
             f"error of speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
             f"{float(p.schedule_max):g} m/s), changing between them at any time, {between}; a balise ends the position "
             "error; times at which the odometer is not believed, and standstill, are left out"
         )
-        if sampled is None:
-            holds, margin, P = found.holds, found.margin, found.lyapunov_matrix
-            constant, radius = found.abscissa < 0.0, float(np.exp(found.abscissa * max_gap))
-            note = f"the speed error falls at least as exp(-{max(found.decay, 0.0):.3g} t)"
-        else:
-            stable, longest = sampled
-            holds, margin, P = stable.holds, stable.margin, stable.lyapunov_matrix
-            constant, radius = stable.spectral_radius < 1.0, stable.spectral_radius
-            reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any looked at, up to {HORIZON:g} s,"
-            note = f"the odometer's period {reach} at a steady speed"
         return Certificate(
             max_gap=max_gap,
             horizon=inf,
-            constant_limit=inf if constant else 0.0,
-            aperiodic_limit=inf if holds else 0.0,
-            spectral_radius=radius,
-            quadratic_margin=margin,
-            holds=holds,
+            constant_limit=inf if found.constant else 0.0,
+            aperiodic_limit=inf if found.holds else 0.0,
+            spectral_radius=found.radius,
+            quadratic_margin=found.margin,
+            holds=found.holds,
             error_model=model,
-            notes=(note,),
-            lyapunov_matrix=rows_of(P),
+            notes=(found.note,),
+            lyapunov_matrix=tuple(tuple(map(float, row)) for row in found.P),
         )
 
     def working_point(self, p: Any) -> list[str]:
@@ -359,6 +349,33 @@ def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:
         float(p.davis_b) / mass, float(p.davis_c) / mass, float(p.schedule_min), float(p.schedule_max)
     )
     return drifts, np.stack([np.asarray(p.gain_low, float), np.asarray(p.gain_high, float)])[:, :, None]
+
+
+class _Stability(NamedTuple):
+    """Of the speed error: for mixed and for constant gaps, radius [1], margin [1], Lyapunov matrix, and in words."""
+
+    holds: bool
+    constant: bool
+    radius: float
+    margin: float
+    P: np.ndarray
+    note: str
+
+
+def _read_stability(errors: np.ndarray, gains: np.ndarray, max_gap: float) -> _Stability:
+    """With a reading that counts all the time, over a gap [s]."""
+    found = polytope_stability(errors - gains @ SEEN)
+    note = f"the speed error falls at least as exp(-{max(found.decay, 0.0):.3g} t)"
+    radius = float(np.exp(found.abscissa * max_gap))
+    return _Stability(found.holds, found.abscissa < 0.0, radius, found.margin, found.lyapunov_matrix, note)
+
+
+def _held_stability(errors: np.ndarray, gains: np.ndarray, period: float) -> _Stability:
+    """With the innovation held for a period [s]."""
+    found, longest = _sampled(errors, gains, period)
+    reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any looked at, up to {HORIZON:g} s,"
+    note, radius = f"the odometer's period {reach} at a steady speed", found.spectral_radius
+    return _Stability(found.holds, radius < 1.0, radius, found.margin, found.lyapunov_matrix, note)
 
 
 def _sampled(drifts: np.ndarray, gains: np.ndarray, period: float) -> tuple[PeriodicStability, float]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
-import scipy
 
 from fmu_observer.certificates.observer_limits import Trial
 from fmu_observer.models.state_affine import StateAffineModel
-from plant_models.hybrid import HybridSystem
+from fmu_observer.observers.model_trial import solved_motion
 
 STOP = 35.0  # [s]; the error counts from 28 s on
 ALLOWED = 0.1  # error of state and first constant that may be left, in the units of the example
@@ -27,29 +25,22 @@ def adaptive_trial(observer: Any, settings: Mapping[str, float]) -> Trial:
     model: StateAffineModel = observer.model
     believed = [float(s.start_values[0]) for s in (*model.states, *model.unknowns)]
     start = np.array(model.example or [value + 1.0 for value in believed])
-    n = model.order
-
-    @cache
-    def motion() -> Any:
-        u = np.zeros(len(model.inputs))
-        flow = lambda t, x: np.asarray(model.flow(t, x, start[n:], u), dtype=float)  # noqa: E731
-        return scipy.integrate.solve_ivp(
-            flow, (0.0, STOP), start[:n], "DOP853", rtol=1e-10, atol=1e-9, dense_output=True, max_step=0.1
-        ).sol
+    n, u = model.order, np.zeros(len(model.inputs))
+    flow = lambda t, x: model.flow(t, x, start[n:], u)  # noqa: E731
+    motion = solved_motion(flow, start[:n], STOP, rtol=1e-10, atol=1e-9, max_step=0.1)
 
     def truth(t: np.ndarray) -> Mapping[str, np.ndarray]:
-        named = {s.name: row for s, row in zip(model.states, motion()(t), strict=True)}
+        named = {s.name: row for s, row in zip(model.states, motion(t), strict=True)}
         return named | {model.unknowns[0].name: np.full(np.shape(t), start[n])}
 
     first = float(np.linalg.norm(start[: n + 1] - np.array(believed[: n + 1])))
-    system: HybridSystem = observer
     return Trial(
-        system=system,
+        system=observer,
         varied="period",
         low=LOW,
         high=HIGH,
         event=model.event,
-        payload=lambda t: {s.name: row for s, row in zip(model.measurements, model.C @ motion()(t), strict=True)},
+        payload=lambda t: {s.name: row for s, row in zip(model.measurements, model.C @ motion(t), strict=True)},
         inputs=lambda t: {s.name: np.zeros(np.shape(t)) for s in model.inputs},
         truth=truth,
         settings=settings,

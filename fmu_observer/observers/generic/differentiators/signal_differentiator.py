@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.observers.judged_observer import JudgedObserver
-from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array
 
 LARGEST = len(LEVANT_GAINS) - 1
@@ -53,14 +52,11 @@ class SignalDifferentiator(JudgedObserver):
     ) -> None:
         require_whole(self.name, 0, order=order, filtering_order=filtering_order)
         if order + filtering_order > LARGEST:
-            raise ValueError(
-                f"{self.name}: order {order} with filtering order {filtering_order}: expected whole numbers from 0 on "
-                f"with a sum "
-                f"of at most {LARGEST}, for which gains are tabulated."
-            )
+            expected = f"whole numbers from 0 on with a sum of at most {LARGEST}, for which gains are tabulated"
+            raise ValueError(f"{self.name}: order {order} with filtering order {filtering_order}: expected {expected}.")
         self.order, self.filtering_order = order, filtering_order
         kind = memory if self.discrete else state
-        units = [rate_unit(unit, i) for i in range(-filtering_order, order + 1)]
+        units = [_rate_unit(unit, i) for i in range(-filtering_order, order + 1)]
         self.filters = [kind(f"filter_{i + 1}", units[i], 0.0, f"Filter state {i + 1}") for i in range(filtering_order)]
         names = ["value", *(f"derivative_{i}" for i in range(1, order + 1))]
         words = ["the signal", *(f"its derivative {i}" for i in range(1, order + 1))]
@@ -68,13 +64,10 @@ class SignalDifferentiator(JudgedObserver):
         self.estimates = [kind(f"estimated_{name}", u, 0.0, f"Estimate of {text}") for name, u, text in described]
         self.states = (*self.filters, *self.estimates, *extra_memory)
         self.inputs = (input_signal("signal", unit, 0.0, "Signal to differentiate"),)
-        moves: Variability = "discrete" if self.discrete else "continuous"
-        self.outputs = tuple(
-            output_signal(name, u, f"Estimate of {text}", variability=moves) for name, u, text in described
-        )
-        bound = parameter(
-            "bound", rate_unit(unit, order + 1), 1.0, f"Bound L of derivative {order + 1} of the signal", min=1e-12
-        )
+        output = discrete_output if self.discrete else output_signal
+        self.outputs = tuple(output(name, u, f"Estimate of {text}") for name, u, text in described)
+        what = f"Bound L of derivative {order + 1} of the signal"
+        bound = parameter("bound", _rate_unit(unit, order + 1), 1.0, what, min=1e-12)
         self.parameters = (bound, *extra_parameters)
         filters_too = {"filtering_order": filtering_order} if filtering_order else {}
         super().__init__(order=order, unit=unit, **filters_too)
@@ -113,12 +106,8 @@ class SignalDifferentiator(JudgedObserver):
         )
 
 
-def rate_unit(unit: str, order: int) -> str:
-    """Unit of a derivative of a signal; negative orders are integrals.
-
-    Args:
-        unit: SI, as FMI writes units. order: number of states of the chain.
-    """
+def _rate_unit(unit: str, order: int) -> str:
+    """Unit of a derivative of a signal; negative orders are integrals."""
     if order == 0:
         return unit
     power = "" if abs(order) == 1 else str(abs(order))

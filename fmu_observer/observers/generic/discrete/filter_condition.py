@@ -14,7 +14,7 @@ from fmu_observer.models.filter_models import FilterModel, Known
 from plant_models.hybrid.system import Array
 
 DOUBTED, WRONG = 1e-4, 1e-2  # differences at half the step: told, and too much for a filter to rest on [ours]
-INACCURATE = (
+_INACCURATE = (
     "its transition over a period is not accurate: steps of half the length change it by {error:.2g} of its size; set "
     "a shorter sample_period or more substeps (option `substeps`), or leave that out and give the option `period`"
 )
@@ -38,27 +38,31 @@ def steady_condition(
     if not np.isfinite(np.asarray(F)).all():
         return _inaccurate(error, source)
     F, H, Q, R = (np.asarray(matrix) for matrix in (F, H, through(noise, W), through(readings, V)))
-    steady, matrix = steady_filter(F, H, Q, R), observability_matrix(F, H)
-    where = "" if model.linear else ", linearised at the start of the estimates"
-    driven = observability_matrix(F.T, Q)
-    rank, reached = int(np.linalg.matrix_rank(matrix)), int(np.linalg.matrix_rank(driven))
-    warnings = (INACCURATE.format(error=error),) if error > DOUBTED else ()
+    steady, observed = steady_filter(F, H, Q, R), observability_matrix(F, H)
+    rank, reached = (int(np.linalg.matrix_rank(m)) for m in (observed, observability_matrix(F.T, Q)))
     return Condition(
         holds=steady is not None and error <= WRONG,
         values={
             "rank": rank,
             "order": model.order,
             "driven": reached,
-            "smallest_singular_value": float(np.linalg.svd(matrix)[1][-1]),
+            "smallest_singular_value": float(np.linalg.svd(observed)[1][-1]),
             "spectral_radius": np.inf if steady is None else steady.spectral_radius,
             "transition_error": error,
         },
-        statement="the gain settles and errors die out: the stationary Riccati equation has a stabilising solution, "
-        f"with spectral_radius of A (I - K C) below 1{where}. Of {model.order} states the measurements observe {rank}, "
-        f"and the process noise drives {reached}; steps of half the length change the transition over a period by "
-        f"transition_error, at most {WRONG:g}",
+        statement=_statement(model, rank, reached),
         source=source,
-        warnings=warnings,
+        doubts=(_INACCURATE.format(error=error),) if error > DOUBTED else (),
+    )
+
+
+def _statement(model: FilterModel, rank: int, driven: int) -> str:
+    where = "" if model.linear else ", linearised at the start of the estimates"
+    return (
+        "the gain settles and errors die out: the stationary Riccati equation has a stabilising solution, with "
+        f"spectral_radius of A (I - K C) below 1{where}. Of {model.order} states the measurements observe {rank}, and "
+        f"the process noise drives {driven}; steps of half the length change the transition over a period by "
+        f"transition_error, at most {WRONG:g}"
     )
 
 
@@ -84,4 +88,4 @@ def within_steps(model: FilterModel, p: Any) -> dict[str, Array]:
 def _inaccurate(error: float, source: str) -> Condition:
     """Of a transition that gives no numbers."""
     text = "the transition over a period is a number"
-    return Condition(False, {"transition_error": error}, text, source, (INACCURATE.format(error=error),))
+    return Condition(False, {"transition_error": error}, text, source, (_INACCURATE.format(error=error),))

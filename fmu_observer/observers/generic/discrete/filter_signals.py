@@ -8,7 +8,13 @@ import numpy as np
 
 from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.observers.generic.discrete.arrivals import Arrivals
-from fmu_observer.observers.model_signals import STATISTICS, deviation_outputs, estimate_outputs, estimate_states
+from fmu_observer.observers.model_signals import (
+    LAST_NIS,
+    LOG_LIKELIHOOD,
+    deviation_outputs,
+    estimate_outputs,
+    estimate_states,
+)
 from plant_models.hybrid import OutputWarning, Signal, discrete_output
 from plant_models.hybrid import memory as memory_signal
 
@@ -48,7 +54,8 @@ class SignalsOf:
             memory_signal(name, "1", np.eye(n), f"{text}, {_ROWS}", shape=(n, n)),
             memory_signal("last_innovation", "1", 0.0, "Last measured minus predicted, SI units", size=q),
             memory_signal("last_innovation_covariance", "1", 0.0, f"Covariance of it, {_ROWS}", shape=(q, q)),
-            *STATISTICS,
+            LAST_NIS,
+            LOG_LIKELIHOOD,
             memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive, or lost a variance"),
         ]
         if self.arrivals.several:

@@ -122,21 +122,11 @@ class GaussianFilter(GatedObserver, JudgedObserver):
             self.model = with_unknown(self.model, unknown)
         self.form: Form = self.forms[0] if form is None else form
         require_choice(self.name, {"form": self.forms}, form=self.form)
-        self.arrivals = Arrivals(self.name, self.model, arrival)
-        self.covariances = covariances
+        self.arrivals, self.covariances = Arrivals(self.name, self.model, arrival), covariances
         self._declare()
-        given = {name: list(value) for name, value in named.items() if value}
-        super().__init__(
-            model=model if isinstance(model, str) else self.model.name,
-            **given,
-            **({} if period is None else {"period": period}),
-            **({} if substeps is None else {"substeps": substeps}),
-            **({"unknown": list(unknown)} if unknown else {}),
-            arrival=arrival if isinstance(arrival, str) else list(arrival),
-            form=self.form,
-            covariances=covariances,
-            **options,
-        )
+        name = model if isinstance(model, str) else self.model.name
+        recorded = _recorded(**named, period=period, substeps=substeps, unknown=unknown, arrival=arrival)
+        super().__init__(model=name, **recorded, form=self.form, covariances=covariances, **options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -393,6 +383,12 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         inputs = self.model.start_inputs
         H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
         return self._estimated[int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))]
+
+
+def _recorded(**options: Any) -> dict[str, Any]:
+    """The options that are set, as they are recorded: sequences as lists."""
+    kept = {name: list(value) if isinstance(value, list | tuple) else value for name, value in options.items()}
+    return {name: value for name, value in kept.items() if value is not None and value != []}
 
 
 def _lost(before: Sequence[Array], after: Sequence[Array], share: float) -> Array:

@@ -22,6 +22,7 @@ from fmu_observer.observers.generic.discrete.sample_step import PRIMED
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import (
+    LAST_NIS,
     deviation_outputs,
     estimate_outputs,
     estimate_states,
@@ -257,7 +258,7 @@ class MemberFilter(JudgedObserver):
         n, q = self.model.order, len(self.model.measurements)
         return (
             *estimate_states(self.model.states, memory),
-            memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
+            LAST_NIS,
             memory("deviations", "1", (1.0,) * n, "Standard deviations of the estimates, SI units", size=n),
             memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", shape=(self.members, n)),
             *self.own_memory,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Literal
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 Trust = Literal["balises", "odometer"]
 
-DEFAULT_MARGIN = 0.1
-THETA_MAX = 8.0  # [1/s], the thesis's gain
+_DEFAULT_MARGIN = 0.1
+_THETA_MAX = 8.0  # [1/s], the thesis's gain
 # [ours], see docs/certificates.md
 FAR = {"innovation_decay": 3.0, "odometer_gain_position": 0.7, "odometer_gain_speed": 1.6}
-SHARE_AT_BALISE = 0.8  # of the position error that a balise takes away in the end, with the gains FAR
+_SHARE_AT_BALISE = 0.8  # of the position error that a balise takes away in the end, with the gains FAR
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ def balise_gaps(spacing: float | Sequence[float], speeds: tuple[float, float]) -
     if not (0.0 < slowest <= fastest < inf):
         raise ValueError(
             f"Balise gaps: expected 0 < slowest <= fastest speed [m/s], got {slowest:g} and {fastest:g}. A train that "
-            f"may stand "
-            "still between balises has no longest gap; give the slowest speed at which the estimate must be right."
+            "may stand still between balises has no longest gap; give the slowest speed at which the estimate must be "
+            "right."
         )
     distances = (
         [float(spacing)] if isinstance(spacing, int | float) else _distances([float(place) for place in spacing])
@@ -117,7 +117,7 @@ def design_high_gain(
     spacing: float | Sequence[float],
     speeds: tuple[float, float],
     observer: HighGainTrainObserver | None = None,
-    margin: float = DEFAULT_MARGIN,
+    margin: float = _DEFAULT_MARGIN,
 ) -> GainDesign:
     """The largest constant theta certified for every mixture of the gaps.
 
@@ -132,14 +132,14 @@ def design_high_gain(
     gaps = balise_gaps(spacing, speeds)
     parameters = _searched(chosen, lambda theta: {chosen.theta_name: theta}, _with_margin(gaps, margin))
     theta = parameters[chosen.theta_name]
-    return _design(chosen, parameters, gaps, lambda _: high_gain_error(theta))
+    return _design(chosen, parameters, gaps, lambda _: _high_gain_error(theta))
 
 
 def design_takagi_sugeno(
     spacing: float | Sequence[float],
     speeds: tuple[float, float],
     trust: Trust = "balises",
-    margin: float = DEFAULT_MARGIN,
+    margin: float = _DEFAULT_MARGIN,
 ) -> GainDesign:
     """Gains of `TakagiSugenoCdo` certified for every mixture of the gaps.
 
@@ -157,7 +157,7 @@ def design_takagi_sugeno(
     if trust not in ("balises", "odometer"):
         raise ValueError(f"Takagi-Sugeno design: unknown trust {trust!r}; use 'balises' or 'odometer'.")
     wanted = _with_margin(gaps, margin)
-    gains = odometer_family() if trust == "odometer" else _searched(observer, balise_family, wanted)
+    gains = _odometer_family() if trust == "odometer" else _searched(observer, balise_family, wanted)
     on_position, on_speed = gains["odometer_gain_position"], gains["odometer_gain_speed"]
     error = SampledError.of(
         [[0.0, 1.0 - on_position], [0.0, -on_speed]],
@@ -172,7 +172,7 @@ def design_adaptive(
     speeds: tuple[float, float],
     acceleration: float = 0.7,
     speed_error: float = 0.05,
-    margin: float = DEFAULT_MARGIN,
+    margin: float = _DEFAULT_MARGIN,
 ) -> GainDesign:
     """Rule of `AdaptiveGainCdo` certified for the gaps and for every change of speed within `acceleration`.
 
@@ -181,49 +181,46 @@ def design_adaptive(
 
     Args:
         spacing, speeds: see `balise_gaps`. Spacings that differ by more than about a third are hardly ever certified.
-        acceleration: largest acceleration and deceleration [m/s2].
-        speed_error: largest relative error of the odometer, slip included [1].
-        margin: the certified limit is this much longer than the longest gap [1].
+        acceleration: largest acceleration and deceleration [m/s2]. speed_error: largest relative error of the odometer,
+            slip included [1]. margin: the certified limit is this much longer than the longest gap [1].
 
     Raises:
         ValueError: bad input (see `balise_gaps`), or no rule could be certified; the constant theta that can is named.
     """
     gaps, observer = balise_gaps(spacing, speeds), AdaptiveGainCdo()
     longest, middle = _with_margin(gaps, margin), 0.5 * (gaps.nearest + gaps.farthest)
-    journey = {
-        "expected_spacing": middle,
-        "assumed_acceleration": acceleration,
-        "assumed_speed_error": speed_error,
-        "assumed_spacing_error": gaps.farthest / middle - 1.0,
-    }
-    for ratio in RATIOS:
-        for share in SHARES:
-            smallest = share / longest
-            largest = max(min(THETA_MAX, ratio * gaps.fastest / middle), smallest)
-            rule = {"ratio": ratio, "theta_min": rounded_down(smallest), "theta_max": largest, **journey}
-            if observer.certify(longest, rule).holds:
-                return _design(observer, rule, gaps, _followed(rule))
+    assumed = {"acceleration": acceleration, "speed_error": speed_error, "spacing_error": gaps.farthest / middle - 1.0}
+    journey = {"expected_spacing": middle} | {f"assumed_{name}": value for name, value in assumed.items()}
+    for ratio, share in product(RATIOS, SHARES):
+        rule = _rule(ratio, share / longest, ratio * gaps.fastest / middle) | journey
+        if observer.certify(longest, rule).holds:
+            return _design(observer, rule, gaps, _followed(rule))
     constant = design_high_gain(spacing, speeds, margin=margin).parameters["theta"]
+    journeys = f"spacings of {gaps.nearest:g} to {gaps.farthest:g} m and accelerations up to {acceleration:g} m/s2"
     raise ValueError(
-        f"Adaptive gain: no rule is certified for gaps up to {gaps.longest:.4g} s with spacings of {gaps.nearest:g} to "
-        f"{gaps.farthest:g} m and accelerations up to {acceleration:g} m/s2; a constant theta of {constant:.3g} is. "
-        f"Raise the "
-        "slowest speed, or lower the acceleration."
+        f"Adaptive gain: no rule is certified for gaps up to {gaps.longest:.4g} s with {journeys}; a constant theta of "
+        f"{constant:.3g} is. Raise the slowest speed, or lower the acceleration."
     )
 
 
-def odometer_family() -> Gains:
+def _rule(ratio: float, smallest: float, asked: float) -> dict[str, float]:
+    """A rule whose fastest speed asks for a gain of so much [1/s]."""
+    largest = max(min(_THETA_MAX, asked), smallest)
+    return {"ratio": ratio, "theta_min": rounded_down(smallest), "theta_max": largest}
+
+
+def _odometer_family() -> Gains:
     """T-S gains that trust the odometer between balises and correct the position only at them [ours]."""
-    return {**FAR, "balise_gain_position": SHARE_AT_BALISE * FAR["innovation_decay"], "balise_gain_speed": 0.0}
+    return {**FAR, "balise_gain_position": _SHARE_AT_BALISE * FAR["innovation_decay"], "balise_gain_speed": 0.0}
 
 
-def high_gain_error(theta: float) -> SampledError:
+def _high_gain_error(theta: float) -> SampledError:
     """Error of the high gain theta [1/s] with K = (2, 1), drag left out."""
     return SampledError.of([[0.0, 1.0], [0.0, 0.0]], (2.0 * theta, theta**2), 2.0 * theta)
 
 
 def _followed(rule: Gains) -> Callable[[float], SampledError]:
-    return lambda gap: high_gain_error(float(np.clip(rule["ratio"] / gap, rule["theta_min"], rule["theta_max"])))
+    return lambda gap: _high_gain_error(float(np.clip(rule["ratio"] / gap, rule["theta_min"], rule["theta_max"])))
 
 
 def _searched(observer: TrainObserver, family: Callable[[float], Gains], gap: float) -> Gains:
@@ -268,7 +265,6 @@ def _distances(positions: Sequence[float]) -> list[float]:
         if following < place:
             raise ValueError(
                 f"Balise gaps: positions must increase; number {number + 1} at {following:g} m follows number {number} "
-                f"at "
-                f"{place:g} m."
+                f"at {place:g} m."
             )
     return [following - place for place, following in pairwise(positions)]
