@@ -88,7 +88,7 @@ def left_working_points(components: Mapping[str, ComponentTable], links: Sequenc
     ]
     for source, target, *_ in links:
         (sensor, output), (name, read) = source.split(".", 1), target.split(".", 1)
-        told = getattr(systems.get(name), "told_bounds", {}).get(read)
+        told = getattr(systems.get(name), "stated_bounds", {}).get(read)
         if told is None or not hasattr(systems.get(sensor), "reading_bound"):
             continue
         arrives = systems[sensor].reading_bound(output, values_in_use(components[sensor], systems[sensor]))

@@ -22,7 +22,7 @@ import numpy as np
 from cosim import Scenario
 from fmu_observer import OBSERVERS
 from fmu_observer.design.certified_gains import certified_gains
-from fmu_observer.observers.innovation_gate import GATE_MEMORY, VERDICT, GateMemory, Told, judge
+from fmu_observer.observers.innovation_gate import GATE_MEMORY, VERDICT, GateMemory, ReportedPlace, judge
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train import TrainObserver
 from plant_models.hybrid import Runtime, scalar_names
@@ -177,7 +177,7 @@ def _told(observer: TrainObserver, runtime: Runtime, place: float, p: Any, odome
     estimate = float(runtime.x[names.index(observer.position_state)])
     offsets = np.concatenate([[0.0], OFFSETS, -OFFSETS])
     bound = float(observer.own_bound(observer.unpack_states(runtime.x), p))
-    used = np.asarray(judge(memory, Told(place + offsets, 0.0, estimate, bound, odometer, runtime.t), p).used)
+    used = np.asarray(judge(memory, ReportedPlace(place + offsets, 0.0, estimate, bound, odometer, runtime.t), p).used)
     settled = memory.settled >= p.gate_recover
     return Telegram(estimate - place, settled, used[0] == 0.0, used[1:].reshape(2, -1).mean(axis=0))
 

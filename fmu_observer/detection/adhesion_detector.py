@@ -24,9 +24,9 @@ from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
-SlipDefinition = Literal["odometer", "speed"]
+_SlipDefinition = Literal["odometer", "speed"]
 
-LARGEST_SLIP = 0.95  # of the odometer ratio: beyond, the wheel spins under a train that stands, 19 times over
+_LARGEST_SLIP = 0.95  # of the odometer ratio: beyond, the wheel spins under a train that stands, 19 times over
 
 
 class AdhesionDetector(HybridSystem):
@@ -74,7 +74,7 @@ class AdhesionDetector(HybridSystem):
     default_preset = "polach"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"slip_definition": ("odometer", "speed")}
 
-    def __init__(self, slip_definition: SlipDefinition = "odometer") -> None:
+    def __init__(self, slip_definition: _SlipDefinition = "odometer") -> None:
         require_choice(self.name, self.option_choices, slip_definition=slip_definition)
         self.slip_definition = slip_definition
         computed = _map_values(nominal_map(), degraded_map())
@@ -121,7 +121,7 @@ class AdhesionDetector(HybridSystem):
     def _magnitude(self, slip: Array) -> Array:
         if self.slip_definition == "speed":
             return np.abs(slip)
-        return np.abs(speed_slip_from_odometer_slip(np.minimum(slip, LARGEST_SLIP)))
+        return np.abs(speed_slip_from_odometer_slip(np.minimum(slip, _LARGEST_SLIP)))
 
     @staticmethod
     def _at_speed(u: Any, p: Any, nominal: Array, degraded: Array) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ FAULT_OUTPUTS = (
     discrete_output("recovering", "1", "1 while it begins to be believed again, else 0"),
     discrete_output("residual_limit", "m/s", "Size of the residual at which the verdict changes"),
 )
-SETTLED_TIME = discrete_output("settled_time", "s", "Time with a small residual; without any no fault is ever judged")
+_SETTLED_TIME = discrete_output("settled_time", "s", "Time with a small residual; without any no fault is ever judged")
 ODOMETER_SAMPLE = PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read")
 
 
@@ -45,7 +45,7 @@ def verdict(rules: Rules, m: Any, p: Any) -> dict[str, Array]:
     }
 
 
-def told_bounds(rules: Rules) -> dict[str, str]:
+def stated_bounds(rules: Rules) -> dict[str, str]:
     """The parameter that bounds the noise of an input, by its name; the printed rules are told nothing of noise.
 
     Args:
@@ -54,7 +54,7 @@ def told_bounds(rules: Rules) -> dict[str, str]:
     return {"odometer": NOISE} if any(s.name == NOISE for s in rules.parameters) else {}
 
 
-def noise_doubts(p: Any) -> list[str]:
+def noise_warnings(p: Any) -> list[str]:
     """What a user should read before a run where faults are judged by noise and not by the threshold, in words.
 
     Args:
@@ -101,7 +101,7 @@ class JamDetector(HybridSystem):
         input_signal("estimated_speed", "m/s", 0.0, "Train speed that the observer estimates"),
         input_signal("effort", "N", 0.0, "Effort at the wheel rim: traction positive, brake negative"),
     )
-    outputs = (*FAULT_OUTPUTS, SETTLED_TIME)
+    outputs = (*FAULT_OUTPUTS, _SETTLED_TIME)
     events = (ODOMETER_SAMPLE,)
     presets: Mapping[str, Mapping[str, Any]] = {
         "as_published": {"threshold": 0.9, "residual_gain": 2.3},
@@ -115,7 +115,7 @@ class JamDetector(HybridSystem):
         self.rules = RULES[rules]
         self.states = self.rules.memory
         self.parameters = (*SHARED_PARAMETERS, *self.rules.parameters)
-        self.told_bounds = told_bounds(self.rules)
+        self.stated_bounds = stated_bounds(self.rules)
         super().__init__(rules=rules)
 
     def working_point(self, p: Any) -> list[str]:
@@ -124,12 +124,12 @@ class JamDetector(HybridSystem):
         Args:
             p: parameters, as in `HybridSystem.flow`.
         """
-        return noise_doubts(p)
+        return noise_warnings(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A sample is judged."""
-        told = Reading(u.odometer, u.estimated_speed, u.residual, u.effort)
-        return self.rules.at_sample(x, told, p).memory
+        reading = Reading(u.odometer, u.estimated_speed, u.residual, u.effort)
+        return self.rules.at_sample(x, reading, p).memory
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Verdict, recovery, and how long the residual has been small."""

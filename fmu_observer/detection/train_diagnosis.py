@@ -133,11 +133,11 @@ class TrainDiagnosis(HybridSystem):
         """The declared outputs."""
         read, codes = readings(u), dict(zip(FAULTS, x.code, strict=True))
         enough = read.fitted[0] * read.fitted[1] * read.fitted[2] * read.has_pressure
-        told = {f"{fault}_fault": code for fault, code in codes.items()}
+        faults = {f"{fault}_fault": code for fault, code in codes.items()}
         isolated = [np.where(code > 0.0, 1.0, 0.0) for code in codes.values()]
         unknown = [1.0 - found for found in x.share_found]
         return {
-            **told,
+            **faults,
             "fault": largest([np.where(since >= 0.0, 1.0, 0.0) for since in x.group_since] + isolated),
             "odometer_fault": np.where(codes["odometer_1"] > 0.0, 1.0, 0.0),
             "fault_count": sum(isolated),

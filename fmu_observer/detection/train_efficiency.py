@@ -58,7 +58,7 @@ def between(means: list[Array]) -> list[Array]:
     return [0.5 * (a + b) for a, b in pairwise(means)]
 
 
-def simulated_change(start: Array, forces: list[Array], step: Array, mass: Array, davis: Array) -> Array:
+def _simulated_change(start: Array, forces: list[Array], step: Array, mass: Array, davis: Array) -> Array:
     """Speed at the end of the window [m/s], by Euler steps from middle to middle.
 
     Args:
@@ -72,7 +72,7 @@ def simulated_change(start: Array, forces: list[Array], step: Array, mass: Array
     return speed
 
 
-def share_of(
+def _share_of(
     parts: list[Array], rest: list[Array], window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any
 ) -> Inverted:
     """Share of a force at which the simulated speed at the end of the window is the measured one [1].
@@ -97,19 +97,19 @@ def share_of(
 
 
 def _inverted(previous: Array, *others: Array) -> Arrays:
-    """`share_of` as a function of arrays alone."""
+    """`_share_of` as a function of arrays alone."""
     return scan(_share, (), [(previous,)], others)[1][0]
 
 
 def _share(_: Arrays, row: Arrays, shared: Arrays) -> tuple[Arrays, Arrays]:
-    """`share_of` of single elements: last share; parts, rest, and what is known in the order of `share_of`."""
+    """`_share_of` of single elements: last share; parts, rest, and what is known in the order of `_share_of`."""
     previous, (parts, rest, known) = row[0][0], shared
     start, end, step, mass = (known[i] for i in range(4))
     grid = grid_around(previous, GRID, least=known[7], most=known[8])
     differences = []
     for share in grid:
         forces = [share * parts[i] + rest[i] for i in range(parts.shape[0])]
-        differences.append(simulated_change(start, forces, step, mass, known[4:7]) - end)
+        differences.append(_simulated_change(start, forces, step, mass, known[4:7]) - end)
     found = invert(grid, differences, previous)
     return (), (vector(smoothed(previous, found.value, known[9]), found.crossings),)
 
@@ -127,7 +127,7 @@ def traction_share(window: MotionWindow, previous: Array, step: Array, mass: Arr
     enough = np.where(pulled > p.least_excitation, np.where(braked < 0.2 * pulled, 1.0, 0.0), 0.0)
     rest = [o - b for o, b in zip(other, brake, strict=True)]
     found = enough * moving(window, p)
-    return _told(share_of(drive, rest, window, previous, step, mass, p), found, previous)
+    return _share_where_found(_share_of(drive, rest, window, previous, step, mass, p), found, previous)
 
 
 def brake_share(
@@ -148,10 +148,10 @@ def brake_share(
     rest = [o + d for o, d in zip(other, drive, strict=True)]
     found = enough * moving(window, p)
     parts = [-b for b in brake]
-    return _told(share_of(parts, rest, window, previous, step, mass, p), found, previous)
+    return _share_where_found(_share_of(parts, rest, window, previous, step, mass, p), found, previous)
 
 
-def _told(share: Inverted, found: Array, previous: Array) -> Share:
+def _share_where_found(share: Inverted, found: Array, previous: Array) -> Share:
     """A share where the window tells one, else the last."""
     value = np.where(found > 0.0, share.value, previous)
     return Share(value, found, found * np.where(share.crossings > 0.5, 1.0, 0.0))

@@ -90,7 +90,7 @@ _NEEDS = {
 """Sensors that each residual needs; where several sources of speed would do, the first."""
 
 
-def available_residuals(fitted: tuple[str, ...]) -> tuple[str, ...]:
+def _available_residuals(fitted: tuple[str, ...]) -> tuple[str, ...]:
     """Residuals that can be computed.
 
     Args:
@@ -117,9 +117,9 @@ def isolability(fitted: tuple[str, ...]) -> dict[str, tuple[str, ...] | None]:
         fitted: names from `SENSORS`; faults of sensors that are not there are left out.
 
     Raises:
-        ValueError: see `available_residuals`.
+        ValueError: see `_available_residuals`.
     """
-    there = available_residuals(fitted)
+    there = _available_residuals(fitted)
     found: dict[str, tuple[str, ...] | None] = {}
     for table in (MOTION, BRAKE, TRACTION):
         faults = [f for f in table.faults if f not in SENSORS or f in fitted]

@@ -35,7 +35,7 @@ _OF_ODOMETER = (
 )
 
 
-class Availability(NamedTuple):
+class _Availability(NamedTuple):
     """Which residuals and which faults there can be, 1 or 0, in the order of `RESIDUALS` and `FAULTS`.
 
     Attributes:
@@ -59,7 +59,7 @@ class Wheels(NamedTuple):
     fast: Array
 
 
-def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Array) -> Availability:
+def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Array) -> _Availability:
     """Which residuals can be computed, what can fail, and which residuals were made without it.
 
     Args:
@@ -93,7 +93,7 @@ def availability(read: Readings, gps_full: Array, telegrams: Array, disagree: Ar
     }
     # A first balise that is false misplaces the train until two others have said so.
     apart["gps_position"]["balise"] = np.where(telegrams > _UNPROVED + 0.5, 1.0, 0.0)
-    return Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source], apart)
+    return _Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source], apart)
 
 
 def alarms_after(x: Any, t: Array, ratios: Sequence[Array], p: Any) -> dict[str, Array]:
@@ -177,15 +177,15 @@ def stuck_sensors(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[list[A
     then, stuck = [], []
     last = zip(values, x.last_reading, x.then, believed, limits, fitted, strict=True)
     for k, (value, before, reference, now, limit, there) in enumerate(last):
-        same = np.where(value == before, there, 0.0)
-        then.append(np.where(same > 0.0, reference, now))
+        unchanged = np.where(value == before, there, 0.0)
+        then.append(np.where(unchanged > 0.0, reference, now))
         locked = np.where(np.abs(value) < p.least_speed, wheel.slow, 0.0) if k < 2 else 0.0
-        stuck.append(np.where(np.abs(now - then[k]) > limit, same * (1.0 - locked), 0.0))
+        stuck.append(np.where(np.abs(now - then[k]) > limit, unchanged * (1.0 - locked), 0.0))
     return stuck, {"last_reading": vector(*values), "then": vector(*then)}
 
 
 def codes_after(
-    x: Any, t: Array, can: Availability, wrong: list[Array], stuck: list[Array], before: Array, p: Any
+    x: Any, t: Array, can: _Availability, wrong: list[Array], stuck: list[Array], before: Array, p: Any
 ) -> dict[str, Array]:
     """Fault codes, instant of the detection, confidence.
 
@@ -241,7 +241,7 @@ class _GroupVerdict(NamedTuple):
     several: Array
 
 
-def _verdicts(x: Any, t: Array, can: Availability, wrong: list[Array], before: Array, p: Any) -> list[_GroupVerdict]:
+def _verdicts(x: Any, t: Array, can: _Availability, wrong: list[Array], before: Array, p: Any) -> list[_GroupVerdict]:
     """What follows for each group, see `codes_after`."""
     there = dict(zip(FAULTS, can.faults, strict=True))
     there["adhesion"] = there["adhesion"] * (1.0 - largest(wrong))
@@ -259,7 +259,7 @@ def _group_verdict(
     group: IsolationTable,
     x: Any,
     t: Array,
-    can: Availability,
+    can: _Availability,
     places: tuple[slice, slice],
     possible: list[Array],
     since: Array,

@@ -19,7 +19,7 @@ from plant_models.hybrid import HybridSystem, discrete_output, input_signal, mem
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
-TRAINED_PERIOD = 0.2  # [s]
+_TRAINED_PERIOD = 0.2  # [s]
 CODES: Mapping[str, float] = {STEADY: 0.0, DROP: -1.0, RISE: 1.0}
 
 
@@ -50,7 +50,7 @@ class WheelSignature(HybridSystem):
         discrete_output("fault_time", "s", "Time since the fault was told"),
     )
     parameters = (
-        parameter("odometer_period", "s", TRAINED_PERIOD, "Time between two readings of the odometer", min=1e-3),
+        parameter("odometer_period", "s", _TRAINED_PERIOD, "Time between two readings of the odometer", min=1e-3),
         parameter("hold_limit", "s", 15.0, "Longest time for which a fault is held that does not end", min=0.0),
     )
     states = (
@@ -67,11 +67,11 @@ class WheelSignature(HybridSystem):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and the period is that of the training."""
         trained = (
-            f"odometer_period must be {TRAINED_PERIOD:g} s: the classes were trained on changes over that time, and "
+            f"odometer_period must be {_TRAINED_PERIOD:g} s: the classes were trained on changes over that time, and "
             "say nothing about others. Read the odometer at that rate, or train classes of your own "
             "(docs/gallery/moving_horizon/wheel_records.py)"
         )
-        kept = np.where(np.abs(p.odometer_period - TRAINED_PERIOD) < 1e-6, 1.0, 0.0)
+        kept = np.where(np.abs(p.odometer_period - _TRAINED_PERIOD) < 1e-6, 1.0, 0.0)
         return super().requirements(p) | within_bounds(self.parameters, p) | {trained: kept}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -79,25 +79,25 @@ class WheelSignature(HybridSystem):
         taken, kind = x.readings, x.told_kind
         change = np.where(taken > 0.5, u.odometer - x.last_reading, 0.0)
         record = [*x.changes[1:], change]
-        told = np.where(taken > CHANGES - 0.5, record_class(WHEEL_CLASSES, record), 0.0)
-        acts = np.where(told == x.told_change, 0.0, told)
+        newest = np.where(taken > CHANGES - 0.5, record_class(WHEEL_CLASSES, record), 0.0)
+        acts = np.where(newest == x.told_change, 0.0, newest)
         kept = np.where(acts * kind == 0.0, np.where(kind == 0.0, acts, kind), np.where(acts == kind, kind, 0.0))
         time = np.where(kept == 0.0, 0.0, np.where(kept == kind, x.held_time + p.odometer_period, 0.0))
         over = time > p.hold_limit
-        record[-1] = np.where(told == 0.0, change, record[-2])
+        record[-1] = np.where(newest == 0.0, change, record[-2])
         return {
             "changes": vector(*record),
             "last_reading": u.odometer,
             "readings": np.minimum(taken + 1.0, 1.0 * CHANGES),
             "told_kind": np.where(over, 0.0, kept),
-            "told_change": told,
+            "told_change": newest,
             "held_time": np.where(over, 0.0, time),
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Verdict, kind, class of the newest record, and how long the fault has been told."""
-        told = {"kind": x.told_kind, "change": x.told_change, "fault_time": x.held_time}
-        return {"odometer_fault": np.abs(x.told_kind)} | told
+        newest = {"kind": x.told_kind, "change": x.told_change, "fault_time": x.held_time}
+        return {"odometer_fault": np.abs(x.told_kind)} | newest
 
 
 def record_class(classes: SignatureClassifier, record: Sequence[Array]) -> Array:

@@ -23,7 +23,7 @@ from plant_models.hybrid import OutputWarning, discrete_output, memory
 from plant_models.hybrid.option import is_number, require_whole
 from plant_models.hybrid.system import Array
 
-TOLERANCE, MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
+TOLERANCE, _MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
 ENDED = (
     discrete_output("converged", "1", "1 where the last window was solved to the tolerance"),
     discrete_output(
@@ -48,8 +48,8 @@ ENDED = (
     ),
     discrete_output("feasible", "1", "1 where the answer keeps bounds and transitions"),
 )
-LAST_SEARCH = memory("last_search", "1", 0.0, "How the last search ended", size=len(ENDED))
-EFFORT_OPTIONS: Mapping[str, Sequence[Any]] = {"tolerance": (), "max_iterations": range(1, 1001), "deadline": ()}
+_LAST_SEARCH = memory("last_search", "1", 0.0, "How the last search ended", size=len(ENDED))
+_EFFORT_OPTIONS: Mapping[str, Sequence[Any]] = {"tolerance": (), "max_iterations": range(1, 1001), "deadline": ()}
 
 
 class FullMovingHorizonObserver(MovingHorizonObserver):
@@ -72,24 +72,24 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
     description = "Moving-horizon observer whose windows are solved to convergence"
     source = "Omar 2012, sections 1.4.8 and 4.2; solver and arrival cost are ours"
     traceable = False
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**MovingHorizonObserver.option_choices, **EFFORT_OPTIONS}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**MovingHorizonObserver.option_choices, **_EFFORT_OPTIONS}
 
     def __init__(
         self,
         model: Any = "pendulum",
         *,
         tolerance: float = TOLERANCE,
-        max_iterations: int = MAX_ITERATIONS,
+        max_iterations: int = _MAX_ITERATIONS,
         deadline: float | None = None,
         **options: Any,
     ) -> None:
-        self.effort = checked_effort(self.name, tolerance, max_iterations, deadline)
+        self.effort = _checked_effort(self.name, tolerance, max_iterations, deadline)
         super().__init__(model, **options)
         self.options |= _effort_options(self.effort)
 
     def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
-        """See `iterated_fully`."""
-        return iterated_fully(problem, self.effort, *arrays)
+        """See `_iterated_fully`."""
+        return _iterated_fully(problem, self.effort, *arrays)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What the observer tells, and how the last search ended."""
@@ -97,7 +97,7 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
 
     def _declare(self) -> None:
         super()._declare()
-        self.states += (LAST_SEARCH,)
+        self.states += (_LAST_SEARCH,)
         self.outputs += ENDED
 
 
@@ -120,34 +120,34 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     traceable = False
     internal_step = 0.1  # [s]; it flows in Python, and the resistance hardly changes in that time
     outputs = (*BaliseMovingHorizon.outputs, *ENDED)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**BaliseMovingHorizon.option_choices, **EFFORT_OPTIONS}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**BaliseMovingHorizon.option_choices, **_EFFORT_OPTIONS}
 
     def __init__(
         self,
         *,
         tolerance: float = TOLERANCE,
-        max_iterations: int = MAX_ITERATIONS,
+        max_iterations: int = _MAX_ITERATIONS,
         deadline: float | None = None,
         **options: Any,
     ) -> None:
-        self.effort = checked_effort(self.name, tolerance, max_iterations, deadline)
+        self.effort = _checked_effort(self.name, tolerance, max_iterations, deadline)
         super().__init__(**options)
         self.options |= _effort_options(self.effort)
 
     def own_states(self) -> tuple[Any, ...]:
         """States of the observer, then how the last search ended."""
-        return (*super().own_states(), LAST_SEARCH)
+        return (*super().own_states(), _LAST_SEARCH)
 
     def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
-        """See `iterated_fully`."""
-        return iterated_fully(problem, self.effort, *arrays)
+        """See `_iterated_fully`."""
+        return _iterated_fully(problem, self.effort, *arrays)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What the observer tells, and how the last search ended."""
         return super().output(t, x, u, p) | _ended(x)
 
 
-def iterated_fully(
+def _iterated_fully(
     problem: WindowProblem,
     effort: Effort,
     arrival: Array,
@@ -174,7 +174,7 @@ def iterated_fully(
             guesses[k] = guesses[k - 1] if k else before.mean
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
     remembered = (np.hstack([*before]), rows.ravel(), found.states.ravel(), _last_pass(found, layout.count(rows)))
-    kept = dict(zip(WINDOW_MEMORY, remembered, strict=True)) | {LAST_SEARCH.name: _how_it_ended(found)}
+    kept = dict(zip(WINDOW_MEMORY, remembered, strict=True)) | {_LAST_SEARCH.name: _how_it_ended(found)}
     return Iterated(found.estimate, found.covariance.ravel(), kept)
 
 
@@ -191,7 +191,7 @@ def _how_it_ended(found: Any) -> np.ndarray:
     return np.array([float(word) for word in (found.converged, found.timed_out, early, found.feasible)])
 
 
-def checked_effort(who: str, tolerance: float, max_iterations: int, deadline: float | None) -> Effort:
+def _checked_effort(who: str, tolerance: float, max_iterations: int, deadline: float | None) -> Effort:
     """The effort that options name.
 
     Args:

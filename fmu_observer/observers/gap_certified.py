@@ -19,7 +19,7 @@ from fmu_observer.observers.gated_observer import is_gate_parameter
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, Signal
 
-ASKED_GAP = 1.0  # [s] of the certificate behind `limits`, which looks much further than that
+_ASKED_GAP = 1.0  # [s] of the certificate behind `limits`, which looks much further than that
 
 
 class GapCertified(HybridSystem):
@@ -74,7 +74,7 @@ class GapCertified(HybridSystem):
         Raises:
             ValueError: as `certify`.
         """
-        return limits_of(self.certify(ASKED_GAP, parameters, preset))
+        return _limits_of(self.certify(_ASKED_GAP, parameters, preset))
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows
@@ -90,7 +90,7 @@ class GapCertified(HybridSystem):
         )
 
 
-def limits_of(certificate: Certificate) -> tuple[Limit, ...]:
+def _limits_of(certificate: Certificate) -> tuple[Limit, ...]:
     """The limits that a certificate found on its way.
 
     Args:

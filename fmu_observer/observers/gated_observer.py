@@ -1,4 +1,4 @@
-"""Base of every observer that is told of balises: what all of them do with a telegram before they believe it."""
+"""Base of every observer that gets balises: what all of them do with a telegram before they believe it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fmu_observer.observers.innovation_gate import (
     REJECT,
     VERDICT,
     GateMemory,
-    Told,
+    ReportedPlace,
     judge,
 )
 from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal
@@ -22,15 +22,15 @@ from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
 GATED_EVENT = "balise"
-TOLD_POSITION = "balise_position"
-LOCATION_ACCURACY = input_signal(
+_REPORTED_POSITION = "balise_position"
+_LOCATION_ACCURACY = input_signal(
     "balise_location_accuracy",
     "m",
     0.0,
     "Location accuracy of the balise just passed, either way; 0: not told",
     variability="discrete",
 )
-Weighing = Literal["innovation", "position", "itself"]
+_Weighing = Literal["innovation", "position", "itself"]
 
 
 class GatedObserver(HybridSystem):
@@ -56,7 +56,7 @@ class GatedObserver(HybridSystem):
 
     position_state: str = ""
     gate_start: float = REJECT
-    weighing: Weighing = "innovation"
+    weighing: _Weighing = "innovation"
     bounded_parameters: tuple[Signal, ...] = ()
     weighed_states: ClassVar[tuple[str, ...]] = ("estimated_position",)
 
@@ -108,8 +108,10 @@ class GatedObserver(HybridSystem):
         odometer = self.odometer_of(u)
         if odometer is not None:  # where it is missing, the one at the telegram before is the last that is known
             odometer = or_else(odometer, gate.last_odometer)
-        told = Told(u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), odometer, t)
-        judged, listens = judge(gate, told, p), self.listens(p)
+        report = ReportedPlace(
+            u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), odometer, t
+        )
+        judged, listens = judge(gate, report, p), self.listens(p)
         used = np.where(listens > 0.0, judged.used, 1.0)
         begun = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
         after = self._weighed_update(t, x._replace(**{self.position_state: begun}), u, p, judged.weight)
@@ -120,30 +122,30 @@ class GatedObserver(HybridSystem):
 
     def _weighed_update(self, t: Array, x: Any, u: Any, p: Any, weight: Array) -> dict[str, Array]:
         """`update` at a telegram that weighs so much [1]; at least the position afterwards."""
-        estimate, told = getattr(x, self.position_state), u.balise_position
+        estimate, reported = getattr(x, self.position_state), u.balise_position
         if self.weighing == "innovation":
-            u = u._replace(balise_position=_towards(estimate, told, weight))
+            u = u._replace(balise_position=_towards(estimate, reported, weight))
         after = {self.position_state: estimate} | self.update(GATED_EVENT, t, x, u, p)
         if self.weighing == "position":
             after |= {name: _towards(getattr(x, name), after[name], weight) for name in self.weighed_states}
         return after
 
 
-def _towards(own: Array, told: Array, weight: Array) -> Array:
-    """What is told, to the bit, where it weighs one."""
-    return np.where(weight < 1.0, own + weight * (told - own), told)
+def _towards(own: Array, reported: Array, weight: Array) -> Array:
+    """What is reported, to the bit, where it weighs one."""
+    return np.where(weight < 1.0, own + weight * (reported - own), reported)
 
 
 def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:
     return (
         event.name == GATED_EVENT
         and isinstance(event, TriggeredEvent)
-        and TOLD_POSITION in (s.name for s in event.payload)
+        and _REPORTED_POSITION in (s.name for s in event.payload)
     )
 
 
 def _judged(event: TriggeredEvent) -> TriggeredEvent:
-    accuracy = () if LOCATION_ACCURACY.name in (s.name for s in event.payload) else (LOCATION_ACCURACY,)
+    accuracy = () if _LOCATION_ACCURACY.name in (s.name for s in event.payload) else (_LOCATION_ACCURACY,)
     return replace(event, payload=(*event.payload, *accuracy), verdict=VERDICT)
 
 

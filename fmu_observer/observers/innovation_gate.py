@@ -1,7 +1,7 @@
-"""The gate of telegrams: whether a position that is told can be true beside what the observer believes, and how much it
+"""The gate of telegrams: whether a reported position can be true beside what the observer believes, and how much it
 weighs. Pure functions, ours.
 
-The limit of the innovation ``|estimate - told|`` is
+The limit of the innovation ``|estimate - reported|`` is
 
     ``gate_floor + location accuracy + g``, ``g = own error + gate_spread * recent``
 
@@ -12,7 +12,7 @@ then as the observer believes it, as the root of their squares. That share is `g
 rises to `gate_drift` (what SUBSET-041 grants an odometer) where the odometer has changed its speed since the last
 telegram by 0.3 m/s2 or more, for wheels creep as they pull and brake; it is ``gate_spread`` times the largest share
 seen of late, halved at every telegram, where that lies between them and is larger. Nothing is doubted before
-`gate_recover` telegrams in a row were within the limit, for an observer may start anywhere. The gate is touched at
+`gate_recover` telegrams in a row were within the limit, for an observer may start anywhere. The gate acts at
 telegrams only, so it costs nothing between them.
 
 Positions that were doubted may be right and the estimate wrong. So each is compared with the telegram before it. A
@@ -24,9 +24,9 @@ restarts there, and the gate is open again until it has settled. True telegrams 
 odometer and estimate say: of ``2 gate_recover - 1`` in a row that follow a true one at least one is used.
 
 A place within ``+-a`` has a standard deviation of ``a / sqrt(3)``: the rectangular distribution, JCGM 100:2008, 4.3.7.
-A telegram told with it weighs ``(g^2 + f^2) / (g^2 + max(f, a)^2)``, f `gate_floor`: the ratio of the gain of a Kalman
+A telegram with it weighs ``(g^2 + f^2) / (g^2 + max(f, a)^2)``, f `gate_floor`: the ratio of the gain of a Kalman
 filter at this accuracy to that at the floor, g the half-width of the estimate's own error. So it is one where nothing
-is told, and never more.
+is reported, and never more.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ counted.
 """
 
 FORGETTING = 0.5  # of the recent innovation and share, at each telegram
-BY_SPEED = 0.5  # what counts that a doubted telegram agrees by the speeds of telegrams alone
-LEAST_TIME = 1e-3  # between two telegrams of which a speed is made [s]
-LEAST_SHARE = 1e-6  # in place of a drift of zero
+_BY_SPEED = 0.5  # what counts that a doubted telegram agrees by the speeds of telegrams alone
+_LEAST_TIME = 1e-3  # between two telegrams of which a speed is made [s]
+_LEAST_SHARE = 1e-6  # in place of a drift of zero
 PULLING = 0.3  # change of speed from which on wheels may creep by the whole drift [m/s2] [ours]
 VERDICT = "gate_verdict"
 
@@ -112,12 +112,12 @@ class GateMemory(NamedTuple):
     last_slack: Array
 
 
-class Told(NamedTuple):
-    """What is told, and what is believed at its stamp.
+class ReportedPlace(NamedTuple):
+    """What is reported, and what is believed at its stamp.
 
     Args:
-        position: told [m]. accuracy: of the place of the balise, either way, zero where it is not known [m]. estimate:
-            believed position [m].
+        position: reported [m]. accuracy: of the place of the balise, either way, zero where it is not known [m].
+        estimate: believed position [m].
         bound: of the estimate's own error, where the observer has one [m]. odometer: reading [m/s]; None where there is
             none.
         t: stamp [s].
@@ -142,95 +142,97 @@ class GateJudgement(NamedTuple):
     memory: GateMemory
 
 
-def known_accuracy(told: Array) -> Array:
-    """The location accuracy, zero where it is told below zero or as no number [m].
+def known_accuracy(accuracy: Array) -> Array:
+    """The location accuracy, zero where it is reported below zero or as no number [m].
 
     Args:
-        told: location accuracy [m].
+        accuracy: as reported [m].
     """
-    return np.where(told > 0.0, told, 0.0)
+    return np.where(accuracy > 0.0, accuracy, 0.0)
 
 
 def place_deviation(accuracy: Array, floor: Array) -> Array:
     """Standard deviation of the place of a balise, ``accuracy / sqrt(3)`` and not below a floor [m].
 
     Args:
-        accuracy: half-width of where it lies [m]. floor: its deviation where nothing is told [m].
+        accuracy: half-width of where it lies [m]. floor: its deviation where nothing is reported [m].
     """
     return np.maximum(known_accuracy(accuracy) / np.sqrt(3.0), floor)
 
 
 def gain_ratio(error: Array, place: Array, floor: Array) -> Array:
-    """Gain of a Kalman filter for a place told so well over that for one at the floor, 0 to 1.
+    """Gain of a Kalman filter for a place reported so well over that for one at the floor, 0 to 1.
 
     Args:
-        error: of the estimate [m]. place: of the place as told [m]. floor: of a place of which nothing is told [m]; all
-            three deviations, or all three half-widths.
+        error: of the estimate [m]. place: of the place as reported [m]. floor: of a place of which nothing is reported
+            [m]; all three deviations, or all three half-widths.
     """
     known = error * error
     # where the place is no worse than the floor, both may be zero
-    told = np.where(place > floor, known + place * place, 1.0)
-    return np.where(place > floor, (known + floor * floor) / told, 1.0)
+    total = np.where(place > floor, known + place * place, 1.0)
+    return np.where(place > floor, (known + floor * floor) / total, 1.0)
 
 
-def granted_error(before: GateMemory, told: Told, p: Any) -> Array:
+def _granted_error(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
     """What is granted of the estimate's error, g [m].
 
     Args:
-        before: memory of the gate before the telegram. told: the telegram and what the observer knows then.
+        before: memory of the gate before the telegram. report: the telegram and what the observer knows then.
         p: parameters, as in `HybridSystem.flow`.
     """
     drift = np.maximum(p.gate_drift, p.gate_creep)
     seen = np.clip(p.gate_spread * before.share, p.gate_creep, drift)
-    share = np.maximum(seen, p.gate_creep + (drift - p.gate_creep) * _pulled(before, told))
-    since = _root_of_squares(before.left, share * (told.estimate - before.reference))
-    return np.maximum(told.bound, since) + p.gate_spread * before.recent
+    share = np.maximum(seen, p.gate_creep + (drift - p.gate_creep) * _pulled(before, report))
+    since = _root_of_squares(before.left, share * (report.estimate - before.reference))
+    return np.maximum(report.bound, since) + p.gate_spread * before.recent
 
 
-def _pulled(before: GateMemory, told: Told) -> Array:
+def _pulled(before: GateMemory, report: ReportedPlace) -> Array:
     """How hard the wheels have pulled or braked since the last telegram, 0 to 1; 1 where there is no odometer."""
-    if told.odometer is None:
+    if report.odometer is None:
         return 1.0
-    time = np.maximum(told.t - before.last_time, LEAST_TIME)
-    return np.minimum(np.abs(told.odometer - before.last_odometer) / (PULLING * time), 1.0)
+    time = np.maximum(report.t - before.last_time, _LEAST_TIME)
+    return np.minimum(np.abs(report.odometer - before.last_odometer) / (PULLING * time), 1.0)
 
 
-def gate_limit(before: GateMemory, told: Told, p: Any) -> Array:
+def gate_limit(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
     """Innovation beyond which a position is doubted [m].
 
     Args:
-        before: memory of the gate before the telegram. told: the telegram and what the observer knows then.
+        before: memory of the gate before the telegram. report: the telegram and what the observer knows then.
         p: parameters, as in `HybridSystem.flow`.
     """
-    return p.gate_floor + known_accuracy(told.accuracy) + granted_error(before, told, p)
+    return p.gate_floor + known_accuracy(report.accuracy) + _granted_error(before, report, p)
 
 
-def judge(before: GateMemory, told: Told, p: Any) -> GateJudgement:
-    """Whether a told position is used, how much it weighs, and what the gate remembers of it.
+def judge(before: GateMemory, report: ReportedPlace, p: Any) -> GateJudgement:
+    """Whether a reported position is used, how much it weighs, and what the gate remembers of it.
 
     Args:
-        before: memory at the telegram. told: telegram and belief. p: named tuple with `GATE_PARAMETERS`.
+        before: memory at the telegram. report: telegram and belief. p: named tuple with `GATE_PARAMETERS`.
     """
-    size, accuracy = np.abs(told.estimate - told.position), known_accuracy(told.accuracy)
-    granted = granted_error(before, told, p)
+    size, accuracy = np.abs(report.estimate - report.position), known_accuracy(report.accuracy)
+    granted = _granted_error(before, report, p)
     settled = indicator(before.settled >= p.gate_recover)
-    outside = indicator(size > gate_limit(before, told, p))
+    outside = indicator(size > gate_limit(before, report, p))
     doubted = outside * settled * indicator(p.gate > OFF)
     refused = doubted * indicator(p.gate >= REJECT)
-    row = _row(before, told, p)
+    row = _row(before, report, p)
     restart = refused * indicator(row[0] >= p.gate_recover)
     used = 1.0 - refused + restart
     # nothing is known of an estimate that has not settled, so nothing speaks against the telegram
     weight = np.where(settled * (1.0 - restart) > 0.0, gain_ratio(granted, accuracy, p.gate_floor), 1.0)
     beyond = np.maximum(size - accuracy, 0.0)
-    share = beyond / (p.gate_floor / np.maximum(p.gate_drift, LEAST_SHARE) + np.abs(told.estimate - before.reference))
+    share = beyond / (
+        p.gate_floor / np.maximum(p.gate_drift, _LEAST_SHARE) + np.abs(report.estimate - before.reference)
+    )
     after = GateMemory._make(
         (
             np.where(used > 0.0, np.where(doubted > 0.0, float(DOUBTED), float(USED)), float(IGNORED)),
             np.where(outside > 0.0, 0.0, before.settled + 1.0),
             np.maximum(beyond, FORGETTING * before.recent),
             np.maximum(share, FORGETTING * before.share),
-            told.position,
+            report.position,
             _root_of_squares((1.0 - weight) * granted, weight * accuracy),
             *row,
         )
@@ -240,28 +242,28 @@ def judge(before: GateMemory, told: Told, p: Any) -> GateJudgement:
     return GateJudgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
 
 
-def _row(before: GateMemory, told: Told, p: Any) -> tuple[Array, ...]:
-    """How many doubted telegrams in a row agree, this one included, and what is remembered of it; one told twice is
-    one.
+def _row(before: GateMemory, report: ReportedPlace, p: Any) -> tuple[Array, ...]:
+    """How many doubted telegrams in a row agree, this one included, and what is remembered of it; one reported twice
+    is one.
     """
-    innovation, accuracy = told.estimate - told.position, known_accuracy(told.accuracy)
-    spacing, passed = told.position - before.last_position, told.t - before.last_time
+    innovation, accuracy = report.estimate - report.position, known_accuracy(report.accuracy)
+    spacing, passed = report.position - before.last_position, report.t - before.last_time
     places = p.gate_floor + accuracy + before.last_accuracy
     tolerance = places + p.gate_drift * np.abs(spacing)
     is_first = indicator(before.doubted <= 0.0)
     by_way = (1.0 - is_first) * indicator(np.abs(innovation - before.last_innovation) <= tolerance)
-    if told.odometer is not None:
-        beyond = spacing - 0.5 * (told.odometer + before.last_odometer) * passed
+    if report.odometer is not None:
+        beyond = spacing - 0.5 * (report.odometer + before.last_odometer) * passed
         # an odometer that agrees with both says nothing against the estimate
         against = indicator(np.abs(beyond + innovation - before.last_innovation) > tolerance)
         by_way = np.maximum(by_way, indicator(np.abs(beyond) <= tolerance) * np.maximum(against, 1.0 - is_first))
-    time = np.maximum(passed, LEAST_TIME)
+    time = np.maximum(passed, _LEAST_TIME)
     speed, slack = spacing / time, 0.5 * p.gate_acceleration * time + (p.gate_floor + places) / time
     by_speed = (1.0 - is_first) * indicator(np.abs(speed - before.last_speed) <= slack + before.last_slack)
-    agreeing = np.maximum(by_way, BY_SPEED * by_speed)
+    agreeing = np.maximum(by_way, _BY_SPEED * by_speed)
     count = np.where(agreeing > 0.0, np.maximum(before.doubted, 1.0) + agreeing, 1.0)
-    odometer = before.last_odometer if told.odometer is None else told.odometer
-    new = (count, told.position, accuracy, innovation, told.t, odometer, speed, slack)
+    odometer = before.last_odometer if report.odometer is None else report.odometer
+    new = (count, report.position, accuracy, innovation, report.t, odometer, speed, slack)
     repeated = (1.0 - is_first) * indicator(np.abs(spacing) <= p.gate_floor)
     return tuple(np.where(repeated > 0.0, a, b) for a, b in zip(before[6:], new, strict=True))
 

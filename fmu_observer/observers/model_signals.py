@@ -67,24 +67,26 @@ def measured_inputs(
     )
 
 
-def sampling_event(names: Sequence[str], text: str = "The measurements are read", **further: bool) -> PeriodicEvent:
+def sampling_event(
+    names: Sequence[str], text: str = "The measurements are read", *, leaves_out: bool = False
+) -> PeriodicEvent:
     """The event ``sampling``, every `sample_period`.
 
     Args:
-        names: inputs that are read. text: one line. further: `leaves_out`.
+        names: inputs that are read. text: one line. leaves_out: see `PeriodicEvent`.
     """
-    return PeriodicEvent("sampling", "sample_period", description=text, samples=tuple(names), **further)
+    return PeriodicEvent("sampling", "sample_period", description=text, samples=tuple(names), leaves_out=leaves_out)
 
 
-def arrival_event(name: str, signals: Iterable[Signal], **further: bool) -> TriggeredEvent:
+def arrival_event(name: str, signals: Iterable[Signal], *, leaves_out: bool = False) -> TriggeredEvent:
     """The event of measurements that arrive at their own time stamp, as its payload ``<event>_<measurement>``.
 
     Args:
-        name: of the event. signals: measurements of the model. further: `leaves_out`.
+        name: of the event. signals: measurements of the model. leaves_out: see `TriggeredEvent`.
     """
     payload = measured_inputs(signals, f"{name}_", "discrete")
     text, samples = "A measurement arrives, at its own time stamp", tuple(s.name for s in payload)
-    return TriggeredEvent(name, payload, text, samples=samples, **further)
+    return TriggeredEvent(name, payload, text, samples=samples, leaves_out=leaves_out)
 
 
 def matrix_parameter(name: str, values: np.ndarray, text: str, unit: str = "1") -> Signal:

@@ -21,13 +21,13 @@ ORDER, POINTS = 67, 34  # printed N and M; N_O = 101
 SIZE = 3.0  # printed set [-3, 3]^3
 EPS = {"literal": 1.0, "norm": 1e-3}
 SLABS, DIRECTIONS, ANGLES = 15, 12, 19
-OTHER_SIDE = 1e6
+_OTHER_SIDE = 1e6
 """Added to the distance of a class of the other sign, which (4.6.14) does not look at."""
 LEAST = 1e-6
 """Added to each distance: a point in two envelopes lies in the middle of their classes."""
 
 
-class CascadeTables(NamedTuple):
+class _CascadeTables(NamedTuple):
     """What the signatures of a grid of states are known by.
 
     Attributes:
@@ -100,8 +100,8 @@ class CascadeSignature(SignatureObserver):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Samples come at the period of the tables, which are part of the equations."""
         text = f"sample_period must be {self._period:g} s: the tables are made of samples over that time"
-        same = np.where(np.abs(p.sample_period - self._period) <= 1e-9, 1.0, 0.0)
-        return super().requirements(p) | {text: same}
+        equal = np.where(np.abs(p.sample_period - self._period) <= 1e-9, 1.0, 0.0)
+        return super().requirements(p) | {text: equal}
 
     def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
         """The printed constants."""
@@ -111,7 +111,7 @@ class CascadeSignature(SignatureObserver):
         """x2 by envelopes, then x1 by median lines, then x3 by chords."""
         first, *middle, last, distances = self._read(past[0])
         point, chord, nodes = 0.5 * (middle[0] + middle[1]), last - first, self.nodes
-        wrong = np.where(nodes * point[0] < 0.0, OTHER_SIDE, 0.0)
+        wrong = np.where(nodes * point[0] < 0.0, _OTHER_SIDE, 0.0)
         second = nearest_two([distances[i] + LEAST + wrong[i] for i in range(len(nodes))], nodes)
         lines, chords = self._at(second)
         to_lines = curve_distances(lines, point)
@@ -155,12 +155,12 @@ class CascadeSignature(SignatureObserver):
         parts = [np.reshape(found[k * count**2 : (k + 1) * count**2], (count, count)) for k in range(4)]
         return parts[:2], [[part[i] for i in range(count)] for part in parts[2:]]
 
-    def _built(self) -> CascadeTables:
+    def _built(self) -> _CascadeTables:
         signatures = self.signatures(np.stack(np.meshgrid(self.nodes, self.nodes, self.nodes, indexing="ij")))
         middles = signatures[:, POINTS // 2 - 1 : POINTS // 2 + 1].mean(axis=1)
         chords = signatures[:, -1] - signatures[:, 0]
         count, angles = range(len(self.nodes)), np.linspace(0.0, np.pi, ANGLES)
-        return CascadeTables(
+        return _CascadeTables(
             [(middles[0, :, j], middles[1, :, j]) for j in count],
             [[chords[:, i, j] for i in count] for j in count],
             np.array(

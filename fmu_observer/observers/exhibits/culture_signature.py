@@ -182,11 +182,11 @@ class CultureSignature(SignatureObserver):
         """
         count = len(self.nodes)
         square = [np.reshape(values, (count, count)) for values in network]
-        told = network_inverse(self.nodes, self.nodes, square, target)
+        found = network_inverse(self.nodes, self.nodes, square, target)
         if self.look_up == "cell":
-            return told
+            return found
         fine = [self._refinement @ values for values in network]
-        return Found(weighted_inverse(self._fine_nodes, fine, (target[0], target[1]), sharpness), told.outside)
+        return Found(weighted_inverse(self._fine_nodes, fine, (target[0], target[1]), sharpness), found.outside)
 
     def look_up_errors(
         self, sharpness: Sequence[float], noise: float = 0.01, draws: int = 600, seed: int = 0
@@ -216,8 +216,8 @@ class CultureSignature(SignatureObserver):
         widths = np.array([[p.glycerol_width], [p.enzyme_width]])
         errors = []
         for mu in sharpness:
-            told = self._at(read, weighted_inverse(self._fine_nodes, fine, (target[0], target[1]), mu), p)
-            errors.append(np.sqrt(np.mean(((told - true)[1:] / widths) ** 2, axis=1)))
+            found = self._at(read, weighted_inverse(self._fine_nodes, fine, (target[0], target[1]), mu), p)
+            errors.append(np.sqrt(np.mean(((found - true)[1:] / widths) ** 2, axis=1)))
         return np.array(errors)
 
     def _at(self, X: np.ndarray, places: np.ndarray, p: Any) -> Array:

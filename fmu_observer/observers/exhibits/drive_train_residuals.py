@@ -115,8 +115,8 @@ def sample_speeds(
     """
     now = (rotor[0], rotor[1], generator[0], generator[1], rotor_torque, torque)
     histories = _moved_on(m, now, starts)
-    *by_speeds, driving, braking = _weighted_windows(histories, p)
-    torsions = _beside(*by_speeds, 1.0)
+    r1, r2, g1, g2, driving, braking = _weighted_windows(histories, p)
+    torsions = _beside(r1, r2, g1, g2, 1.0)
     rates = _beside(rotor[0], rotor[1], generator[0], generator[1], -1.0 / p.gear_ratio)
     coefficients = residual_filter(p.speed_filter_time, p.sample_period)
     sensors = zip(m.speed_filter, [torsion + driving + braking for torsion in torsions], rates, strict=True)

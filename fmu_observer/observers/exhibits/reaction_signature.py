@@ -27,7 +27,7 @@ from plant_models.hybrid.system import Array
 ORDER, POINTS = 2, 9  # printed N; N_O = 11
 LARGEST = 3.0  # printed set [0, 3]^2
 RATES = (0.10, 0.35)  # printed range of b [1/s]
-EPS, WIDE_PERIOD = 1e-2, 0.1
+EPS, _WIDE_PERIOD = 1e-2, 0.1
 
 
 class ReactionSignature(SignatureObserver):
@@ -97,7 +97,7 @@ class ReactionSignature(SignatureObserver):
             ),
             known=("rate",),
         )
-        wide = {"sample_period": WIDE_PERIOD, "table": tuple(self._built(WIDE_PERIOD, EPS))}
+        wide = {"sample_period": _WIDE_PERIOD, "table": tuple(self._built(_WIDE_PERIOD, EPS))}
         self.presets = {"as_published": {}, "wide_samples": wide}
         super().__init__(candidates=candidates, corrections=corrections, nodes=nodes, next_scaling=next_scaling)
 

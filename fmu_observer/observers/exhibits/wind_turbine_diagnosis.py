@@ -73,7 +73,7 @@ _GROUPS = (
     _Group("pitch_actuator_fault", BLADES, "actuator", "pitch actuators of the blades"),
     _Group("efficiency_fault", 1, "efficiency", "drive train, by its efficiency"),
 )
-ALARMS = sum(group.size for group in _GROUPS)
+_ALARMS = sum(group.size for group in _GROUPS)
 ALARM_NAMES = tuple(f"{g.output}[{i + 1}]" if g.size > 1 else g.output for g in _GROUPS for i in range(g.size))
 """The alarms by name, in the order of the outputs."""
 
@@ -155,9 +155,9 @@ class WindTurbineDiagnosis(HybridSystem):
         *EFFICIENCY_MEMORY,
         memory("undecided_pairs", "1", 0.0, "Pairs of sensors that disagree while no model tells which one is it"),
         memory("undecided_alarm", "1", (0.0, 0.0, 0.0), "Alarm of such pairs: raised, contrary, since", size=3),
-        memory("raised", "1", 0.0, "1 for each alarm that is raised", size=ALARMS),
-        memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=ALARMS),
-        memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
+        memory("raised", "1", 0.0, "1 for each alarm that is raised", size=_ALARMS),
+        memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=_ALARMS),
+        memory("since", "s", 0.0, "Last change of each alarm", size=_ALARMS),
     )
     inputs = (
         input_signal("wind_speed", "m/s", 9.0, "Measured wind speed", display_unit="km/h"),
@@ -270,11 +270,11 @@ class WindTurbineDiagnosis(HybridSystem):
             found |= {group.output: x.raised[place], f"{group.output}_time": x.since[place]}
             at += group.size
         any_raised = x.undecided_alarm[0]  # detected is told although it is not isolated
-        for i in range(ALARMS):
+        for i in range(_ALARMS):
             any_raised = np.maximum(any_raised, x.raised[i])
         residuals = {name: getattr(x, f"held_{name}") for name, *_ in _RESIDUALS}
-        told = {"fault": any_raised, "undecided": x.undecided_pairs}
-        return found | residuals | told | _ratios(x, p) | warned(x, p)
+        whole = {"fault": any_raised, "undecided": x.undecided_pairs}
+        return found | residuals | whole | _ratios(x, p) | warned(x, p)
 
 
 def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
@@ -290,8 +290,8 @@ def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
     disagree = [np.where(value > 1.0, 1.0, 0.0) for value in differences]
     sensors: list[Array] = []
     undecided: Array = 0.0
-    for i, told in enumerate(disagree):
-        found = larger(told, sizes[2 * i], sizes[2 * i + 1])
+    for i, whole in enumerate(disagree):
+        found = larger(whole, sizes[2 * i], sizes[2 * i + 1])
         sensors += [found.first, found.second]
         undecided = undecided + found.undecided
     turned = np.where(np.abs(m.held_shaft_angle) > p.shaft_angle_limit, 1.0, 0.0)

@@ -13,9 +13,9 @@ from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS
 from plant_models.hybrid import OutputWarning, discrete_output
 from plant_models.hybrid.system import Array
 
-OUTSIDE_UPDATES = 12.0
+_OUTSIDE_UPDATES = 12.0
 """Updates in a row without a bracket that are too many: the default grid moves from 0.97 to 0.05 in eleven."""
-REPEATED_SHARE = 0.25
+_REPEATED_SHARE = 0.25
 """Share of samples without a new reading that is too large; sensors read half as often repeat every second one."""
 
 WARNINGS = (
@@ -34,9 +34,9 @@ WARNINGS = (
         "1",
         "1 where the grid has long not bracketed the efficiency",
         warning=OutputWarning(
-            f"took the end of its grid for the efficiency: for {OUTSIDE_UPDATES:g} updates and more the grid bracketed "
-            "no measurement; widen it (grid_lowest, grid_highest, least_efficiency, most_efficiency), and check "
-            "wind_bias",
+            f"took the end of its grid for the efficiency: for {_OUTSIDE_UPDATES:g} updates and more the grid "
+            "bracketed no measurement; widen it (grid_lowest, grid_highest, least_efficiency, most_efficiency), and "
+            "check wind_bias",
             shows=("efficiency_estimate",),
         ),
     ),
@@ -115,10 +115,10 @@ def repeats(m: Any, u: Any, starts: Array) -> Array:
         (u.generator_speed[0], m.generator_first[WINDOW - 2]),
         (u.torque, m.torques[WINDOW - 2]),
     )
-    same: Array = 1.0 - starts
+    unchanged: Array = 1.0 - starts
     for now, before in pairs:
-        same = np.where(now == before, same, 0.0)
-    return same
+        unchanged = np.where(now == before, unchanged, 0.0)
+    return unchanged
 
 
 def warned(m: Any, p: Any) -> dict[str, Array]:
@@ -129,7 +129,7 @@ def warned(m: Any, p: Any) -> dict[str, Array]:
     """
     return {
         "efficiency_unknown": np.where(m.full_blocks > BLOCKS + 0.5, 0.0, 1.0),
-        "efficiency_outside": np.where(m.outside_updates >= OUTSIDE_UPDATES, 1.0, 0.0),
+        "efficiency_outside": np.where(m.outside_updates >= _OUTSIDE_UPDATES, 1.0, 0.0),
         "efficiency_impossible": np.where(m.held_efficiency_estimate > 1.0 + p.efficiency_limit, 1.0, 0.0),
-        "readings_repeated": np.where(m.repeated > REPEATED_SHARE * np.maximum(m.samples, 1.0), 1.0, 0.0),
+        "readings_repeated": np.where(m.repeated > _REPEATED_SHARE * np.maximum(m.samples, 1.0), 1.0, 0.0),
     }

@@ -17,7 +17,7 @@ from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
-from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
+from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from fmu_observer.observers.model_signals import LOG_LIKELIHOOD, sampling_event
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, Signal, discrete_output, input_signal, memory, output_signal, parameter
@@ -60,7 +60,7 @@ class MotorFilter(HybridSystem):
         axes, estimated = AXES[frame], STATES if known_load else (*STATES, LOAD)
         self.order = n = len(estimated)
         P, text = np.diag(start_variance), "Covariance P, row by row, SI units"
-        self.states = primed_memory(
+        self.states = initialised_memory(
             *(memory(f"estimated_{s.name}", s.unit, 0.0, f"Estimate: {s.description}") for s in estimated),
             memory("estimate_covariance", "1", P, text, shape=(n, n)),
             *(memory(f"held_innovation_{a}", "A", 0.0, f"Innovation of the current along {a}") for a in axes),
@@ -113,13 +113,13 @@ class MotorFilter(HybridSystem):
             there = is_there(innovation[0]) * is_there(innovation[1])  # one current alone is as good as none
             innovation = or_else(innovation, 0.0)
             after = correct(estimate, x.estimate_covariance, innovation, H, RN)
-            told = x.log_likelihood + log_likelihood(innovation, after.innovation_covariance)
+            likelihood = x.log_likelihood + log_likelihood(innovation, after.innovation_covariance)
             corrected = {
                 **named_as(estimated, after.estimate, "estimated_"),
                 "estimate_covariance": after.covariance,
                 **{f"held_innovation_{a}": value for a, value in zip(AXES[self.frame], innovation, strict=True)},
                 "held_nis": normalised_square(innovation, after.innovation_covariance),
-                "log_likelihood": told,
+                "log_likelihood": likelihood,
             }
             return {name: np.where(there > 0.5, value, getattr(x, name)) for name, value in corrected.items()}
 

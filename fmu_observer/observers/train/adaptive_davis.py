@@ -50,8 +50,8 @@ from fmu_observer.observers.train.train_signals import (
 from plant_models.hybrid import Signal, input_signal, matrix, output_signal, parameter, vector
 from plant_models.hybrid.system import Array
 
-BALISE_WEIGHT = 0.1  # [1/m] [ours]: a metre of a balise counts as 0.1 m/s of the odometer
-C = np.array([[BALISE_WEIGHT, 0.0], [0.0, 1.0]])
+_BALISE_WEIGHT = 0.1  # [1/m] [ours]: a metre of a balise counts as 0.1 m/s of the odometer
+C = np.array([[_BALISE_WEIGHT, 0.0], [0.0, 1.0]])
 A = np.array([[0.0, 1.0], [0.0, 0.0]])
 MU, FORGETTING = 0.2, 0.0  # [1/s] [ours]
 QUICKEST = 50.0  # [1/s]: no sample moves constants faster [ours]

@@ -30,7 +30,7 @@ _ADVISED_RATIO, _ADVISED_SHARES = 2.0, (3.0, 1.5)  # what `advise` tries: ratio,
 _SHORTEST_LEARNT = 0.25  # of the expected spacing: nearer to the last one a balise teaches no spacing
 
 
-_STAGES = {"effort": WheelStage, **WHEEL_STAGES}
+_STAGES: dict[str, type[WheelStage]] = {"effort": WheelStage, **WHEEL_STAGES}
 
 
 class AdaptiveGainCdo(HighGainTrainObserver):

@@ -153,24 +153,24 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         begins = x.balises_used <= 0.0
         deviation = place_deviation(u.balise_location_accuracy, p.balise_deviation)
         gain, variance = gain_ratio(self.own_bound(x, p), deviation, p.balise_deviation), deviation**2
-        told = u.balise_position - p.reading_age * _without_creep(u, p) * (1.0 + x.estimated_scale)
+        reported = u.balise_position - p.reading_age * _without_creep(u, p) * (1.0 + x.estimated_scale)
         position, R, seen = x.estimated_position, x.adaptation_gain[0, 0], gain * x.sensitivity[0, 0]
         quickest = R / (1.0 + R * seen**2 / QUICKEST)
-        predicted = np.where(gain < 1.0, position + gain * (told - position), told)
+        predicted = np.where(gain < 1.0, position + gain * (reported - position), reported)
         covariance = x.error_covariance
-        jump = np.vstack([UNMOVED, np.hstack([1.0 - gain, 0.0, 0.0])])
-        moved = jump @ covariance @ jump.T + gain**2 * variance * OF_PREDICTED
-        known = variance * SAME_PLACE + covariance[1, 1] * OF_SCALE
+        jump = np.vstack([_UNMOVED, np.hstack([1.0 - gain, 0.0, 0.0])])
+        moved = jump @ covariance @ jump.T + gain**2 * variance * _OF_PREDICTED
+        known = variance * SAME_PLACE + covariance[1, 1] * _OF_SCALE
         return {
-            "estimated_position": np.where(begins, told, position),
-            "predicted_position": np.where(begins, told, predicted),
+            "estimated_position": np.where(begins, reported, position),
+            "predicted_position": np.where(begins, reported, predicted),
             "adaptation_gain": matrix([np.where(begins, p.first_gain, quickest)]),
             "sensitivity": np.where(begins, 0.0, x.sensitivity),
             "seen_sensitivity": matrix([np.where(begins, 0.0, seen)]),
             "mean_excitation": np.where(begins, 0.0, x.mean_excitation),
             "error_covariance": np.where(begins, known, moved),
             "balises_used": x.balises_used + 1.0,
-            "last_innovation": position - told,
+            "last_innovation": position - reported,
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -206,9 +206,9 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
 
 DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position
 SAME_PLACE = DISTURBED
-OF_SCALE = np.diag([0.0, 1.0, 0.0])
-OF_PREDICTED = np.diag([0.0, 0.0, 1.0])
-UNMOVED = np.eye(2, 3)  # position and scale at a balise
+_OF_SCALE = np.diag([0.0, 1.0, 0.0])
+_OF_PREDICTED = np.diag([0.0, 0.0, 1.0])
+_UNMOVED = np.eye(2, 3)  # position and scale at a balise
 
 
 def _without_creep(u: Any, p: Any) -> Array:

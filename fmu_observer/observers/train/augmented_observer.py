@@ -35,18 +35,18 @@ from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4  # position, speed, unknown acceleration, its rate
-BALISE_LAST, FIX_LAST = 1.0, 2.0
+_BALISE_LAST, _FIX_LAST = 1.0, 2.0
 SENSORS = ("balise", "gps")
-POSITION_OF = {"balise": "balise_position", "gps": "gps_position", "fix": "fix_position"}  # event to input
+_POSITION_OF = {"balise": "balise_position", "gps": "gps_position", "fix": "fix_position"}  # event to input
 
 GPS = TriggeredEvent(
     "gps",
     (input_signal("gps_position", "m", 0.0, "Position of the satellite fix", variability="discrete"),),
     "A satellite fix of the position, at its own time stamp",
 )
-SAMPLED_FIX = PeriodicEvent("fix", "fix_period", description="The held position of the receiver is read")
-FIX_POSITION = input_signal("fix_position", "m", 0.0, "Position of the last satellite fix, held by the receiver")
-FIX_PERIOD = parameter(
+_SAMPLED_FIX = PeriodicEvent("fix", "fix_period", description="The held position of the receiver is read")
+_FIX_POSITION = input_signal("fix_position", "m", 0.0, "Position of the last satellite fix, held by the receiver")
+_FIX_PERIOD = parameter(
     "fix_period",
     "s",
     0.1,
@@ -105,8 +105,8 @@ class AugmentedTrainObserver(TrainObserver):
     def __init__(self, fixes: Fixes = "event", **options: Any) -> None:
         require_choice(self.name, {"fixes": WAYS_OF_FIXES}, fixes=fixes)
         if fixes == "sampled":
-            self.inputs = (*self.inputs, FIX_POSITION)
-        self.estimator_events = (GPS if fixes == "event" else SAMPLED_FIX, *self.own_events)
+            self.inputs = (*self.inputs, _FIX_POSITION)
+        self.estimator_events = (GPS if fixes == "event" else _SAMPLED_FIX, *self.own_events)
         self.estimator_states = (
             POSITION,
             SPEED,
@@ -115,7 +115,7 @@ class AugmentedTrainObserver(TrainObserver):
             state("position_innovation", "m", 0.0, "Position error seen at the last balise or fix, decaying since"),
             *self.own_states,
         )
-        self.estimator_parameters = (*self.own_parameters, FIX_PERIOD)
+        self.estimator_parameters = (*self.own_parameters, _FIX_PERIOD)
         super().__init__(fixes=fixes, **options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
@@ -173,10 +173,10 @@ class AugmentedTrainObserver(TrainObserver):
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A balise or a fix sets the innovation anew and puts its gains in force; the estimates stay continuous."""
-        if event not in POSITION_OF:
+        if event not in _POSITION_OF:
             return self.own_jump(event, x, u, p)
-        sensor, last = ("balise", BALISE_LAST) if event == "balise" else ("gps", FIX_LAST)
-        measured = getattr(u, POSITION_OF[event])
+        sensor, last = ("balise", _BALISE_LAST) if event == "balise" else ("gps", _FIX_LAST)
+        measured = getattr(u, _POSITION_OF[event])
         used = self.gains_of(sensor, p)[0][0] > 0.0
         return {
             "position_innovation": np.where(used, x.estimated_position - measured, x.position_innovation),
@@ -209,11 +209,8 @@ class AugmentedTrainObserver(TrainObserver):
             return certificate
         gap = float(p.fix_period)
         alone, mixed = (self._mixture(sensors, gap, p, model) for sensors in (("gps",), SENSORS))
-        notes = (
-            f"fixes alone {_told(alone)}",
-            f"fixes and balises in any order {_told(mixed)}; the change between times with fixes and without is taken "
-            f"to be rare",
-        )
+        rare = "the change between times with fixes and without is taken to be rare"
+        notes = (f"fixes alone {_in_words(alone)}", f"fixes and balises in any order {_in_words(mixed)}; {rare}")
         return replace(
             certificate, holds=certificate.holds and alone.holds and mixed.holds, notes=(*certificate.notes, *notes)
         )
@@ -225,7 +222,7 @@ class AugmentedTrainObserver(TrainObserver):
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _in_force(self, x: Any, p: Any) -> tuple[tuple[Array, ...], Array]:
-        fix = x.last_sensor == FIX_LAST
+        fix = x.last_sensor == _FIX_LAST
         (by_balise, slow), (by_fix, fast) = (self.gains_of(sensor, p) for sensor in SENSORS)
         gains = tuple(np.where(fix, b, a) for a, b in zip(by_balise, by_fix, strict=True))
         return gains, np.where(fix, fast, slow)
@@ -239,7 +236,7 @@ class AugmentedTrainObserver(TrainObserver):
         return certify_sampled_error(vertices, gap, model)
 
 
-def _told(certificate: Certificate) -> str:
+def _in_words(certificate: Certificate) -> str:
     verdict = "certified" if certificate.holds else "NOT certified"
     limit = certificate.aperiodic_limit
     reach = f"limit {limit:.4g} s" if isfinite(limit) else f"no limit found up to {certificate.horizon:.4g} s"

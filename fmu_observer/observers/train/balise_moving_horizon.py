@@ -46,14 +46,14 @@ from plant_models.hybrid.system import Array
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
 LAYOUT = RowLayout(inputs=ORDER + 5, measurements=1)
 OFFSETS, SPEED, EFFORT = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
-IS_BALISE, ANEW, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
-WINDOW_PARAMETERS = (
+_IS_BALISE, _ANEW, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
+_WINDOW_PARAMETERS = (
     parameter("speed_limit", "m/s", 100.0, "Highest speed, either way", min=0.1),
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
     parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
 )
 
-RESTARTS = discrete_output(
+_RESTARTS = discrete_output(
     "restarts",
     "1",
     "Times that the position began anew, since most balises were refused",
@@ -64,7 +64,7 @@ RESTARTS = discrete_output(
 )
 
 
-REFUSALS = (
+_REFUSALS = (
     memory("balises_believed", "1", 0.0, "Balises believed since the position began"),
     memory("balises_refused", "1", 0.0, "Balises refused in a row that agree"),
     memory("told_place", "m", 0.0, "Place of the last balise, as told"),
@@ -129,9 +129,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     name = "balise_moving_horizon"
     description = "Moving-horizon observer of odometer and balises, with disturbance and creep"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
-    parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
-    bounded_parameters = (*TUNABLE, *WINDOW_PARAMETERS)
-    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW), RESTARTS)
+    parameters = (*OWN_PARAMETERS, *_WINDOW_PARAMETERS)
+    bounded_parameters = (*TUNABLE, *_WINDOW_PARAMETERS)
+    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW), _RESTARTS)
     iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
@@ -154,7 +154,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         """States of the filter, then what is remembered of the window."""
         covariance = np.diag(np.square(FIRST_DEVIATIONS))
         remembered = window_memory(np.zeros(ORDER), covariance, LAYOUT.width, self.window)
-        return (*super().own_states(), *REFUSALS, *remembered)
+        return (*super().own_states(), *_REFUSALS, *remembered)
 
     @cached_property
     def problem(self) -> WindowProblem:
@@ -201,13 +201,13 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
         if self.loss != "squares":
             values.pop("nis")
-        return values | window_values(x.last_pass) | {RESTARTS.name: x.restart_count}
+        return values | told(x.last_pass) | {_RESTARTS.name: x.restart_count}
 
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _refusals(self, event: str, x: Any, u: Any, p: Any, filtered: Mapping[str, Array]) -> dict[str, Array]:
         """What is remembered of refused balises after an event, from the innovation of the filter's own step."""
-        old = {s.name: getattr(x, s.name) for s in REFUSALS}
+        old = {s.name: getattr(x, s.name) for s in _REFUSALS}
         if event != BALISE.name or self.loss == "squares":
             return old
         error, nis, before = filtered["last_innovation"], filtered["last_nis"], x.last_innovation
@@ -222,9 +222,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
             "told_place": u.balise_position,
             "restart_count": x.restart_count + anew,
         }
-        told = x.balises_believed + x.balises_refused > 0.0
+        any_before = x.balises_believed + x.balises_refused > 0.0
         near = np.abs(u.balise_position - x.told_place) <= p.balise_deviation
-        again = np.where(near, told, False)  # told twice, it is one
+        again = np.where(near, any_before, False)  # reported twice, it is one
         return {name: np.where(again, old[name], now[name]) for name in now}
 
     def _row(self, event: str, t: Array, x: Any, u: Any, p: Any, before: Array, anew: Array) -> WindowRow:
@@ -232,8 +232,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         period, is_balise, speed = t - x.last_time, float(event == BALISE.name), x.estimated_speed
         offset = estimate_of(x) - transition(period, speed, u.effort, p).F @ before
         measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
-        told = known_accuracy(u.balise_location_accuracy) if event == BALISE.name else 0.0
-        inputs = vector(*(offset[i] for i in range(ORDER)), speed, u.effort, is_balise, anew, told)
+        accuracy = known_accuracy(u.balise_location_accuracy) if event == BALISE.name else 0.0
+        inputs = vector(*(offset[i] for i in range(ORDER)), speed, u.effort, is_balise, anew, accuracy)
         return WindowRow(1.0, period, t, inputs, vector(measured), np.ones(1))
 
 
@@ -243,12 +243,12 @@ def _shared(flat: Array) -> Shared:
 
 def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
     F, noise = transition(row.period, row.inputs[SPEED], row.inputs[EFFORT], _shared(shared))
-    unknown = row.inputs[ANEW] * np.diag([FIRST_DEVIATIONS[P] ** 2, 0.0, 0.0, 0.0])
+    unknown = row.inputs[_ANEW] * np.diag([FIRST_DEVIATIONS[P] ** 2, 0.0, 0.0, 0.0])
     return Moved(F @ x + row.inputs[OFFSETS], F, noise + unknown)
 
 
 def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
-    p, balise = _shared(shared), row.inputs[IS_BALISE]
+    p, balise = _shared(shared), row.inputs[_IS_BALISE]
     H = balise * BALISE_ROW + (1.0 - balise) * ODOMETER_ROW
     place = place_deviation(row.inputs[ACCURACY], p.balise_deviation)
     deviation: Array = np.where(balise > 0.5, place, p.odometer_deviation)

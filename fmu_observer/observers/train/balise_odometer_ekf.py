@@ -42,14 +42,14 @@ from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4
-P, V, D, CREEP = range(ORDER)  # places of the estimates among themselves
+P, V, D, _CREEP = range(ORDER)  # places of the estimates among themselves
 VARIANCES = [f"estimate_covariance[{k}]" for k in (1, 5, 8, 10)]  # of an upper triangle
 FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s], [m/s2], [m/s] [ours]
 ROUNDING = 1e-9  # of times that are sums of periods
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 SETTLING = 400  # readings after which a certificate takes the covariance for settled, and four gaps at least
 HORIZON = 60.0  # longest gap that a certificate looks at unasked [s]
-CERTIFIED_AT = 20.0  # speed of the certificate [m/s]
+_CERTIFIED_AT = 20.0  # speed of the certificate [m/s]
 
 ODOMETER_ROW = np.array([[0.0, 1.0, 0.0, 1.0]])
 BALISE_ROW = np.array([[1.0, 0.0, 0.0, 0.0]])
@@ -215,7 +215,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         innovation = vector(error)
         after = correct(estimate, before, innovation, row, np.reshape(deviation**2, (1, 1)))
         nis = normalised_square(innovation, after.innovation_covariance)
-        told = log_likelihood(innovation, after.innovation_covariance)
+        likelihood = log_likelihood(innovation, after.innovation_covariance)
         refused = 0.0 * nis if is_balise else np.where(nis > p.odometer_gate**2, 1.0, 0.0)
         kept = [np.where(refused > 0.0, estimate[i], after.estimate[i]) for i in range(ORDER)]
         kept[V] = moving_speed(kept[V], x.estimated_speed, u, p)
@@ -229,7 +229,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "last_time": t,
             "last_innovation": -error if is_balise else x.last_innovation,
             "last_nis": np.where(refused > 0.0, x.last_nis, nis),
-            "log_likelihood": x.log_likelihood + np.where(refused > 0.0, 0.0, told),
+            "log_likelihood": x.log_likelihood + np.where(refused > 0.0, 0.0, likelihood),
             "refused_time": refused_time * (1.0 - anew),
         }
 
@@ -375,7 +375,7 @@ def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple
             [s].
     """
     variances = [P[0, 0] + np.square(error * refused_time), *(d**2 + 0.0 * error for d in FIRST_DEVIATIONS[1:])]
-    reading = estimate[V] + estimate[CREEP] + error
+    reading = estimate[V] + estimate[_CREEP] + error
     found = [estimate[0], np.maximum(reading, 0.0), 0.0 * error, 0.0 * error]
     rows = [np.hstack([variances[i] if i == j else 0.0 * error for j in range(ORDER)]) for i in range(ORDER)]
     return found, np.vstack(rows)
@@ -415,7 +415,7 @@ def moving_speed(speed: Array, before: Array, u: Any, p: Any) -> Array:
     return np.where(stands(before, u.odometer, noise) > 0.0, 0.0, forward)
 
 
-class Settled(NamedTuple):
+class _Settled(NamedTuple):
     """The filter where every gap is the same.
 
     Attributes:
@@ -428,10 +428,10 @@ class Settled(NamedTuple):
     margin: float
 
 
-def _settled(gap: float, p: Any) -> Settled:
+def _settled(gap: float, p: Any) -> _Settled:
     """The settled filter at a constant gap [s], readings at their period."""
     readings = max(round(gap / float(p.odometer_period)), 1)
-    moved = transition(gap / readings, CERTIFIED_AT, p.creep_effort * p.mass, p)
+    moved = transition(gap / readings, _CERTIFIED_AT, p.creep_effort * p.mass, p)
     F, QN = np.asarray(moved.F, dtype=float), np.asarray(moved.QN, dtype=float)
     reading, balise = float(p.odometer_deviation) ** 2, float(p.balise_deviation) ** 2
     first, after = np.eye(ORDER), np.diag(np.square(FIRST_DEVIATIONS))
@@ -443,7 +443,7 @@ def _settled(gap: float, p: Any) -> Settled:
         after, monodromy = _corrected(after, monodromy, BALISE_ROW, balise)
     shrunk = np.linalg.solve(np.linalg.cholesky(after), monodromy @ np.linalg.cholesky(first))
     radius = float(np.abs(np.linalg.eigvals(monodromy)).max())
-    return Settled(after, radius, 1.0 - float(np.linalg.norm(shrunk, 2)) ** 2)
+    return _Settled(after, radius, 1.0 - float(np.linalg.norm(shrunk, 2)) ** 2)
 
 
 def _corrected(P: np.ndarray, M: np.ndarray, row: np.ndarray, variance: float) -> tuple[np.ndarray, np.ndarray]:

@@ -23,9 +23,9 @@ from fmu_observer.observers.train.train_signals import POSITION, SPEED
 from plant_models.hybrid import Signal, memory, scalar_names
 from plant_models.hybrid.system import Array
 
-TRIAL_SPEED, TRIAL_ERROR = 20.0, 5.0  # [m/s], [m] of the start; a tenth of it in m/s
-LONGEST_HOLE = 100.0  # [s]
-DECAY_OVER_THETA = 1.25  # [ours]; at a = 0.5 and K = (2, 1) 85 % of a position error seen is corrected
+_TRIAL_SPEED, _TRIAL_ERROR = 20.0, 5.0  # [m/s], [m] of the start; a tenth of it in m/s
+_LONGEST_HOLE = 100.0  # [s]
+_DECAY_OVER_THETA = 1.25  # [ours]; at a = 0.5 and K = (2, 1) 85 % of a position error seen is corrected
 
 
 class DecayingInnovationCdo(HighGainTrainObserver):
@@ -72,7 +72,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """The largest theta that is certified with a decay that fits it."""
-        rule = lambda theta: {self.theta_name: theta, "decay_rate": DECAY_OVER_THETA * theta}  # noqa: E731
+        rule = lambda theta: {self.theta_name: theta, "decay_rate": _DECAY_OVER_THETA * theta}  # noqa: E731
         gains = certified_gains(max_gap, rule, certify)
         if gains is None:
             return None
@@ -89,12 +89,12 @@ class DecayingInnovationCdo(HighGainTrainObserver):
         """How long a hole may last: (3.109), the exact limit, and a trial beside a train at 20 m/s."""
         values = parameter_values(self, parameters, preset, "to judge")
         p = self.unpack_parameters(values)
-        exact = first_unstable_gap(self.vertices(p), LONGEST_HOLE)
-        high = min(2.0 * exact, LONGEST_HOLE)
+        exact = first_unstable_gap(self.vertices(p), _LONGEST_HOLE)
+        high = min(2.0 * exact, _LONGEST_HOLE)
         K, slope = np.array(p.high_gain, dtype=float)[:, None], float(max(drag_slope_range(p, 0.0, TOP_SPEED)))
         printed = decay_bounds(shift_matrix(2), K, np.eye(1, 2), float(p.theta), float(p.decay_rate), slope).longest_gap
         premise = f"tau_MASP, sigma to zero, if theta is above 1 1/s; L = {slope:.3g} 1/s, the steepest drag slope"
-        effort = float(p.davis_a + p.davis_b * TRIAL_SPEED + p.davis_c * TRIAL_SPEED**2)
+        effort = float(p.davis_a + p.davis_b * _TRIAL_SPEED + p.davis_c * _TRIAL_SPEED**2)
         known = dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
         trial = Trial(
             system=self,
@@ -102,10 +102,10 @@ class DecayingInnovationCdo(HighGainTrainObserver):
             low=high / 50.0,
             high=high,
             event="balise",
-            payload=lambda t: {"position": TRIAL_SPEED * t},
-            inputs=lambda t: {"effort": effort + 0.0 * t, "odometer": TRIAL_SPEED + 0.0 * t},
-            truth=lambda t: {"position": TRIAL_SPEED * t, "speed": TRIAL_SPEED + 0.0 * t},
-            settings={**known, POSITION.name: TRIAL_ERROR, SPEED.name: TRIAL_SPEED + 0.1 * TRIAL_ERROR},
+            payload=lambda t: {"position": _TRIAL_SPEED * t},
+            inputs=lambda t: {"effort": effort + 0.0 * t, "odometer": _TRIAL_SPEED + 0.0 * t},
+            truth=lambda t: {"position": _TRIAL_SPEED * t, "speed": _TRIAL_SPEED + 0.0 * t},
+            settings={**known, POSITION.name: _TRIAL_ERROR, SPEED.name: _TRIAL_SPEED + 0.1 * _TRIAL_ERROR},
             stop=30.0 * high,
         )
         return (
@@ -113,7 +113,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
                 "gap between balises",
                 printed=(PrintedBound(printed, premise, "Hann 2014, (3.109)"),),
                 exact=exact,
-                searched_to=LONGEST_HOLE,
+                looked=_LONGEST_HOLE,
                 exact_test="first gap at which the error grows from balise to balise, at the drag slope of one speed",
                 trial=trial if high > 0.0 else None,
             ),

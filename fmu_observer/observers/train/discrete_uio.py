@@ -18,8 +18,8 @@ from plant_models.hybrid.system import Array
 
 # Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes
 # them.
-ODOMETER_GAIN = (0.0, 0.41889, 0.0, 1.13024, 0.0, 1.52461)
-BALISE_GAIN = (0.94689, 0.0, 1.17481, 0.0, 0.7288, 0.0)
+_ODOMETER_GAIN = (0.0, 0.41889, 0.0, 1.13024, 0.0, 1.52461)
+_BALISE_GAIN = (0.94689, 0.0, 1.17481, 0.0, 0.7288, 0.0)
 ORDER = 6
 
 
@@ -56,8 +56,8 @@ class DiscreteUio(TrainObserver):
     estimator_parameters = (
         parameter("linearisation_speed", "m/s", 50.0 / 3.6, "Speed at which the drag slope is taken", min=0.0),
         parameter("odometer_period", "s", 0.1, "Sampling period of the odometer", min=1e-4),
-        parameter("odometer_gain", "1", ODOMETER_GAIN, "Gain K_o per odometer sample, state i per m/s", size=ORDER),
-        parameter("balise_gain", "1", BALISE_GAIN, "Gain K_b per balise, state i per m", size=ORDER),
+        parameter("odometer_gain", "1", _ODOMETER_GAIN, "Gain K_o per odometer sample, state i per m/s", size=ORDER),
+        parameter("balise_gain", "1", _BALISE_GAIN, "Gain K_b per balise, state i per m", size=ORDER),
     )
     estimator_events = (ODOMETER_SAMPLE,)
     stability_parameters = ("linearisation_speed", "odometer_period", "odometer_gain", "balise_gain")

@@ -50,7 +50,7 @@ _BOUND_NUMBERS = {  # of `ErrorBounds`: by which parameter
 Missing = Literal["predicted", "held"]
 
 REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
-PROOF = (
+_PROOF = (
     "the error must decay with bound_decay under gain, as lyapunov_matrix proves for the drag slopes of the train "
     f"(mass, davis_b, davis_c, speed_max; those of the presets for {DRAG_SLOPES[0]:g} to {DRAG_SLOPES[1]:g} 1/s); see "
     "fmu_observer.design.proposition_4_1.bound_matrix"
@@ -204,9 +204,9 @@ class HeldOdometerObserver(TrainObserver):
         free = (traction - rolling_drag(speed, p)) / p.mass - x.estimated_disturbance
         free = free + self._braking(x)  # what brakes: see friction
         acceleration = free + first_gain(self.scheduling_speed(x), p) * residual
-        told = self.error_bound(t, x, p)
+        bound = self.error_bound(t, x, p)
         # Without a reading it is the error itself that K is missing: (A) e = (A - K C) e + K C e.
-        driving = np.where(predicting, told, self._since_reading(t, x, p))
+        driving = np.where(predicting, bound, self._since_reading(t, x, p))
         reading = self.largest_gain_level(x, p) * driving
         decay = np.where(predicting, rate / p.rate_decay_time, 0.0)
         # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
@@ -223,7 +223,7 @@ class HeldOdometerObserver(TrainObserver):
             "estimated_disturbance": drift,
             "estimated_disturbance_rate": rate_drift,
             "bound_level": reading + unknown_level(p) + own - p.bound_decay * x.bound_level,
-            "integrated_bound": told,
+            "integrated_bound": bound,
         }
 
     def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
@@ -310,7 +310,7 @@ class HeldOdometerObserver(TrainObserver):
         slowest, fastest = error_slopes(p)
         shown = [proven(a11, p) for a11 in (slowest, fastest)]
         limited = tuple(s for s in self.estimator_parameters if s.min is not None)
-        return super().requirements(p) | within_bounds(limited, p) | {PROOF: shown[0] * shown[1]}
+        return super().requirements(p) | within_bounds(limited, p) | {_PROOF: shown[0] * shown[1]}
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of ``de = (A - K C) e`` with the position behind it, for all drag slopes up to `speed_max`."""
@@ -340,7 +340,7 @@ class HeldOdometerObserver(TrainObserver):
         slopes = tuple(map(float, error_slopes(p)))
         if not all(proven(a11, p) for a11 in slopes):
             gain = [float(k) for k in p.gain]
-            raise ValueError(f"{self.name}: {PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {gain}).")
+            raise ValueError(f"{self.name}: {_PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {gain}).")
         gains = [np.array([float(first_gain(z, p)), *map(float, p.gain[1:])]) for z in (0.0, float(p.speed_max))]
         numbers = {name: float(getattr(p, of)) for name, of in _BOUND_NUMBERS.items()}
         unknown = (float(p.unknown_acceleration), float(p.unknown_jerk), float(p.unknown_jerk_rate))

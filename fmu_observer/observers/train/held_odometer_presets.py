@@ -17,9 +17,9 @@ DRAG_SLOPES = (-0.03, 0.12)
 """
 
 # Aguiar Cota 2019, 4.3.4: sets C and D of the running resistance, a unit of mass
-SET_C = {"mass": 1.0, "davis_a": 0.0, "davis_b": 0.04, "davis_c": 0.0, "speed_max": 50.0}
+_SET_C = {"mass": 1.0, "davis_a": 0.0, "davis_b": 0.04, "davis_c": 0.0, "speed_max": 50.0}
 SET_D = {"mass": 1.0, "davis_a": 0.46, "davis_b": 5.7e-3, "davis_c": -2.4e-4, "speed_max": 50.0}
-NOTHING_UNKNOWN = {
+_NOTHING_UNKNOWN = {
     "odometer_error": 0.0,
     "unknown_acceleration": 0.0,
     "unknown_jerk": 0.0,
@@ -48,8 +48,8 @@ HELD_ODOMETER_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "bound_decay": 0.9,
     },
     "as_published": {  # 4.3.4: the beta there belongs to another gain; for this one it is 2.248 at least
-        **SET_C,
-        **NOTHING_UNKNOWN,
+        **_SET_C,
+        **_NOTHING_UNKNOWN,
         "gain": (2.9, -5.5, -3.5),
         "gain_schedule": 1.0,
         "published_beta": 1.9,
@@ -59,7 +59,7 @@ HELD_ODOMETER_PRESETS: Mapping[str, Mapping[str, Any]] = {
     },
     "as_published_set_d": {  # 5.4
         **SET_D,
-        **NOTHING_UNKNOWN,
+        **_NOTHING_UNKNOWN,
         "gain": (3.4, -3.4, -1.5),
         "gain_schedule": 1.0,
         "published_beta": 1.9,
@@ -69,8 +69,8 @@ HELD_ODOMETER_PRESETS: Mapping[str, Mapping[str, Any]] = {
     },
     **{
         f"m_{m:g}_alpha_{alpha:g}".replace(".", "_"): {
-            **SET_C,
-            **NOTHING_UNKNOWN,
+            **_SET_C,
+            **_NOTHING_UNKNOWN,
             "gain": gain,
             "gain_schedule": 0.0,
             "published_beta": beta,

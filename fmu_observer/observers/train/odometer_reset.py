@@ -40,8 +40,8 @@ class OdometerReset(GatedObserver):
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The position is that of the balise."""
-        told = u.balise_position
-        return {POSITION.name: told, "last_innovation": x.estimated_position - told}
+        reported = u.balise_position
+        return {POSITION.name: reported, "last_innovation": x.estimated_position - reported}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and innovation."""

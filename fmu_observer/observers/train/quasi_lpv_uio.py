@@ -21,7 +21,7 @@ from fmu_observer.design.quasi_lpv_published import (
     QuasiLpvDesign,
     quasi_lpv_vertices,
 )
-from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, RULES, RuleChoice, noise_doubts, told_bounds, verdict
+from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, RULES, RuleChoice, noise_warnings, stated_bounds, verdict
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -44,13 +44,13 @@ from plant_models.hybrid.system import Array
 
 SPEEDS = 21  # between the vertices, for the certificate
 HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for
-OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
+_OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
-HoldChoice = Literal["innovation", "reading"]
-HOLDS: tuple[HoldChoice, ...] = ("innovation", "reading")
+_HoldChoice = Literal["innovation", "reading"]
+HOLDS: tuple[_HoldChoice, ...] = ("innovation", "reading")
 
 SPEED = state("estimated_speed", "m/s", 0.0, "Estimate of the train speed")
-OWN_MEMORY = (
+_OWN_MEMORY = (
     memory("held_odometer", "m/s", 0.0, "Last reading of the odometer"),
     memory("held_innovation", "m/s", 0.0, "Odometer minus estimate just after the last sample"),
     memory("last_disturbance", "m/s2", 0.0, "Disturbance at the sample before"),
@@ -143,10 +143,10 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     default_preset = "as_published"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES), "hold": HOLDS}
 
-    def __init__(self, rules: RuleChoice = "repaired", hold: HoldChoice = "innovation") -> None:
+    def __init__(self, rules: RuleChoice = "repaired", hold: _HoldChoice = "innovation") -> None:
         require_choice(self.name, self.option_choices, rules=rules, hold=hold)
         self.rules = RULES[rules]
-        self.told_bounds = told_bounds(self.rules)
+        self.stated_bounds = stated_bounds(self.rules)
         self.hold = hold
         self.repaired = rules == "repaired"
         self.states = (
@@ -155,7 +155,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             state("unknown_deceleration", "m/s2", 0.0, "Deceleration by what the model does not know, d"),
             state("unknown_deceleration_rate", "m/s3", 0.0, "Its rate d'"),
             state("odometer_way", "m", 0.0, "Way of the odometer since the last balise"),
-            *OWN_MEMORY,
+            *_OWN_MEMORY,
             *self.rules.memory,
         )
         low, high = SECTION_3_3_4.gain_low, SECTION_3_3_4.gain_high
@@ -221,7 +221,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def own_bound(self, x: Any, p: Any) -> Array:
         """While the odometer is not believed no balise is to be doubted: it is what the speed is corrected by."""
-        return OPEN_BOUND * self.rules.fault(x)
+        return _OPEN_BOUND * self.rules.fault(x)
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""
@@ -261,7 +261,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         """
         noise = estimate_noise(*speed_errors(p), p)
         noisy = f"its gains make the estimate {noise:.3g} times as noisy as a reading; its rules take 1 for the most."
-        return [*noise_doubts(p), *([noisy] if noise > 1.0 else [])]
+        return [*noise_warnings(p), *([noisy] if noise > 1.0 else [])]
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """Gains, vertices and coefficients."""
@@ -295,7 +295,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def _at_balise(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         position, place = x.estimated_position, u.balise_position
-        told = Passing(
+        passing = Passing(
             t - x.balise_stamp,
             place - x.balise_place,
             x.odometer_way,
@@ -305,7 +305,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             # Exactly on the balise: the gate has restarted the position there, and the way before it says nothing.
             np.where(x.balises_used > 0.0, np.where(position == place, 0.0, 1.0), 0.0),
         )
-        judged = self.rules.at_balise(x, told, p)
+        judged = self.rules.at_balise(x, passing, p)
         restarts = judged.restart > 0.0
         return {
             "estimated_position": place,

@@ -13,8 +13,8 @@ from plant_models.hybrid import output_signal
 from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 
-ROLL_BACK = 0.3  # [m/s] [ours]: what a wheel must turn backwards for to be no noise: six deviations of 0.05 m/s
-FADING = 1.0  # [1/s] [ours]: of a disturbance's rate at standstill, where an observer has no rate of its own for it
+_ROLL_BACK = 0.3  # [m/s] [ours]: what a wheel must turn backwards for to be no noise: six deviations of 0.05 m/s
+_FADING = 1.0  # [1/s] [ours]: of a disturbance's rate at standstill, where an observer has no rate of its own for it
 
 ROLLS_BACK = output_signal(
     "rolls_back",
@@ -34,7 +34,7 @@ def rolls_back(reading: Array) -> Array:
     Args:
         reading: of the odometer, negative where its wheel turns backwards [m/s].
     """
-    return np.where(reading < -ROLL_BACK, 1.0, 0.0)
+    return np.where(reading < -_ROLL_BACK, 1.0, 0.0)
 
 
 def stands(speed: Array, reading: Array = 0.0, tolerance: Array = 0.0) -> Array:
@@ -51,7 +51,7 @@ def stands(speed: Array, reading: Array = 0.0, tolerance: Array = 0.0) -> Array:
 
 
 def held_disturbance(
-    standing: Array, drift: Array, rate_drift: Array, rate: Array, fading: Array = FADING
+    standing: Array, drift: Array, rate_drift: Array, rate: Array, fading: Array = _FADING
 ) -> tuple[Array, Array]:
     """Derivatives of a disturbance [m/s3] and of its rate [m/s4]: their own, or those at standstill.
 

@@ -20,7 +20,7 @@ from plant_models.hybrid.system import Array
 
 Premise = Literal["frozen", "live", "estimated"]
 
-PRINTED_GAINS = {  # (3.48), one value a vertex: lowest speed, highest speed
+_PRINTED_GAINS = {  # (3.48), one value a vertex: lowest speed, highest speed
     "balise_gain_position": (9.9036, 9.9036),
     "balise_gain_speed": (25.4133, 25.4071),
     "odometer_gain_position": (-0.1618e-4, -0.1618e-4),
@@ -28,7 +28,7 @@ PRINTED_GAINS = {  # (3.48), one value a vertex: lowest speed, highest speed
 }
 
 
-LONG_GAPS = {  # ours; as `design_takagi_sugeno(trust="odometer")`
+_LONG_GAPS = {  # ours; as `design_takagi_sugeno(trust="odometer")`
     "innovation_decay": 3.0,
     "balise_gain_position": (2.4, 2.4),
     "balise_gain_speed": (0.0, 0.0),
@@ -70,27 +70,27 @@ class TakagiSugenoCdo(TrainObserver):
         parameter("premise_min", "m/s", 5.0, "Speed of the first vertex", min=0.0),
         parameter("premise_max", "m/s", 50.0, "Speed of the second vertex", min=0.0),
         parameter(
-            "balise_gain_position", "1/s", PRINTED_GAINS["balise_gain_position"], "First entries of K_11, K_21", size=2
+            "balise_gain_position", "1/s", _PRINTED_GAINS["balise_gain_position"], "First entries of K_11, K_21", size=2
         ),
         parameter(
-            "balise_gain_speed", "1/s2", PRINTED_GAINS["balise_gain_speed"], "Second entries of K_11, K_21", size=2
+            "balise_gain_speed", "1/s2", _PRINTED_GAINS["balise_gain_speed"], "Second entries of K_11, K_21", size=2
         ),
         parameter(
             "odometer_gain_position",
             "1",
-            PRINTED_GAINS["odometer_gain_position"],
+            _PRINTED_GAINS["odometer_gain_position"],
             "First entries of K_12, K_22",
             size=2,
         ),
         parameter(
-            "odometer_gain_speed", "1/s", PRINTED_GAINS["odometer_gain_speed"], "Second entries of K_12, K_22", size=2
+            "odometer_gain_speed", "1/s", _PRINTED_GAINS["odometer_gain_speed"], "Second entries of K_12, K_22", size=2
         ),
     )
-    stability_parameters = ("innovation_decay", "premise_min", "premise_max", *PRINTED_GAINS)
+    stability_parameters = ("innovation_decay", "premise_min", "premise_max", *_PRINTED_GAINS)
     presets: Mapping[str, Mapping[str, Any]] = {
-        "as_published": {"innovation_decay": 3.0, **PRINTED_GAINS},
-        "repaired": {"innovation_decay": 9.9, **PRINTED_GAINS},
-        "long_gaps": LONG_GAPS,
+        "as_published": {"innovation_decay": 3.0, **_PRINTED_GAINS},
+        "repaired": {"innovation_decay": 9.9, **_PRINTED_GAINS},
+        "long_gaps": _LONG_GAPS,
     }
     default_preset = "repaired"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"premise": ("frozen", "live", "estimated")}

@@ -17,7 +17,7 @@ from plant_models.hybrid import scalar_names
 
 NOISE, SIZE = "move readings of odometer.reading by up to", "smaller ones are noise to them"
 SHIPPED = sorted(path.stem for path in Path(cosim.__file__).parent.joinpath("scenarios").glob("*.toml"))
-JUDGES = sorted(name for name in OBSERVERS if getattr(shipped(name), "told_bounds", {}))
+JUDGES = sorted(name for name in OBSERVERS if getattr(OBSERVERS[name](), "stated_bounds", {}))
 
 
 def warned(name: str, sensor: str, given: dict[str, float], **parameters: float) -> list[str]:

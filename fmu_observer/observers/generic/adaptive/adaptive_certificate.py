@@ -16,7 +16,7 @@ from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 HORIZON = 40.0  # [s]; the second regressor of the printed example has faded long before
 COARSE = 0.01  # [s], internal step: RK4 of frequencies of 20 rad/s to 1e-5
 LEFT = 0.02  # share of the first error that may be left in the states
-SHORTEST, BISECTIONS = 0.02, 6  # [s], [1] of the search for the longest period
+SHORTEST, _BISECTIONS = 0.02, 6  # [s], [1] of the search for the longest period
 LAST_PART = 0.8  # of the horizon; what is left after it counts
 
 
@@ -57,7 +57,7 @@ def _longest_kept(keeps: Callable[[float], bool], high: float) -> float:
     if keeps(high):
         return inf
     low, top = shortest, high
-    for _ in range(BISECTIONS):
+    for _ in range(_BISECTIONS):
         middle = float(np.sqrt(low * top))
         low, top = (middle, top) if keeps(middle) else (low, middle)
     return low

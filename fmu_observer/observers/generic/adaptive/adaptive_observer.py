@@ -52,11 +52,11 @@ from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Signal, output_signal, parameter, scalar_names
 from plant_models.hybrid.system import Array
 
-LATER, EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
-LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
-NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
-LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
-ADAPTIVE_PARAMETERS = (
+_LATER, _EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
+_LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
+_NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
+_LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
+_ADAPTIVE_PARAMETERS = (
     parameter("mu", "1/s", 10.0, "Decay of S: the state's gain forgets measurements at this rate", min=1e-9),
     parameter("forgetting", "1/s", 1.0, "Rate at which the adaptation gain forgets; 1 as published", min=0.0),
     parameter("gain_floor", "1", 0.0, "One over the largest adaptation gain; 0 for no limit, as published", min=0.0),
@@ -75,7 +75,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
     ``chi' chi``; and `innovation`.
 
     The covariance is exact for the model with white noise of `noise_deviation` at each measurement, whatever the
-    instants: the errors obey a linear equation that the observer knows. It begins at `NOTHING_KNOWN` for all.
+    instants: the errors obey a linear equation that the observer knows. It begins at `_NOTHING_KNOWN` for all.
 
     Args:
         model: a state-affine model or the name of one. sampled: whether the sensitivity of the output is sampled like
@@ -97,16 +97,16 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
                 f"{self.name}: the model {chosen.name!r} has {self.sizes.m} unknown constants; 1 to 3 can be learnt."
             )
         believed = (*chosen.states, *chosen.unknowns)
-        first = start_covariance(chosen.C, (NOTHING_KNOWN,) * len(believed), self.sizes, self.predicts)
+        first = start_covariance(chosen.C, (_NOTHING_KNOWN,) * len(believed), self.sizes, self.predicts)
         self.states = (
             *estimate_states(believed),
             *adaptation_states(self.sizes, first),
             self.kept_signal(),
         )
         self.inputs = chosen.inputs
-        self.outputs = adaptive_outputs(chosen)
+        self.outputs = _adaptive_outputs(chosen)
         self.parameters = self.bounded_parameters = (
-            *ADAPTIVE_PARAMETERS,
+            *_ADAPTIVE_PARAMETERS,
             parameter("noise_deviation", "1", 0.0, "Standard deviation of the noise of a measurement", min=0.0),
         )
         self.events = (arrival_event(chosen.event, chosen.measurements),)
@@ -165,7 +165,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
             variance = adaptation.covariance[n + j, n + j]
             found |= {
                 s.name: rho[j],
-                f"{s.name}_deviation": np.sqrt(np.maximum(variance, LEAST_VARIANCE)),
+                f"{s.name}_deviation": np.sqrt(np.maximum(variance, _LEAST_VARIANCE)),
                 f"{s.name}_learnt": learnt[j],
             }
         innovation = self.acting(x)
@@ -205,8 +205,8 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
             f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
             f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
         )
-        known = first_unstable_gap([self.known_error(float(p.mu))], LONGEST_PERIOD)
-        longest = adaptation_limit(self, values, min(known, LONGEST_PERIOD))
+        known = first_unstable_gap([self.known_error(float(p.mu))], _LONGEST_PERIOD)
+        longest = adaptation_limit(self, values, min(known, _LONGEST_PERIOD))
         return replace(
             found,
             holds=found.holds and max_gap <= longest and left.states < LEFT,
@@ -218,12 +218,12 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
 
     def condition_of(self, p: Any) -> Condition:
         """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`."""
-        early, late = (adaptive_bounds(self.model, float(p.mu), begin=begin) for begin in (0.5 * LATER, LATER))
+        early, late = (adaptive_bounds(self.model, float(p.mu), begin=begin) for begin in (0.5 * _LATER, _LATER))
         alpha0 = late.alpha0
-        values = {"alpha0": alpha0, "least_alpha0": EXCITED * early.alpha0}
+        values = {"alpha0": alpha0, "least_alpha0": _EXCITED * early.alpha0}
         statement = (
-            f"excitation that lasts, alpha0 >= least_alpha0: at {LATER:g} s at least {EXCITED:g} of that at "
-            f"{0.5 * LATER:g} s"
+            f"excitation that lasts, alpha0 >= least_alpha0: at {_LATER:g} s at least {_EXCITED:g} of that at "
+            f"{0.5 * _LATER:g} s"
         )
         excited = alpha0 > 0.0 and alpha0 >= values["least_alpha0"]
         if not self.predicts:
@@ -249,7 +249,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         mu = float(self.unpack_parameters(values).mu)
         bounds = adaptive_bounds(self.model, mu)
         trial = adaptive_trial(self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True)))
-        known = min(first_unstable_gap([self.known_error(mu)], LONGEST_PERIOD), LONGEST_PERIOD)
+        known = min(first_unstable_gap([self.known_error(mu)], _LONGEST_PERIOD), _LONGEST_PERIOD)
         adapted = adaptation_limit(self, values, known, trial.left)
         return (
             Limit(
@@ -263,8 +263,8 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
                 )
                 if self.predicts
                 else (),
-                exact=adapted if known == LONGEST_PERIOD else min(adapted, known),
-                searched_to=LONGEST_PERIOD,
+                exact=adapted if known == _LONGEST_PERIOD else min(adapted, known),
+                looked=_LONGEST_PERIOD,
                 tried=shortest_tried(known),
                 exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
                 f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",
@@ -287,7 +287,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         return gains_of(adaptation, self.model.C, learnt)
 
 
-def adaptive_outputs(model: StateAffineModel) -> tuple[Signal, ...]:
+def _adaptive_outputs(model: StateAffineModel) -> tuple[Signal, ...]:
     """Outputs of an adaptive observer of a model.
 
     Args:

@@ -13,7 +13,7 @@ from plant_models.hybrid.option import require_choice
 from plant_models.hybrid.system import Array
 
 Sensitivity = Literal["continuous", "sampled"]
-SENSITIVITIES: tuple[Sensitivity, ...] = ("continuous", "sampled")
+_SENSITIVITIES: tuple[Sensitivity, ...] = ("continuous", "sampled")
 
 
 class AdaptivePredictor(AdaptiveObserver):
@@ -44,7 +44,7 @@ class AdaptivePredictor(AdaptiveObserver):
     predicts = True
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         **AdaptiveObserver.option_choices,
-        "sensitivity": SENSITIVITIES,
+        "sensitivity": _SENSITIVITIES,
     }
 
     def __init__(

@@ -22,7 +22,7 @@ from plant_models.hybrid import output_signal, state
 from plant_models.hybrid.system import Array
 
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, -1.5 SPEED, ... [ours]
-PUBLISHED_GAIN = (101.4, 2650.0, 3750.0)  # poles -50, -50 and -1.5 1/s
+_PUBLISHED_GAIN = (101.4, 2650.0, 3750.0)  # poles -50, -50 and -1.5 1/s
 PUBLISHED_START = {"estimated_speed": 30.0, "estimated_disturbance": -0.91, "estimated_disturbance_rate": 0.13}
 LARGEST = 3  # of rho
 
@@ -91,7 +91,7 @@ class ProportionalIntegralUio(ModelObserver):
             residual_gain(chosen),
         )
         if (chosen.name, self.rho, numbers) == ("braked_train", 2, {}):
-            self.presets = {"as_published": {"gain": PUBLISHED_GAIN, **PUBLISHED_START}}
+            self.presets = {"as_published": {"gain": _PUBLISHED_GAIN, **PUBLISHED_START}}
         super().__init__(chosen, rho=self.rho, **numbers)
 
     @staticmethod

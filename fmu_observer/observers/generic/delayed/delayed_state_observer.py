@@ -41,9 +41,9 @@ from plant_models.hybrid.system import Array
 Between = Literal["predicted", "held"]
 BETWEEN: tuple[Between, ...] = ("predicted", "held")
 
-DELAY, MEMORY_PERIOD, MEMORY_PLACES = 0.1, 0.01, 20  # [s], [s], [1] [ours]: one predictor remembers 0.2 s
-THETA_PUBLISHED, THETA_REPAIRED = 1.0, 5.0  # [1/s]
-MOST_PREDICTORS = 8
+DELAY, _MEMORY_PERIOD, MEMORY_PLACES = 0.1, 0.01, 20  # [s], [s], [1] [ours]: one predictor remembers 0.2 s
+_THETA_PUBLISHED, _THETA_REPAIRED = 1.0, 5.0  # [1/s]
+_MOST_PREDICTORS = 8
 
 
 class DelayedStateObserver(HighGainSampled):
@@ -86,7 +86,7 @@ class DelayedStateObserver(HighGainSampled):
     description = "Observer of late measurements node by node, with finite-time predictors of the state now"
     source = "Hann 2014, (2.16), (2.57), Theorem 2.1"
     sampled_state = "predicted_output"
-    theta_start = THETA_REPAIRED
+    theta_start = _THETA_REPAIRED
     internal_step = 2.5e-3  # four to a reading
     late_policy = "late"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
@@ -105,7 +105,7 @@ class DelayedStateObserver(HighGainSampled):
         nodes: Sequence[int] = (),
     ) -> None:
         chosen = find_model(model)
-        require_whole(self.name, 0, MOST_PREDICTORS, predictors=predictors)
+        require_whole(self.name, 0, _MOST_PREDICTORS, predictors=predictors)
         require_whole(self.name, memory_places=memory_places)
         require_choice(self.name, self.option_choices, between_samples=between_samples)
         self.predictors, self.memory_places = predictors, memory_places
@@ -121,7 +121,7 @@ class DelayedStateObserver(HighGainSampled):
             nodes=tuple(nodes),
         )
         if chosen.order == 2 * len(chosen.measurements):
-            self.presets = {"as_published": {"theta": THETA_PUBLISHED}, "repaired": {}}
+            self.presets = {"as_published": {"theta": _THETA_PUBLISHED}, "repaired": {}}
             self.default_preset = "repaired"
 
     # -- declarations -----------------------------------------------------------------------------------------------
@@ -146,7 +146,7 @@ class DelayedStateObserver(HighGainSampled):
         return (
             *super().theta_parameters(),
             parameter("delay", "s", DELAY, "Delay of every measurement when it arrives", min=0.0),
-            parameter("memory_period", "s", MEMORY_PERIOD, "Time between two readings into the memory", min=1e-6),
+            parameter("memory_period", "s", _MEMORY_PERIOD, "Time between two readings into the memory", min=1e-6),
         )
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
@@ -188,9 +188,11 @@ class DelayedStateObserver(HighGainSampled):
         """A packet sets the outputs of its node; a reading moves memory on."""
         if event == "reading":
             return self._read(t, x, u, p)
-        told, outputs = self.measured(u), self.sampled_part(x)
+        received, outputs = self.measured(u), self.sampled_part(x)
         node = getattr(u, f"{event}_node")
-        after = (np.where(node * (node - float(of)) == 0.0, told[i], outputs[i]) for i, of in enumerate(self.node_of))
+        after = (
+            np.where(node * (node - float(of)) == 0.0, received[i], outputs[i]) for i, of in enumerate(self.node_of)
+        )
         return self.named_part(vector(*after))
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

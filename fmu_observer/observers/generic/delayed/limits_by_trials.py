@@ -18,10 +18,10 @@ from fmu_observer.observers.model_trial import WRONG_START, model_trial
 if TYPE_CHECKING:
     from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
 
-MOST_PLACES = 60  # of a trial
-LONGEST_INTERVAL = 100.0  # [s] to which the exact limit of the packets is looked for
-LONGEST_TRIAL = 2.0  # [s] of trials, each predictor its own share
-THEOREM = "Hann 2014, (2.17)"
+_MOST_PLACES = 60  # of a trial
+_LONGEST_INTERVAL = 100.0  # [s] to which the exact limit of the packets is looked for
+_LONGEST_TRIAL = 2.0  # [s] of trials, each predictor its own share
+_THEOREM = "Hann 2014, (2.17)"
 
 
 def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
@@ -33,13 +33,13 @@ def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any
     """
     text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
     interval = _interval(observer, p)
-    high, trial = min(2.0 * interval, LONGEST_TRIAL), None
+    high, trial = min(2.0 * interval, _LONGEST_TRIAL), None
     if interval > 0.0:
         trial = _trial(observer, "period", high, named, delayed=True, delay=min(float(p.delay), 0.05))
     return Limit(
         "interval of the packets" + (", one node each" if _nodes(observer) else ""),
         printed=(
-            PrintedBound(bounds.longest_interval, f"tau_MATI < 1/(gamma |H| N L), {text}", THEOREM),
+            PrintedBound(bounds.longest_interval, f"tau_MATI < 1/(gamma |H| N L), {text}", _THEOREM),
             PrintedBound(
                 bounds.strict_interval,
                 f"gamma |H| N L tau exp(sigma N tau) < 1, the factor left out of (2.17) kept, sigma = "
@@ -48,7 +48,7 @@ def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any
             ),
         ),
         exact=interval,
-        searched_to=LONGEST_INTERVAL,
+        looked=_LONGEST_INTERVAL,
         exact_test="spectral radius over a period of the protocol, model linearised at its start",
         trial=trial,
     )
@@ -62,9 +62,9 @@ def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any]
             2.1.
     """
     exact = exact_predictor_delay(observer.linearised_drift(), observer.predictors)
-    longest = min(1.5 * exact, LONGEST_TRIAL * observer.predictors)
+    longest = min(1.5 * exact, _LONGEST_TRIAL * observer.predictors)
     places = int(np.ceil(longest / (observer.predictors * float(p.memory_period)) - 1e-9))
-    tried = observer.remembering(min(max(places, observer.memory_places), MOST_PLACES))
+    tried = observer.remembering(min(max(places, observer.memory_places), _MOST_PLACES))
     stretched = {
         **named,
         "memory_period": max(float(p.memory_period), longest / tried.total_places),
@@ -79,7 +79,7 @@ def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any]
                 bounds.longest_delay,
                 f"(L/sigma) (exp(sigma tau_MAD{share}) - 1) < 1, L = {bounds.lipschitz:.3g} 1/s, sigma = "
                 f"{bounds.decay:.3g} 1/s",
-                THEOREM if observer.predictors == 1 else "Hann 2014, (2.59)",
+                _THEOREM if observer.predictors == 1 else "Hann 2014, (2.59)",
             ),
         ),
         exact=exact,
@@ -90,7 +90,9 @@ def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any]
 
 def _interval(observer: DelayedStateObserver, p: Any) -> float:
     """First interval between packets at which the error grows from round to round [s]."""
-    return first_unstable_gap([observer.turned_error(observer.linearised_drift(), p, observer.turns)], LONGEST_INTERVAL)
+    return first_unstable_gap(
+        [observer.turned_error(observer.linearised_drift(), p, observer.turns)], _LONGEST_INTERVAL
+    )
 
 
 def _trial(

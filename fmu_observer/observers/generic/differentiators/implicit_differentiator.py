@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from fmu_observer.formulas.differentiation.implicit_recursion import implicit_step
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
-from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
+from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from plant_models.hybrid import PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole
@@ -53,7 +53,7 @@ class ImplicitDifferentiator(SignalDifferentiator):
             filtering_order,
             unit,
             extra_parameters=(parameter("sample_period", "s", 0.01, "Sampling period of the signal", min=1e-6),),
-            extra_memory=primed_memory(memory("held_signal", unit, 0.0, "Signal at the last sample")),
+            extra_memory=initialised_memory(memory("held_signal", unit, 0.0, "Signal at the last sample")),
         )
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -11,7 +11,7 @@ from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid.system import Array
 
 ROUNDING = 1e-9  # share of the product of two deviations that is taken for zero
-CARRIED_ROUNDING = 1e-6  # likewise, of a covariance that went through many steps
+_CARRIED_ROUNDING = 1e-6  # likewise, of a covariance that went through many steps
 
 
 def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, Array]:
@@ -71,7 +71,7 @@ def is_positive(matrix: Array) -> Array:
     rest = matrix - lower @ lower.T
     for i in range(size):
         for j in range(i + 1):
-            fits = fits * _small(rest[i, j], matrix, i, j, CARRIED_ROUNDING)
+            fits = fits * _small(rest[i, j], matrix, i, j, _CARRIED_ROUNDING)
     return fits
 
 

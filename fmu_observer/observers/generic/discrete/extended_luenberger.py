@@ -15,7 +15,7 @@ from fmu_observer.models.discrete_model import transition
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observability import MeasuredSystem, UnobservableError, require_observable
-from fmu_observer.observers.generic.discrete.sample_step import at_sample, primed_memory
+from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.missing import or_else
@@ -50,7 +50,7 @@ class ExtendedLuenberger(ModelObserver):
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
         self.gain_parameters = (self.gain_parameter("gain", default_gain(chosen), "Gain L of one period, row by row"),)
-        self.extra_memory = primed_memory(*_innovations(chosen))
+        self.extra_memory = initialised_memory(*_innovations(chosen))
         super().__init__(chosen)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -22,11 +22,11 @@ class Belief(NamedTuple):
     drawn: Any = None
 
 
-def chosen(primed: Array, one: Belief, other: Belief) -> Belief:
+def chosen(begun: Array, one: Belief, other: Belief) -> Belief:
     """The one belief where a filter has begun, else the other.
 
     Args:
-        primed: whether it has. one, other: of the same shapes.
+        begun: whether it has. one, other: of the same shapes.
     """
 
     def fields(a: Any, b: Any) -> Any:
@@ -35,7 +35,7 @@ def chosen(primed: Array, one: Belief, other: Belief) -> Belief:
         return (
             type(a)(*(fields(*pair) for pair in zip(a, b, strict=True)))
             if isinstance(a, tuple)
-            else np.where(primed, a, b)
+            else np.where(begun, a, b)
         )
 
     return Belief(*(fields(*pair) for pair in zip(one, other, strict=True)))

@@ -25,7 +25,7 @@ from fmu_observer.observers.generic.discrete.covariance_requirements import is_p
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.generic.discrete.filter_signals import NOT_POSITIVE, SignalsOf
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief, chosen
-from fmu_observer.observers.generic.discrete.sample_step import PRIMED
+from fmu_observer.observers.generic.discrete.sample_step import INITIALISED
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
@@ -40,7 +40,7 @@ Form = Literal["joseph", "short", "square_root"]
 
 DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
 VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
-LARGEST_ENTRY = 1e150  # of a factor: its square and sums of such are numbers
+_LARGEST_ENTRY = 1e150  # of a factor: its square and sums of such are numbers
 LEFT = 8.0 * float(np.finfo(np.float64).eps)  # of a variance, after a subtraction: what is smaller is rounding
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 
@@ -197,7 +197,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         """
         return spread @ spread.T if self.rooted else spread
 
-    def told_accuracy(self, event: str, u: Any) -> Array:
+    def reported_accuracy(self, event: str, u: Any) -> Array:
         """The location accuracy that comes with an event, zero where none does [m].
 
         Args:
@@ -206,7 +206,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         return known_accuracy(u.balise_location_accuracy) if self.gated and event == GATED_EVENT else 0.0
 
     def reading_noise(self, accuracy: Array, p: Any) -> Array:
-        """Covariance of the measurement noise with a balise told so accurately, shape (s, s).
+        """Covariance of the measurement noise with a balise reported so accurately, shape (s, s).
 
         Args:
             accuracy: of its place [m]. p: all parameters.
@@ -225,12 +225,12 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         """Prediction over the time since the last event, then correction by what has arrived."""
         before, rows = self.belief(x), self.arrivals.rows(event)
         belief = self._ahead(before, t, x, u, p)
-        kept = {"primed": 1.0, "covariance_lapsed": self._lapsed(x)}
+        kept = {"primed": 1.0, "covariance_lapsed": self._not_positive(x)}
         kept |= {"last_time": t} if self.arrivals.timed else {}
         if not rows:
             return self._remembered(belief) | kept
         y = self.arrivals.measured(event, u)
-        noise = self.reading_noise(self.told_accuracy(event, u), p)
+        noise = self.reading_noise(self.reported_accuracy(event, u), p)
         after, error = self.corrected(belief, self.known(t, u, p), y, rows, noise, p)
         there, found = is_there(y), after.innovation_covariance
         count = there @ np.ones(len(rows))
@@ -260,7 +260,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
     def _remembered(self, belief: Belief) -> dict[str, Array]:
         return named_as(self.model.states, belief.estimate, "estimated_") | {self._spread: belief.spread}
 
-    def _lapsed(self, x: Any) -> Array:
+    def _not_positive(self, x: Any) -> Array:
         """Whether the covariance is none, or was none before; a correction may hide that."""
         if self.rooted:
             return x.covariance_lapsed
@@ -281,7 +281,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         values |= {"nis": x.last_nis, "innovation_likelihood": x.log_likelihood}
         if self.arrivals.several:
             values["nis_degrees"] = x.last_count
-        values[NOT_POSITIVE.name] = self._lapsed(x)
+        values[NOT_POSITIVE.name] = self._not_positive(x)
         if self.covariances:
             values["covariance"] = np.reshape(P, (n * n,))
         return values
@@ -299,8 +299,8 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         n, spread = self.model.order, getattr(x, self._spread)
         if not self.rooted:
             return positive(self._spread, np.reshape(spread, (n * n,)), n, definite=False)
-        text = f"{self._spread}: entries below {LARGEST_ENTRY:g}, whose squares are numbers"
-        return {text: np.where(np.max(np.abs(spread)) < LARGEST_ENTRY, 1.0, 0.0)}
+        text = f"{self._spread}: entries below {_LARGEST_ENTRY:g}, whose squares are numbers"
+        return {text: np.where(np.max(np.abs(spread)) < _LARGEST_ENTRY, 1.0, 0.0)}
 
     def condition_of(self, p: Any) -> Condition:
         """Whether the filter linearised at the start of the estimates has a stable steady state.
@@ -340,13 +340,13 @@ class GaussianFilter(GatedObserver, JudgedObserver):
     def _declare(self) -> None:
         """Signals and events, from the model and the way its measurements arrive."""
         model = self.model
-        told = SignalsOf(model, self.arrivals, rooted=self.rooted, covariances=self.covariances)
-        self.states = (*told.memory(), PRIMED)
+        signals = SignalsOf(model, self.arrivals, rooted=self.rooted, covariances=self.covariances)
+        self.states = (*signals.memory(), INITIALISED)
         self._estimated = tuple(s.name for s in self.states[: model.order])
         self._spread = self.states[model.order].name
         self.inputs = (*model.inputs, *self.arrivals.inputs)
         self.events = self.arrivals.events
-        self.outputs = told.outputs()
+        self.outputs = signals.outputs()
         self.parameters = (*self._declared_noise(), *self.own_parameters, *model.parameters)
         period = "Period of the prediction" if self.arrivals.timed else "Sampling period of the measurements"
         self.parameters += (parameter("sample_period", "s", model.sample_period, period, min=1e-6),)

@@ -18,7 +18,7 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
-from fmu_observer.observers.generic.discrete.sample_step import PRIMED
+from fmu_observer.observers.generic.discrete.sample_step import INITIALISED
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import (
@@ -243,7 +243,7 @@ class MemberFilter(JudgedObserver):
         model, period = self.model, "Sampling period of the measurements"
         self.states = self._memory()
         self.inputs = (*model.inputs, *measured_inputs(model.measurements))
-        self.events = (self._sampling(),)
+        self.events = (self._sample_event(),)
         self.outputs = (
             *estimate_outputs(model.states, discrete_output),
             *deviation_outputs(model.states, discrete_output),
@@ -263,10 +263,10 @@ class MemberFilter(JudgedObserver):
             memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", shape=(self.members, n)),
             *self.own_memory,
             memory("last_count", "1", float(q), "How many measurements there were last"),
-            PRIMED,
+            INITIALISED,
         )
 
-    def _sampling(self) -> PeriodicEvent:
+    def _sample_event(self) -> PeriodicEvent:
         """The event of a sample, with the numbers that are drawn for it."""
         model = self.model
         q, drawn_for_each = len(model.measurements), {"process_normal": max(model.order, model.noise_count)}

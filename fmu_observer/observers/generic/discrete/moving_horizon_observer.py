@@ -40,7 +40,7 @@ from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
-UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
+_UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
 Bounds = Mapping[str, Sequence[float | None]]
 
 
@@ -163,14 +163,14 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         steady, model = super().condition_of(p), self.model
         inputs = stacked(tuple(float(s.start_values[0]) for s in model.inputs))
         known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))
-        told_by = window_observability(model, known, float(p.sample_period), self.window)
+        observed = window_observability(model, known, float(p.sample_period), self.window)
         rows = f"A window of {self.window} full row{'s' if self.window > 1 else ''}"
-        told = f"{rows} {told_by.explain()}"
+        rows = f"{rows} {observed.explain()}"
         return replace(
             steady,
-            values={**steady.values, "window_rank": told_by.rank},
-            statement=f"{steady.statement}. {told}",
-            warnings=(told,) if told_by.unseen.size else (),
+            values={**steady.values, "window_rank": observed.rank},
+            statement=f"{steady.statement}. {rows}",
+            doubts=(rows,) if observed.unseen.size else (),
         )
 
     @cached_property
@@ -196,16 +196,16 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
     def _row(self, event: str, t: Array, x: Any, u: Any, p: Any) -> WindowRow:
         """The row that an event brings."""
         arrived = self.arrivals.rows(event)
-        primed = np.where(x.primed > 0.5, 1.0, 0.0)
-        period = primed * (t - x.last_time) if self.arrivals.timed else p.sample_period + 0.0 * primed
+        begun = np.where(x.primed > 0.5, 1.0, 0.0)
+        period = begun * (t - x.last_time) if self.arrivals.timed else p.sample_period + 0.0 * begun
         known, q = self.known(t, u, p), len(self.model.measurements)
         y = self.arrivals.measured(event, u) if arrived else np.zeros(0)
         place, there, y = {row: i for i, row in enumerate(arrived)}, is_there(y), or_else(y, 0.0)
-        measured = vector(*(y[place[j]] if j in place else 0.0 * primed for j in range(q)))
-        used = vector(*(there[place[j]] if j in place else 0.0 * primed for j in range(q)))
-        told = (self.told_accuracy(event, u) + 0.0 * primed,) if self._told_accurately else ()
-        inputs = vector(*(known.u[i] for i in range(len(self.model.inputs))), *told) if told else known.u
-        return WindowRow(primed, period, t + 0.0 * primed, inputs, measured, used)
+        measured = vector(*(y[place[j]] if j in place else 0.0 * begun for j in range(q)))
+        used = vector(*(there[place[j]] if j in place else 0.0 * begun for j in range(q)))
+        accuracy = (self.reported_accuracy(event, u) + 0.0 * begun,) if self._carries_accuracy else ()
+        inputs = vector(*(known.u[i] for i in range(len(self.model.inputs))), *accuracy) if accuracy else known.u
+        return WindowRow(begun, period, t + 0.0 * begun, inputs, measured, used)
 
     def _predicted_point(self, x: Array, row: WindowRow, shared: Array) -> Array:
         """Where the first pass linearises the newest row: the estimate before, moved on, within the bounds."""
@@ -220,13 +220,13 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         return row.inputs[: len(self.model.inputs)]
 
     @property
-    def _told_accurately(self) -> bool:
+    def _carries_accuracy(self) -> bool:
         """Whether rows of balises carry their location accuracy, behind the inputs."""
         return GATED_EVENT in self.arrivals.names and self.weighing == "itself"
 
     @property
     def _layout(self) -> RowLayout:
-        return RowLayout(len(self.model.inputs) + self._told_accurately, len(self.model.measurements))
+        return RowLayout(len(self.model.inputs) + self._carries_accuracy, len(self.model.measurements))
 
     def _moved(self, x: Array, row: WindowRow, shared: Array) -> Moved:
         p = self.unpack_parameters(shared)
@@ -242,7 +242,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         p, model = self.unpack_parameters(shared), self.model
         known = Known(row.time, self._inputs_of(row), self.known_parameters(p))
         H, V = model.measurement_jacobians(x, known)
-        accuracy = row.inputs[len(model.inputs)] if self._told_accurately else 0.0
+        accuracy = row.inputs[len(model.inputs)] if self._carries_accuracy else 0.0
         noise = through(self.reading_noise(accuracy, p), V)
         return Seen(model.measured(x, model.no_reading_noise(), known), H, noise)
 
@@ -290,8 +290,8 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
 
 def _starts(bounds: Bounds) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Start values of lowest and highest, with numbers where there is none."""
-    lower = tuple(-UNBOUNDED if low is None else max(float(low), -UNBOUNDED) for low, _ in bounds.values())
-    upper = tuple(UNBOUNDED if high is None else min(float(high), UNBOUNDED) for _, high in bounds.values())
+    lower = tuple(-_UNBOUNDED if low is None else max(float(low), -_UNBOUNDED) for low, _ in bounds.values())
+    upper = tuple(_UNBOUNDED if high is None else min(float(high), _UNBOUNDED) for _, high in bounds.values())
     return lower, upper
 
 

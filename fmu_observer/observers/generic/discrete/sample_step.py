@@ -16,16 +16,16 @@ from plant_models.hybrid.system import Array
 
 Update = Callable[[Any], dict[str, Array]]  # named tuple of the memory -> what of it changes, by name
 
-PRIMED = memory("primed", "1", 0.0, "1 after the first sample")
+INITIALISED = memory("primed", "1", 0.0, "1 after the first sample")
 
 
-def primed_memory(*signals: Signal) -> tuple[Signal, ...]:
+def initialised_memory(*signals: Signal) -> tuple[Signal, ...]:
     """Memory of an observer, with the mark of the first sample behind it.
 
     Args:
         signals: memory of the observer itself.
     """
-    return (*signals, PRIMED)
+    return (*signals, INITIALISED)
 
 
 def at_sample(x: Any, advance: Update, correct: Update) -> dict[str, Array]:
@@ -33,8 +33,8 @@ def at_sample(x: Any, advance: Update, correct: Update) -> dict[str, Array]:
     corrected.
 
     Args:
-        x: named tuple of the memory, `PRIMED` among it.
+        x: named tuple of the memory, `INITIALISED` among it.
         advance: over one period. correct: by the measurement at hand.
     """
     moved = {name: np.where(x.primed > 0.5, value, getattr(x, name)) for name, value in advance(x).items()}
-    return moved | correct(x._replace(**moved)) | {PRIMED.name: 1.0}
+    return moved | correct(x._replace(**moved)) | {INITIALISED.name: 1.0}

@@ -19,7 +19,7 @@ from plant_models.hybrid import parameter
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.system import Array
 
-ALPHA, BETA, KAPPA = 1e-3, 2.0, 0.0  # Allaoui 2024, section II.6
+_ALPHA, BETA, _KAPPA = 1e-3, 2.0, 0.0  # Allaoui 2024, section II.6
 
 
 class _Drawn(NamedTuple):
@@ -51,9 +51,9 @@ class UnscentedKalmanFilter(GaussianFilter):
     source = "Allaoui 2024, (2.32)-(2.55)"
     forms: ClassVar[tuple[Form, ...]] = ("short", "square_root")
     own_parameters = (
-        parameter("alpha", "1", ALPHA, "Spread of the sigma points", min=1e-6),
+        parameter("alpha", "1", _ALPHA, "Spread of the sigma points", min=1e-6),
         parameter("beta", "1", BETA, "What is known of the distribution, 2 for a Gaussian one"),
-        parameter("kappa", "1", KAPPA, "Second spread of the sigma points, 0 or 3 - n"),
+        parameter("kappa", "1", _KAPPA, "Second spread of the sigma points, 0 or 3 - n"),
     )
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         **GaussianFilter.option_choices,

@@ -18,8 +18,8 @@ from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal
 from plant_models.hybrid.system import Array
 
-DECAY_RATE, DECAY_EXPONENT = 10.0, 0.5  # [1/s], [1]; Hann 2014, section 3.4.3
-PUBLISHED_THETA, PUBLISHED_K = 10.0, (1.0, 2.0)
+_DECAY_RATE, _DECAY_EXPONENT = 10.0, 0.5  # [1/s], [1]; Hann 2014, section 3.4.3
+_PUBLISHED_THETA, _PUBLISHED_K = 10.0, (1.0, 2.0)
 
 
 class DecayingInnovation(HeldInnovation):
@@ -44,16 +44,16 @@ class DecayingInnovation(HeldInnovation):
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         super().__init__(model)
         if self.model.order == 2 * self.outputs_count:
-            published = np.kron(np.array(PUBLISHED_K)[:, None], np.eye(self.outputs_count))
+            published = np.kron(np.array(_PUBLISHED_K)[:, None], np.eye(self.outputs_count))
             self.presets = {
-                "as_published": {"theta": PUBLISHED_THETA, "high_gain": tuple(map(float, published.ravel()))},
+                "as_published": {"theta": _PUBLISHED_THETA, "high_gain": tuple(map(float, published.ravel()))},
                 "repaired": {},
             }
             self.default_preset = "repaired"
 
     def theta_parameters(self) -> tuple[Signal, ...]:
         """Theta, rate and exponent of the decay."""
-        return (*super().theta_parameters(), *decay_parameters(DECAY_RATE, DECAY_EXPONENT))
+        return (*super().theta_parameters(), *decay_parameters(_DECAY_RATE, _DECAY_EXPONENT))
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
         """The innovation, in memory, and the time since it was set."""

@@ -15,8 +15,12 @@ from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Signal, output_signal, parameter, state
 from plant_models.hybrid.system import Array
 
-THETA_LIMIT, THETA_RATE, THETA_START = 5.0, 1.0 / 12.0, 20.0  # [ours]: b = 2, mu = 1, and 4/6 for the printed bracket
-PUBLISHED_START, PUBLISHED_STEP = 2.0, 1e-3  # [ours]; any start above 1 is allowed
+_THETA_LIMIT, _THETA_RATE, _THETA_START = (
+    5.0,
+    1.0 / 12.0,
+    20.0,
+)  # [ours]: b = 2, mu = 1, and 4/6 for the printed bracket
+PUBLISHED_START, _PUBLISHED_STEP = 2.0, 1e-3  # [ours]; any start above 1 is allowed
 
 
 class DynamicHighGain(OutputPredictor):
@@ -49,20 +53,20 @@ class DynamicHighGain(OutputPredictor):
                 "theta_limit": published.theta_limit,
                 "theta_rate": published.theta_rate,
                 "theta": PUBLISHED_START,
-                "internal_step": PUBLISHED_STEP,
+                "internal_step": _PUBLISHED_STEP,
             }
 
     def theta_parameters(self) -> tuple[Signal, ...]:
         """The law of theta."""
         return (
-            parameter("theta_limit", "1/s", THETA_LIMIT, "High gain that theta tends to", min=0.0),
-            parameter("theta_rate", "1", THETA_RATE, "Rate of theta over its distance from the limit", min=0.0),
+            parameter("theta_limit", "1/s", _THETA_LIMIT, "High gain that theta tends to", min=0.0),
+            parameter("theta_rate", "1", _THETA_RATE, "Rate of theta over its distance from the limit", min=0.0),
         )
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
         """The predicted output and theta."""
         super().declare_sampled_part(model)
-        self.extra_states = (*self.extra_states, state("theta", "1/s", THETA_START, "High gain in force"))
+        self.extra_states = (*self.extra_states, state("theta", "1/s", _THETA_START, "High gain in force"))
 
     def theta_in_force(self, x: Any, p: Any) -> Array:
         """High gain now [1/s]."""

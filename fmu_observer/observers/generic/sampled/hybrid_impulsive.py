@@ -16,7 +16,7 @@ from fmu_observer.observers.generic.sampled.sampled_observer import SampledObser
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid.system import Array
 
-JUMP_SHARE = 0.5  # of the correction of a sample that is given at once [ours]
+_JUMP_SHARE = 0.5  # of the correction of a sample that is given at once [ours]
 
 
 class HybridImpulsive(SampledObserver):
@@ -44,7 +44,7 @@ class HybridImpulsive(SampledObserver):
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
         width = check_chain(chosen, self.name)
-        L, H, F = hybrid_gains(chain_gain(chosen.order // width, width), THETA, JUMP_SHARE)
+        L, H, F = hybrid_gains(chain_gain(chosen.order // width, width), THETA, _JUMP_SHARE)
         self.gain_parameters = (
             self.gain_parameter("flow_gain", L, "Gain L of z, row by row"),
             self.gain_parameter("flow_matrix", H, "Matrix H of z, row by row [1/s]", "1/s"),

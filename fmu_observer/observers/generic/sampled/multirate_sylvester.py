@@ -24,7 +24,7 @@ from plant_models.hybrid import Signal, TriggeredEvent, state
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 
-MULTIRATE_MODELS: dict[str, Callable[[], ObserverModel]] = {"inverted_pendulum_cart": inverted_pendulum_cart}
+_MULTIRATE_MODELS: dict[str, Callable[[], ObserverModel]] = {"inverted_pendulum_cart": inverted_pendulum_cart}
 
 SPEED = 2.0  # [1/s] of the poles of A, at -SPEED, -1.25 SPEED, ... [ours]
 RESIDUAL = 1e-9  # relative: above it (1.46) does not hold for the matrices in use
@@ -41,7 +41,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
     the equation.
 
     Args:
-        model: linear, its measurements the last states in their order; or the name of one in `MULTIRATE_MODELS`.
+        model: linear, its measurements the last states in their order; or the name of one in `_MULTIRATE_MODELS`.
         continuous: how many of the measurements, the first ones, are there always.
 
     Default A: real poles from -2 1/s on; B such that T_R = I (`sylvester_design`) [ours, the thesis prints none].
@@ -54,7 +54,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
     description = "Multirate observer by a Sylvester equation, every sampled output at its own instants"
     source = "Bouchama 2024, (1.42)-(1.46)"
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MULTIRATE_MODELS), "continuous": (0, 1, 2)}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(_MULTIRATE_MODELS), "continuous": (0, 1, 2)}
 
     def __init__(self, model: str | ObserverModel = "inverted_pendulum_cart", continuous: int = 1) -> None:
         self.model = _find(model)
@@ -191,7 +191,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
 def _find(model: str | ObserverModel) -> ObserverModel:
     if isinstance(model, ObserverModel):
         return model
-    if not isinstance(model, str) or model not in MULTIRATE_MODELS:
-        known = ", ".join(MULTIRATE_MODELS)
+    if not isinstance(model, str) or model not in _MULTIRATE_MODELS:
+        known = ", ".join(_MULTIRATE_MODELS)
         raise ValueError(f"Unknown multirate model {model!r}; known are: {known}. Or give an ObserverModel.")
-    return MULTIRATE_MODELS[model]()
+    return _MULTIRATE_MODELS[model]()

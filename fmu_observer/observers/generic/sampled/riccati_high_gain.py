@@ -22,7 +22,7 @@ from plant_models.hybrid.missing import is_there
 from plant_models.hybrid.system import Array
 
 THETA = 1.5  # [1/s] [ours]
-OUTPUT_WEIGHT = 0.2  # r [ours]
+_OUTPUT_WEIGHT = 0.2  # r [ours]
 
 
 class RiccatiHighGain(ModelObserver, GapCertified):
@@ -58,7 +58,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         self.gain_parameters = (
             parameter("theta", "1/s", THETA, "High gain", min=1e-6),
             parameter("state_weight", "1", (1.0,) * n, "Diagonal of Q", min=1e-9, size=n),
-            parameter("output_weight", "1", OUTPUT_WEIGHT, "r, the same for every measurement", min=1e-9),
+            parameter("output_weight", "1", _OUTPUT_WEIGHT, "r, the same for every measurement", min=1e-9),
         )
         text = "Upper triangle of S, row by row"
         self.extra_states = (state("information", "1", np.eye(n), text, shape=(n, n), symmetric=True),)

@@ -36,12 +36,12 @@ class TakagiSugenoGains:
         """
         check_numbers(f"Gains for model {model.name!r}", {}, {"eta": self.eta})
         values: dict[str, Any] = {"innovation_decay": self.eta}
-        for name, given, measured in (
+        for name, gain, measured in (
             ("sampled_gain", self.sampled, model.sampled),
             ("continuous_gain", self.continuous, model.continuous),
         ):
             shape = (model.vertices, model.order, len(measured))
-            array = _numbers(given)
+            array = _numbers(gain)
             fits = (
                 array.shape == shape
                 or (len(measured) == 1 and array.shape == shape[:2])
@@ -68,10 +68,10 @@ class TakagiSugenoGains:
         return np.reshape(np.asarray(self.sampled, dtype=float), shape), _continuous(self.continuous, shape)
 
 
-def _numbers(given: Any) -> np.ndarray:
+def _numbers(gain: Any) -> np.ndarray:
     """An array of floats; one number that is not finite where it holds anything else."""
     try:
-        return np.asarray(() if given is None else given, dtype=float)
+        return np.asarray(() if gain is None else gain, dtype=float)
     except (TypeError, ValueError):
         return np.array(np.nan)
 
@@ -103,14 +103,14 @@ E2_PUBLISHED = TakagiSugenoGains(  # section 2.5.2
 
 # Ours, by `design_theorem7` with the arguments beside them, rounded; a test proves them anew.
 # the largest margin: with the least gamma K_i2 grows to 1.3e4
-E1_DESIGN = {"gap": 0.2, "eta": 1.0, "performance": False}
-E1_REDESIGNED = TakagiSugenoGains(
+_E1_DESIGN = {"gap": 0.2, "eta": 1.0, "performance": False}
+_E1_REDESIGNED = TakagiSugenoGains(
     eta=1.0,
     sampled=((2.6901, -0.6571, 4.0055, -78.416), (2.6899, -0.6565, 4.0052, -24.749)),
     continuous=((-49.706, 121.244, -1.224, 2214.06), (-49.707, 121.245, -1.224, -1720.31)),
 )
-E2_DESIGN = {"gap": 0.4, "eta": 0.1}
-E2_REDESIGNED = TakagiSugenoGains(
+_E2_DESIGN = {"gap": 0.4, "eta": 0.1}
+_E2_REDESIGNED = TakagiSugenoGains(
     eta=0.1,
     sampled=(
         (-0.2938, -0.3360, 0.1191, 0.6883, 0.8241),
@@ -125,8 +125,8 @@ E2_REDESIGNED = TakagiSugenoGains(
         (1.0139, 0.6136, 0.5659, -1.9204, -1.3366),
     ),
 )
-TRAIN_DESIGN = {"gap": 0.5, "eta": 1.0}  # eta = 3 1/s is infeasible at this gap
-TRAIN_REDESIGNED = TakagiSugenoGains(
+_TRAIN_DESIGN = {"gap": 0.5, "eta": 1.0}  # eta = 3 1/s is infeasible at this gap
+_TRAIN_REDESIGNED = TakagiSugenoGains(
     eta=1.0,
     sampled=((1.7683, -0.0971), (1.7684, -0.0978)),
     continuous=((0.8690, 2.3290), (0.8686, 2.3310)),
@@ -136,18 +136,18 @@ TRAIN_PUBLISHED = TakagiSugenoGains(  # (3.48); unstable beyond gaps of 0.286 s
     sampled=((9.9036, 25.4133), (9.9036, 25.4071)),
     continuous=((-0.1618e-4, -0.0126e-4), (-0.1618e-4, -0.0130e-4)),
 )
-PENDULUM_DESIGN = {"gap": 0.1, "eta": 1.0, "performance": False}  # nothing is noisy there
-PENDULUM_REDESIGNED = TakagiSugenoGains(eta=1.0, sampled=((3.6009, 3.3197), (3.6008, 2.1775)))
+_PENDULUM_DESIGN = {"gap": 0.1, "eta": 1.0, "performance": False}  # nothing is noisy there
+_PENDULUM_REDESIGNED = TakagiSugenoGains(eta=1.0, sampled=((3.6009, 3.3197), (3.6008, 2.1775)))
 
 GAINS: dict[str, dict[str, TakagiSugenoGains]] = {  # by model; the first is the default preset
-    "triangularisable_example": {"as_published": E1_PUBLISHED, "redesigned": E1_REDESIGNED},
-    "non_triangularisable_example": {"as_published": E2_PUBLISHED, "redesigned": E2_REDESIGNED},
-    "takagi_sugeno_train": {"redesigned": TRAIN_REDESIGNED, "as_published": TRAIN_PUBLISHED},
-    "pendulum": {"redesigned": PENDULUM_REDESIGNED},
+    "triangularisable_example": {"as_published": E1_PUBLISHED, "redesigned": _E1_REDESIGNED},
+    "non_triangularisable_example": {"as_published": E2_PUBLISHED, "redesigned": _E2_REDESIGNED},
+    "takagi_sugeno_train": {"redesigned": _TRAIN_REDESIGNED, "as_published": TRAIN_PUBLISHED},
+    "pendulum": {"redesigned": _PENDULUM_REDESIGNED},
 }
 DESIGNS: dict[str, dict[str, float | bool]] = {
-    "triangularisable_example": E1_DESIGN,
-    "non_triangularisable_example": E2_DESIGN,
-    "takagi_sugeno_train": TRAIN_DESIGN,
-    "pendulum": PENDULUM_DESIGN,
+    "triangularisable_example": _E1_DESIGN,
+    "non_triangularisable_example": _E2_DESIGN,
+    "takagi_sugeno_train": _TRAIN_DESIGN,
+    "pendulum": _PENDULUM_DESIGN,
 }

@@ -37,9 +37,9 @@ from fmu_observer.observers.model_signals import (
 from plant_models.hybrid import Signal, memory
 from plant_models.hybrid.system import Array
 
-SPEED, SPEED_GAP = 2.0, 0.4  # default poles from -min(SPEED [1/s], SPEED_GAP / longest gap) on [ours]
+SPEED, _SPEED_GAP = 2.0, 0.4  # default poles from -min(SPEED [1/s], _SPEED_GAP / longest gap) on [ours]
 SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certified
-SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
+_SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
 
 
 class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
@@ -53,7 +53,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
     """
 
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": SUITED}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": _SUITED}
     periodic: ClassVar[bool] = False
     extra_memory: tuple[Signal, ...] = ()
 
@@ -189,7 +189,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
 
     def _gain_parameter(self) -> Signal:
         model = self.model
-        poles = -min(SPEED, SPEED_GAP / model.max_gap) * (1.0 + 0.25 * np.arange(model.order))
+        poles = -min(SPEED, _SPEED_GAP / model.max_gap) * (1.0 + 0.25 * np.arange(model.order))
         states, who = tuple(s.name for s in model.states), f"{self.name} of {model.name}"
         gains = np.concatenate([observer_gain(A, model.C, poles, states, who).ravel() for A in model.A])
         text = "Gains L_i, vertex after vertex, each row by row"

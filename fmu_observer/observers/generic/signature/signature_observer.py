@@ -32,16 +32,16 @@ from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
-OUTSIDE_CELLS = 0.5
+_OUTSIDE_CELLS = 0.5
 """Cells beyond its table from which a window counts as outside: less comes of rounding and of mild noise."""
 
 TABLE_ERROR = 1e-6
 """Of its range, that a table may be off its parameters: they are written with so many digits at least [ours]."""
 
-RECENT = 50.0
+_RECENT = 50.0
 """Windows of which more than half beyond the table are told, although there were many within it before [ours]."""
 
-MOSTLY = OutputWarning(
+_MOSTLY = OutputWarning(
     "found more than half of its windows beyond its table, of all or of some fifty: the state is not in the set the "
     "table was built for, its parameters are not those of the table, or the noise is too large. Widen the set, build "
     "the table anew (`tabulated`), or lower the gain",
@@ -52,7 +52,7 @@ NEVER = OutputWarning(
     "its window never filled, and its estimates are the start values and the model alone. Let the run last longer",
     reaches=1.0,
 )
-NO_MODEL = ("sample_period", "process_noise", "measurement_noise")
+_NO_MODEL = ("sample_period", "process_noise", "measurement_noise")
 
 
 class InvertedWindow(NamedTuple):
@@ -112,7 +112,7 @@ class SignatureObserver(HybridSystem):
         pairs = list(zip(plant.moving, named, strict=True))
         self.states = (*_remembered(pairs, measured, window), *own_memory)
         self.inputs = tuple(input_signal(s.name, s.unit, 0.0, s.description) for s in measured)
-        self.outputs = (*_told(named), *own_outputs)
+        self.outputs = (*_window_outputs(named), *own_outputs)
         self._own_memory, self._own_outputs = tuple(own_memory), tuple(own_outputs)
         self.parameters = (*_settings(plant, known, gain, eps), *own_parameters)
         self.events = (PeriodicEvent("sampling", "sample_period", description="A sample is read"),)
@@ -216,12 +216,12 @@ class SignatureObserver(HybridSystem):
         full = np.where(count > width - 0.5, 1.0, 0.0)
         before = stacked_of(x, self._named, "estimated_")
         ahead = np.where(x.samples_held > 0.5, self.moved(before, 1, self.model_parameters(own, p))[-1], before)
-        told = self.inverted([*past.values()], x, p)
-        now = self.adopted(self.brought(told.state, width - 1, self.model_parameters(told.own, p)), u)
-        windows, beyond = x.windows_inverted, full * np.where(told.outside > OUTSIDE_CELLS, 1.0, 0.0)
-        share = x.share_outside + full * (beyond - x.share_outside) / np.minimum(windows + 1.0, RECENT)  # all, or last
-        long = np.where(windows > RECENT, np.where(share > 0.5, 1.0, x.long_outside), x.long_outside)
-        kept = (np.where(full > 0.5, new, old) for new, old in zip(told.own, own, strict=True))
+        found = self.inverted([*past.values()], x, p)
+        now = self.adopted(self.brought(found.state, width - 1, self.model_parameters(found.own, p)), u)
+        windows, beyond = x.windows_inverted, full * np.where(found.outside > _OUTSIDE_CELLS, 1.0, 0.0)
+        share = x.share_outside + full * (beyond - x.share_outside) / np.minimum(windows + 1.0, _RECENT)  # all, or last
+        long = np.where(windows > _RECENT, np.where(share > 0.5, 1.0, x.long_outside), x.long_outside)
+        kept = (np.where(full > 0.5, new, old) for new, old in zip(found.own, own, strict=True))
         return {
             **named_as(self._named, blended(ahead, now, p.gain, full), "estimated_"),
             **named_as(self._named, np.where(full > 0.5, now, ahead), "looked_up_"),
@@ -261,7 +261,7 @@ class SignatureObserver(HybridSystem):
     @cached_property
     def _model(self) -> Any:
         """Type of the parameters of the equations, and of the period."""
-        names = [s.name for s in self.plant.parameters if s.name not in NO_MODEL]
+        names = [s.name for s in self.plant.parameters if s.name not in _NO_MODEL]
         return namedtuple("Model", [*names, "sample_period"])
 
     def _fill_table(self, table: np.ndarray) -> None:
@@ -279,7 +279,7 @@ def _settings(plant: NoisyPlant, known: Sequence[str], gain: float, eps: float) 
     """Parameters of the model but those `known`, the sampling period, the gain and the regularisation."""
     period = next(s for s in plant.parameters if s.name == "sample_period")
     return (
-        *(s for s in plant.parameters if s.name not in (*NO_MODEL, *known)),
+        *(s for s in plant.parameters if s.name not in (*_NO_MODEL, *known)),
         parameter("sample_period", "s", period.start, "Time tau between two samples", min=1e-6),
         parameter("gain", "1", gain, "Gain q of the signature's estimate; 0 for the model alone", min=0.0),
         parameter("regularisation", "1", eps, "eps of the pencil map, in the unit of the samples", min=1e-9),
@@ -300,7 +300,7 @@ def _remembered(pairs: Sequence[tuple[Signal, Signal]], measured: Sequence[Signa
     )
 
 
-def _told(named: Sequence[Signal]) -> tuple[Signal, ...]:
+def _window_outputs(named: Sequence[Signal]) -> tuple[Signal, ...]:
     """Estimates, look-ups, and how full the window is and how often it was beyond the table."""
     return (
         *(discrete_output(s.name, s.unit, f"Estimate: {s.description}") for s in named),
@@ -308,5 +308,5 @@ def _told(named: Sequence[Signal]) -> tuple[Signal, ...]:
         discrete_output("window_full", "1", "1 once the window is full, and estimates are corrected", warning=NEVER),
         discrete_output("window_count", "1", "Full windows so far"),
         discrete_output("outside_count", "1", "Full windows beyond the table so far"),
-        discrete_output("mostly_outside", "1", "1 where most windows were beyond the table", warning=MOSTLY),
+        discrete_output("mostly_outside", "1", "1 where most windows were beyond the table", warning=_MOSTLY),
     )

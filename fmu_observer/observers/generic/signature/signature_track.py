@@ -134,9 +134,9 @@ class SignatureTrack(HybridSystem):
         named = ("nominal_length", "nominal_short_tip", "nominal_gap", "sample_period", "eps")
         start = {s.name: float(s.start_values[0]) for s in self.parameters if s.name in named}
         own = np.stack([np.abs(getattr(p, name) - start[name]) for name in named[:3]])
-        same = np.abs(p.sample_period - start["sample_period"]) + np.abs(p.eps - start["eps"])
+        differs = np.abs(p.sample_period - start["sample_period"]) + np.abs(p.eps - start["eps"])
         shipped = np.where(np.max(own) > 0.0, 0.0, 1.0)
-        other = np.where(same > 0.0, 1.0, 0.0)
+        other = np.where(differs > 0.0, 1.0, 0.0)
         text = (
             f"nominal_length, nominal_short_tip and nominal_gap belong to samples each {start['sample_period']:g} s, "
             f"eps = {start['eps']:g} and orders {LONG} and {SHORT}: measure them with yours on a run without a change"

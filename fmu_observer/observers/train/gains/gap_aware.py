@@ -37,7 +37,7 @@ _SHARE_AT_BALISE = 0.8  # of the position error that a balise takes away in the 
 
 
 @dataclass(frozen=True)
-class BaliseGaps:
+class _BaliseGaps:
     """The times between two balises that a track and a range of speeds bring.
 
     Attributes:
@@ -73,7 +73,7 @@ class GainDesign:
 
     observer: str
     parameters: Mapping[str, float]
-    gaps: BaliseGaps
+    gaps: _BaliseGaps
     certificate: Certificate
     margin: float
     noise: NoiseAmplification
@@ -87,7 +87,7 @@ class GainDesign:
         return f"{self.observer}: {values}. {occur}. {self.noise.explain()}"
 
 
-def balise_gaps(spacing: float | Sequence[float], speeds: tuple[float, float]) -> BaliseGaps:
+def balise_gaps(spacing: float | Sequence[float], speeds: tuple[float, float]) -> _BaliseGaps:
     """The gaps that balises bring.
 
     Args:
@@ -110,7 +110,7 @@ def balise_gaps(spacing: float | Sequence[float], speeds: tuple[float, float]) -
     )
     if not all(isfinite(distance) and distance > 0.0 for distance in distances):
         raise ValueError(f"Balise gaps: the spacing must be positive and finite [m], got {spacing!r}.")
-    return BaliseGaps(min(distances), max(distances), slowest, fastest)
+    return _BaliseGaps(min(distances), max(distances), slowest, fastest)
 
 
 def design_high_gain(
@@ -233,7 +233,7 @@ def _searched(observer: TrainObserver, family: Callable[[float], Gains], gap: fl
 def _design(
     observer: TrainObserver,
     parameters: Gains,
-    gaps: BaliseGaps,
+    gaps: _BaliseGaps,
     error: Callable[[float], SampledError],
     odometer_gain: tuple[float, float] = (0.0, 0.0),
 ) -> GainDesign:
@@ -246,7 +246,7 @@ def _design(
     return GainDesign(observer.name, parameters, gaps, certificate, margin, noise_amplification(judged, odometer_gain))
 
 
-def _with_margin(gaps: BaliseGaps, margin: float) -> float:
+def _with_margin(gaps: _BaliseGaps, margin: float) -> float:
     if not 0.0 <= margin < inf:
         raise ValueError(f"Gap-aware design: the margin must not be negative, got {margin!r}.")
     return gaps.longest * (1.0 + margin)
