@@ -20,7 +20,7 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
@@ -75,7 +75,7 @@ class AdhesionDetector(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"slip_definition": ("odometer", "speed")}
 
     def __init__(self, slip_definition: _SlipDefinition = "odometer") -> None:
-        require_choice(self.name, self.option_choices, slip_definition=slip_definition)
+        require_chosen(self.name, self.option_choices, slip_definition=slip_definition)
         self.slip_definition = slip_definition
         computed = _map_values(nominal_map(), degraded_map())
         self.parameters = (

@@ -17,7 +17,7 @@ from fmu_observer.detection.jam_rules import (
 )
 from fmu_observer.detection.printed_jam_rules import PrintedRules
 from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 NOISE = "odometer_noise"
@@ -111,7 +111,7 @@ class JamDetector(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
 
     def __init__(self, rules: RuleChoice = "repaired") -> None:
-        require_choice(self.name, self.option_choices, rules=rules)
+        require_chosen(self.name, self.option_choices, rules=rules)
         self.rules = RULES[rules]
         self.states = self.rules.memory
         self.parameters = (*SHARED_PARAMETERS, *self.rules.parameters)

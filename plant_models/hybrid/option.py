@@ -79,18 +79,3 @@ def require_whole(where: str, low: int = 1, high: int | None = None, **options: 
         if number < low or (high is not None and number > high):
             legal = f"at least {low}" if high is None else f"{low} to {high}"
             raise ValueError(f"{where}: {name} must be {legal}, got {number}.")
-
-
-def require_choice(where: str, choices: Mapping[str, Sequence[object]], **options: object) -> None:
-    """Refuse an option that is none of its choices.
-
-    Args:
-        where: what asks, for the message. choices: legal values by name of the option. options: values by name.
-
-    Raises:
-        ValueError: one is not; the message says which, and what is legal.
-    """
-    for name, value in options.items():
-        if value not in choices[name]:
-            known = ", ".join(map(str, choices[name]))
-            raise ValueError(f"{where}: unknown {name} {value!r}; choose one of: {known}.")

@@ -13,7 +13,7 @@ from fmu_observer.formulas.signatures.inversion import curve_distances, interpol
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from fmu_observer.observers.generic.signature.signature_observer import InvertedWindow, SignatureObserver
 from plant_models.exhibits.three_state_cascade import ThreeStateCascade
-from plant_models.hybrid.option import require_choice, require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
@@ -71,7 +71,7 @@ class CascadeSignature(SignatureObserver):
 
     def __init__(self, nodes: int = 7, next_scaling: NextScaling = "literal") -> None:
         require_whole(self.name, 4, 13, nodes=nodes)
-        require_choice(self.name, self.option_choices, next_scaling=next_scaling)
+        require_chosen(self.name, self.option_choices, next_scaling=next_scaling)
         self.nodes = np.linspace(-SIZE, SIZE, nodes)
         plant = ThreeStateCascade()
         known = [

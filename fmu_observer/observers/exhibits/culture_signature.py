@@ -14,7 +14,7 @@ from fmu_observer.observers.parameter_values import Value
 from plant_models.exhibits.ecoli_culture import HOUR, EcoliCulture
 from plant_models.hybrid import parameter, vector
 from plant_models.hybrid.integration import rk4_step
-from plant_models.hybrid.option import require_choice, require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
@@ -69,7 +69,7 @@ class CultureSignature(SignatureObserver):
 
     def __init__(self, nodes: int = 3, next_scaling: NextScaling = "literal", look_up: _LookUp = "weighted") -> None:
         require_whole(self.name, 2, 7, nodes=nodes)
-        require_choice(self.name, self.option_choices, look_up=look_up)
+        require_chosen(self.name, self.option_choices, look_up=look_up)
         self.look_up: _LookUp = look_up
         self.nodes, fine = np.linspace(-1.0, 1.0, nodes), np.linspace(-1.0, 1.0, FINE)
         self._fine_nodes = np.stack(np.meshgrid(fine, fine, indexing="ij"), axis=-1).reshape(-1, 2)

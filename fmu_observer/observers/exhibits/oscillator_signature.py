@@ -13,7 +13,7 @@ from fmu_observer.observers.generic.signature.signature_observer import TABLE_ER
 from fmu_observer.observers.parameter_values import Value
 from plant_models.exhibits.braked_oscillator import BrakedOscillator, Variant
 from plant_models.hybrid import parameter
-from plant_models.hybrid.option import require_choice, require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.system import Array
 
 ORDER, POINTS = 2, 1  # printed N; N_O = 3
@@ -59,7 +59,7 @@ class OscillatorSignature(SignatureObserver):
 
     def __init__(self, nodes: int = 7, next_scaling: NextScaling = "literal", variant: Variant = "mixed") -> None:
         require_whole(self.name, 4, 21, nodes=nodes)
-        require_choice(self.name, self.option_choices, next_scaling=next_scaling)
+        require_chosen(self.name, self.option_choices, next_scaling=next_scaling)
         self.nodes = [np.linspace(-size, size, nodes) for size in SET]
         eps = EPS[next_scaling]
         self.declare(

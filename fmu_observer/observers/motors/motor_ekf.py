@@ -11,7 +11,7 @@ from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_pre
 from fmu_observer.observers.motors.motor_filter_presets import ROWS, preset_of
 from fmu_observer.observers.motors.motor_jacobians import printed_jacobian, rotor_jacobian
 from plant_models.hybrid import matrix, vector
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, Frame, euler_step, rotor_voltages
 from plant_models.railway.traction.transforms import to_rotor
@@ -54,7 +54,7 @@ class MotorEkf(MotorFilter):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES, "jacobian": ("exact", "as_published")}
 
     def __init__(self, *, frame: Frame = "rotor", jacobian: Jacobian = "exact") -> None:
-        require_choice(self.name, self.option_choices, frame=frame, jacobian=jacobian)
+        require_chosen(self.name, self.option_choices, frame=frame, jacobian=jacobian)
         self.jacobian = printed_jacobian if jacobian == "as_published" else rotor_jacobian
         super().__init__(frame, True, (1.0, 1.0, 1.0, 1.0), jacobian=jacobian)
         self.options["frame"] = frame

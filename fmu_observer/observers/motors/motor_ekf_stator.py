@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_preset
 from fmu_observer.observers.motors.motor_jacobians import rotor_jacobian
 from plant_models.hybrid import matrix, vector
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import euler_step
 from plant_models.railway.traction.transforms import to_rotor, to_stator
@@ -47,7 +47,7 @@ class MotorEkfStator(MotorFilter):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"load": ("known", "estimated")}
 
     def __init__(self, *, load: Load = "known") -> None:
-        require_choice(self.name, self.option_choices, load=load)
+        require_chosen(self.name, self.option_choices, load=load)
         extra = () if load == "known" else (1e-6,)
         heavy = () if load == "known" else (1.0,)
         self.presets: Mapping[str, Mapping[str, Any]] = {

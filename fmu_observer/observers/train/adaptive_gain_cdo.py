@@ -19,7 +19,7 @@ from fmu_observer.observers.train.train_observer import TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, WheelStage
 from plant_models.hybrid import Signal, memory, output_signal, parameter
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 _FirstStage = Literal["effort", "differentiator", "multirate"]
@@ -86,7 +86,7 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         spacing: _SpacingSource = "expected",
     ) -> None:
         chosen = {"first_stage": first_stage, "gain_speed": gain_speed, "spacing": spacing}
-        require_choice(self.name, self.option_choices, **chosen)
+        require_chosen(self.name, self.option_choices, **chosen)
         self.stage, self.gain_speed, self.spacing = _STAGES[first_stage](), gain_speed, spacing
         self.stability_parameters = (*type(self).stability_parameters, *self.stage.stability_parameters)
         self.estimator_memory = (memory("theta", "1/s", 1.0, "High gain in force since the last balise"),)

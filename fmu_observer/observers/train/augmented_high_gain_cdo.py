@@ -14,7 +14,7 @@ from fmu_observer.observers.train.high_gain_observer import TOP_SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, MultirateStage
 from plant_models.hybrid import parameter
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 _FirstStage = Literal["multirate", "differentiator"]
@@ -63,7 +63,7 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"first_stage": tuple(WHEEL_STAGES), "fixes": WAYS_OF_FIXES}
 
     def __init__(self, first_stage: _FirstStage = "multirate", fixes: Fixes = "event") -> None:
-        require_choice(self.name, self.option_choices, first_stage=first_stage)
+        require_chosen(self.name, self.option_choices, first_stage=first_stage)
         self.stage = WHEEL_STAGES[first_stage]()
         self.own_states = self.stage.states
         self.own_parameters = (

@@ -30,7 +30,7 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
@@ -103,7 +103,7 @@ class AugmentedTrainObserver(TrainObserver):
     estimator_memory = (memory("last_sensor", "1", 0.0, "1 when a balise came last, 2 when a fix did, 0 before"),)
 
     def __init__(self, fixes: Fixes = "event", **options: Any) -> None:
-        require_choice(self.name, {"fixes": WAYS_OF_FIXES}, fixes=fixes)
+        require_chosen(self.name, {"fixes": WAYS_OF_FIXES}, fixes=fixes)
         if fixes == "sampled":
             self.inputs = (*self.inputs, _FIX_POSITION)
         self.estimator_events = (GPS if fixes == "event" else _SAMPLED_FIX, *self.own_events)

@@ -40,7 +40,7 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
 )
 from fmu_observer.observers.train.train_signals import BALISE
 from plant_models.hybrid import OutputWarning, discrete_output, memory, parameter, vector
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
@@ -131,7 +131,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
     parameters = (*OWN_PARAMETERS, *_WINDOW_PARAMETERS)
     bounded_parameters = (*TUNABLE, *_WINDOW_PARAMETERS)
-    outputs = (*BaliseOdometerEkf.outputs, *told_outputs(WINDOW), _RESTARTS)
+    outputs = (*BaliseOdometerEkf.outputs, *window_outputs(WINDOW), _RESTARTS)
     iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
@@ -141,7 +141,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
 
     def __init__(self, window: int = WINDOW, passes: int = PASSES, loss: Loss = "geman_mcclure") -> None:
         require_window(self.name, window, passes)
-        require_choice(self.name, self.option_choices, loss=loss)
+        require_chosen(self.name, self.option_choices, loss=loss)
         self.window, self.passes, self.loss = window, passes, loss
         self.gate_start = OFF
         told_of = {s.name: s for s in window_outputs(window)}
@@ -201,7 +201,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
         if self.loss != "squares":
             values.pop("nis")
-        return values | told(x.last_pass) | {_RESTARTS.name: x.restart_count}
+        return values | window_values(x.last_pass) | {_RESTARTS.name: x.restart_count}
 
     # -- internals --------------------------------------------------------------------------------------------------
 

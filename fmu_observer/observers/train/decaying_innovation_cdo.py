@@ -113,7 +113,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
                 "gap between balises",
                 printed=(PrintedBound(printed, premise, "Hann 2014, (3.109)"),),
                 exact=exact,
-                looked=_LONGEST_HOLE,
+                searched_to=_LONGEST_HOLE,
                 exact_test="first gap at which the error grows from balise to balise, at the drag slope of one speed",
                 trial=trial if high > 0.0 else None,
             ),

@@ -34,7 +34,7 @@ from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
 from plant_models.hybrid import input_signal, memory, output_signal, parameter, state
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -176,7 +176,7 @@ class HeldOdometerObserver(TrainObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"missing": ("predicted", "held")}
 
     def __init__(self, missing: Missing = "predicted") -> None:
-        require_choice(self.name, self.option_choices, missing=missing)
+        require_chosen(self.name, self.option_choices, missing=missing)
         self.missing = missing
         super().__init__(missing=missing)
 

@@ -39,7 +39,7 @@ from fmu_observer.observers.train.train_signals import (
     SPEED_OUTPUT,
 )
 from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 SPEEDS = 21  # between the vertices, for the certificate
@@ -144,7 +144,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES), "hold": HOLDS}
 
     def __init__(self, rules: RuleChoice = "repaired", hold: _HoldChoice = "innovation") -> None:
-        require_choice(self.name, self.option_choices, rules=rules, hold=hold)
+        require_chosen(self.name, self.option_choices, rules=rules, hold=hold)
         self.rules = RULES[rules]
         self.stated_bounds = stated_bounds(self.rules)
         self.hold = hold
@@ -250,7 +250,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             holds=found.holds,
             error_model=model,
             notes=(found.note,),
-            lyapunov_matrix=tuple(tuple(map(float, row)) for row in found.P),
+            lyapunov_matrix=rows_of(found.P),
         )
 
     def working_point(self, p: Any) -> list[str]:

@@ -15,7 +15,7 @@ from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
 from plant_models.hybrid import memory, parameter
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Premise = Literal["frozen", "live", "estimated"]
@@ -96,7 +96,7 @@ class TakagiSugenoCdo(TrainObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"premise": ("frozen", "live", "estimated")}
 
     def __init__(self, premise: Premise = "frozen") -> None:
-        require_choice(self.name, self.option_choices, premise=premise)
+        require_chosen(self.name, self.option_choices, premise=premise)
         self.premise = premise
         if premise == "frozen":
             self.estimator_memory = (

@@ -264,7 +264,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
                 if self.predicts
                 else (),
                 exact=adapted if known == _LONGEST_PERIOD else min(adapted, known),
-                looked=_LONGEST_PERIOD,
+                searched_to=_LONGEST_PERIOD,
                 tried=shortest_tried(known),
                 exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
                 f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",

@@ -9,7 +9,7 @@ from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
 from fmu_observer.observers.generic.adaptive.adaptive_presets import ADAPTIVE_PRESETS
 from plant_models.hybrid import Signal, state
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Sensitivity = Literal["continuous", "sampled"]
@@ -50,7 +50,7 @@ class AdaptivePredictor(AdaptiveObserver):
     def __init__(
         self, model: str | StateAffineModel = "time_varying_oscillator", sensitivity: Sensitivity = "continuous"
     ) -> None:
-        require_choice(self.name, self.option_choices, sensitivity=sensitivity)
+        require_chosen(self.name, self.option_choices, sensitivity=sensitivity)
         super().__init__(model, sensitivity == "sampled", sensitivity=sensitivity)
 
     def kept_signal(self) -> Signal:

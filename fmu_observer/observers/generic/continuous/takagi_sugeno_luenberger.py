@@ -16,7 +16,7 @@ from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, matrix_parameter, measured_inputs
 from plant_models.hybrid import output_signal, state
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Premise = Literal["measured", "estimated"]
@@ -60,7 +60,7 @@ class TakagiSugenoLuenberger(JudgedObserver):
         gains: np.ndarray | None = None,
     ) -> None:
         self.model = chosen = find_takagi_sugeno_model(model)
-        require_choice(self.name, self.option_choices, premise=premise)
+        require_chosen(self.name, self.option_choices, premise=premise)
         self.premise = premise
         n, shape = chosen.order, (chosen.vertices, chosen.order, len(chosen.measurements))
         K = placed_gains(chosen, -SPEED * (1.0 + 0.25 * np.arange(n))) if gains is None else gains

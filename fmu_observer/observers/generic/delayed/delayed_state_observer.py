@@ -35,7 +35,7 @@ from plant_models.hybrid import (
     state,
     vector,
 )
-from plant_models.hybrid.option import require_choice, require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.system import Array
 
 Between = Literal["predicted", "held"]
@@ -107,7 +107,7 @@ class DelayedStateObserver(HighGainSampled):
         chosen = find_model(model)
         require_whole(self.name, 0, _MOST_PREDICTORS, predictors=predictors)
         require_whole(self.name, memory_places=memory_places)
-        require_choice(self.name, self.option_choices, between_samples=between_samples)
+        require_chosen(self.name, self.option_choices, between_samples=between_samples)
         self.predictors, self.memory_places = predictors, memory_places
         self.predicts_output = between_samples == "predicted"
         self.node_of = nodes_of_measurements("delayed_state_observer", chosen, nodes)

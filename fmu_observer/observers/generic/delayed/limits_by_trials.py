@@ -48,7 +48,7 @@ def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any
             ),
         ),
         exact=interval,
-        looked=_LONGEST_INTERVAL,
+        searched_to=_LONGEST_INTERVAL,
         exact_test="spectral radius over a period of the protocol, model linearised at its start",
         trial=trial,
     )

@@ -52,7 +52,7 @@ def steady_condition(
         },
         statement=_statement(model, rank, reached),
         source=source,
-        doubts=(_INACCURATE.format(error=error),) if error > DOUBTED else (),
+        warnings=(_INACCURATE.format(error=error),) if error > DOUBTED else (),
     )
 
 

@@ -32,7 +32,7 @@ from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import matrix_parameter
 from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.missing import is_there
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -121,7 +121,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         if unknown:
             self.model = with_unknown(self.model, unknown)
         self.form: Form = self.forms[0] if form is None else form
-        require_choice(self.name, {"form": self.forms}, form=self.form)
+        require_chosen(self.name, {"form": self.forms}, form=self.form)
         self.arrivals, self.covariances = Arrivals(self.name, self.model, arrival), covariances
         self._declare()
         name = model if isinstance(model, str) else self.model.name

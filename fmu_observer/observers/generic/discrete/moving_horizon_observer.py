@@ -170,7 +170,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
             steady,
             values={**steady.values, "window_rank": observed.rank},
             statement=f"{steady.statement}. {rows}",
-            doubts=(rows,) if observed.unseen.size else (),
+            warnings=(rows,) if observed.unseen.size else (),
         )
 
     @cached_property

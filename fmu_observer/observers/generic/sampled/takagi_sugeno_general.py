@@ -24,7 +24,7 @@ from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, measured_inputs
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Signal, TriggeredEvent, discrete_output, memory, output_signal, parameter, state, vector
-from plant_models.hybrid.option import require_choice
+from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.system import Array
 
 Premise = Literal["estimated", "live", "frozen"]
@@ -76,7 +76,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
         gains: TakagiSugenoGains | None = None,
     ) -> None:
         self.model = chosen = find_takagi_sugeno_model(model)
-        require_choice(self.name, self.option_choices, premise=premise)
+        require_chosen(self.name, self.option_choices, premise=premise)
         if not chosen.sampled:
             raise ValueError(
                 f"{self.name}: model {chosen.name!r} has no sampled measurement; use an observer of continuous ones."

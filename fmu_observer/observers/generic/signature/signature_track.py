@@ -23,7 +23,7 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
-from plant_models.hybrid.option import require_choice, require_whole
+from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.system import Array
 
 Reading = Literal["repaired", "as_published"]
@@ -114,7 +114,7 @@ class SignatureTrack(HybridSystem):
         require_whole(self.name, 2, long_order=long_order, short_order=short_order)
         if short_order > long_order:
             raise ValueError(f"{self.name}: short_order {short_order} is above long_order {long_order}; exchange them.")
-        require_choice(self.name, self.option_choices, next_scaling=next_scaling, reading=reading)
+        require_chosen(self.name, self.option_choices, next_scaling=next_scaling, reading=reading)
         self.orders, self.next_scaling, self.reading = (long_order, short_order), next_scaling, reading
         self.states = (
             memory("samples", "1", 0.0, "The last samples, the oldest first", size=long_order),
