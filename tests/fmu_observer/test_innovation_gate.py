@@ -26,7 +26,7 @@ from fmu_observer.observers.innovation_gate import (
     WARN,
     GateJudgement,
     GateMemory,
-    Told,
+    ReportedPlace,
     gate_limit,
     judge,
 )
@@ -116,7 +116,7 @@ LIMIT = 0.5 + 0.2 + SINCE + 3.0 * 0.4
 
 def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> GateJudgement:
     """The judgement on a position so far from an estimate of 100 m."""
-    return judge(before, Told(100.0 - innovation, 0.2, 100.0, 0.3, 0.0, 10.0)._replace(**told), GATE)
+    return judge(before, ReportedPlace(100.0 - innovation, 0.2, 100.0, 0.3, 0.0, 10.0)._replace(**told), GATE)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -134,7 +134,7 @@ def test_the_limit_is_the_sum_of_its_terms(sign: float) -> None:
 @pytest.mark.parametrize(("share", "granted"), [(0.0, 0.01), (0.005, 0.015), (0.1, 0.05)])
 def test_the_share_of_the_way_is_learnt_within_creep_and_drift(share: float, granted: float) -> None:
     before = SETTLED._replace(share=share, left=0.0, recent=0.0)
-    told = Told(0.0, 0.0, 100.0, 0.0, 10.0, 10.0)
+    told = ReportedPlace(0.0, 0.0, 100.0, 0.0, 10.0, 10.0)
     for change, floor in ((0.0, 0.01), (0.15, 0.03), (-0.15, 0.03), (1.0, 0.05)):  # of the speed [m/s2]
         limit = float(gate_limit(before._replace(last_odometer=10.0 + 10.0 * change), told, GATE))
         assert limit == pytest.approx(0.5 + max(granted, floor) * 40.0)
@@ -193,7 +193,7 @@ def test_doubted_telegrams_agree_by_ways_or_speeds(told: dict[str, float], count
     before = SETTLED._replace(last_position=60.0, last_odometer=90.0)
     first = judged(-100.0, before, odometer=10.0).memory
     assert (float(first.doubted), float(first.last_speed)) == (1.0, 14.0)
-    second = judge(first, Told(accuracy=0.2, bound=0.3, **told), GATE)
+    second = judge(first, ReportedPlace(accuracy=0.2, bound=0.3, **told), GATE)
     believed = count == 2.0
     assert (float(second.restart), float(second.used)) == (believed, believed)
     assert float(second.memory.doubted) == (0.0 if believed else count)
@@ -233,7 +233,7 @@ def test_no_gate_stays_shut(seed: int, accuracy: float) -> None:
         place, t, speed = place + spacing, t + spacing / (0.5 * (speed + new)), new
         off = float(rng.uniform(-1.0, 1.0)) * (accuracy + 0.5)
         estimate, odometer = float(rng.normal() * 1e4), float(rng.uniform(0.0, 60.0))
-        found = judge(memory, Told(place + off, accuracy, estimate, 0.0, odometer, t), GATE)
+        found = judge(memory, ReportedPlace(place + off, accuracy, estimate, 0.0, odometer, t), GATE)
         memory, shut = found.memory, 0 if float(found.used) > 0.0 else shut + 1
         assert shut <= 2 or number == shut - 1 == 2
 
