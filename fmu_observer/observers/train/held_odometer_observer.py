@@ -271,9 +271,9 @@ class HeldOdometerObserver(TrainObserver):
                 "integrated_bound": known_accuracy(u.balise_location_accuracy),
                 "last_innovation": x.estimated_position - u.balise_position,
             }
-        return self._sampled(t, x, u, p)
+        return self._at_sample(t, x, u, p)
 
-    def _sampled(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+    def _at_sample(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What a sample of the odometer changes."""
         first, speed = 1.0 - x.sampled_once, x.estimated_speed
         d_now, rate_now = x.estimated_disturbance, x.estimated_disturbance_rate
