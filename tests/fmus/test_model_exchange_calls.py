@@ -336,7 +336,6 @@ def _continued(one: Exchange, next_time: float) -> np.ndarray:
     return importer.run.values()
 
 
-@pytest.mark.each_kind
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_restored_state_continues_identically(
     name: str, version: int, exchange: Callable[..., Exchange], reference: Callable[[str], Any]
