@@ -19,7 +19,9 @@ from plant_models.disk_cache.files import file_digest
 ROOT = Path(__file__).parents[1]
 TIMES = Path(__file__).with_name("measured_times.json")
 FOLLOWS = Path(__file__).with_name("measured_follows.json")
-"""Of each sheet, page and tutorial the digest of what it followed from when it last ran, and what that is."""
+"""Of each sheet, page and tutorial the digest of what it followed from when it last ran, and what that is, by its place
+among the names that stand first.
+"""
 FOLLOWS_FROM = "follows from"
 """Property of a test that repeats something: folders of modules and files of the project that it loaded."""
 LIMIT = 0.7
@@ -78,8 +80,10 @@ def write_times(spent: Mapping[str, float]) -> None:
 
 def write_follows(entries: Mapping[str, Iterable[str]]) -> None:
     """Note for tests what they followed from: see `has_changed`."""
-    found = {name: [digest(sorted(set(what))), *sorted(set(what))] for name, what in entries.items()}
-    _write(FOLLOWS, {**_follows(), **found})
+    found = _follows() | {name: (digest(sorted(set(what))), sorted(set(what))) for name, what in entries.items()}
+    names = sorted({name for _, what in found.values() for name in what})
+    place = {name: k for k, name in enumerate(names)}
+    _write(FOLLOWS, {"": names} | {name: [seen, *(place[w] for w in what)] for name, (seen, what) in found.items()})
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -92,14 +96,16 @@ def _write(path: Path, content: Mapping[str, object]) -> None:
 
 
 @cache
-def _follows() -> Mapping[str, list[str]]:
-    return _read(FOLLOWS)
+def _follows() -> dict[str, tuple[str, list[str]]]:
+    content = _read(FOLLOWS)
+    names = content.pop("", [])
+    return {name: (seen, [names[k] for k in places]) for name, (seen, *places) in content.items()}
 
 
 def has_changed(name: str) -> bool:
     """Whether what a test follows from is no longer what it was when the test last ran, or is not known."""
-    found, *what = _follows().get(name, [""])
-    return found != digest(what)
+    seen, what = _follows().get(name, ("", []))
+    return seen != digest(what)
 
 
 def digest(names: Iterable[str]) -> str:
