@@ -151,9 +151,15 @@ def processor_time() -> float:
     return times.user + times.system + times.children_user + times.children_system + sum(ELSEWHERE)
 
 
-def pytest_collection_finish() -> None:
-    """Tests and modules stay to the end: no collection of garbage needs to look at them again."""
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[object]:
+    """Tests and modules stay to the end: no collection of garbage needs to look at them, now or later."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
