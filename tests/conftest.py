@@ -68,11 +68,6 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault(SEED, tiers.change())
 
 
-def pytest_report_header(config: pytest.Config) -> str | None:
-    """With this the same sample is drawn again."""
-    return f"sample drawn by {SEED}={os.environ[SEED]}" if "sample" in config.option.markexpr else None
-
-
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """In the first tier, leave aside the files that say that they belong to the second: what they import, packages of
     others most of all, is not loaded and need not be there.
@@ -120,8 +115,10 @@ def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """In continuous integration, tell which files cost most: processor time says it, however busy the machine is. Where
-    it is asked for, write what the tiers follow from.
+    it is asked for, write what the tiers follow from. With what drew a sample the same one is drawn again.
     """
+    if "sample" in config.option.markexpr:
+        terminalreporter.write_line(f"sample drawn by {SEED}={os.environ[SEED]}")
     stats = terminalreporter.stats
     found = {r.nodeid: (dict(r.user_properties), r.keywords) for r in stats.get("", [])}
     if config.option.measure:
