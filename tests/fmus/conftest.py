@@ -284,18 +284,28 @@ OF_EACH_KIND = {
     for name in sorted(SHIPPED, key=lambda name: make_system(name).state_count, reverse=True)
 }
 """Of each kind the shipped system of the fewest states. The runtime in C is one for all, so the first tier builds these
-and the small systems of this file; the second tier builds every system that ships, as FMI 2.0 too.
+and the small systems of this file; the second tier builds every system that ships as FMI 3.0, and these as FMI 2.0 too.
 """
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Shipped systems that are none of `OF_EACH_KIND` belong to the second tier, and all of them as FMI 2.0."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Shipped systems that are none of `OF_EACH_KIND` belong to the second tier. Leave them out in FMI 2.0, which
+    belongs there too, and in laws of ``each_kind``.
+    """
     kinds = set(OF_EACH_KIND.values())
+    beside = set()
     for item in items:
         names = _shipped(item)
-        if names and (not names & kinds or item.callspec.params.get("version") == 2):  # type: ignore[attr-defined]
+        as_fmi2 = names and item.callspec.params.get("version") == 2  # type: ignore[attr-defined]
+        other = names and not names & kinds
+        if other and (as_fmi2 or item.get_closest_marker("each_kind")):
+            beside.add(item)
+        elif as_fmi2 or other:
             item.add_marker(pytest.mark.slow)
+    if beside:
+        config.hook.pytest_deselected(items=list(beside))
+        items[:] = [item for item in items if item not in beside]
 
 
 def _shipped(item: pytest.Item) -> set[str]:

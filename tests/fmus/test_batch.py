@@ -77,6 +77,7 @@ def _starts(signals: Any) -> list[float]:
     return [float(v) for s in signals for v in (s.start if isinstance(s.start, tuple) else [s.start] * s.width)]
 
 
+@pytest.mark.each_kind
 def test_a_member_is_the_fmu_alone(system_name: str, system: HybridSystem, component: Callable[..., Any]) -> None:
     case = Case(system)
     together = case.run([0, 1, 2])

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.compiler
 
 
 @pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.each_kind
 @pytest.mark.parametrize("name", list(RECIPES))
 def test_a_shipped_fmu_passes_clean(name: str, version: Any) -> None:
     report = check_fmu(cached_fmu(recipe(name), version))

@@ -81,6 +81,7 @@ def _values_at(one: Exchange, unknowns: list[str], values: dict[str, float], sta
     return one.get(*unknowns)
 
 
+@pytest.mark.each_kind
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_they_are_the_limits_of_central_differences(
     name: str, version: int, exchange: Callable[..., Exchange], reference: Callable[[str], Any]
@@ -123,6 +124,7 @@ def _terms(system: HybridSystem) -> float:
     return 100.0 if system.name in RECIPES else 1.0
 
 
+@pytest.mark.each_kind
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_every_known_has_the_column_of_the_jacobian(
     name: str, version: int, exchange: Callable[..., Exchange], reference: Callable[[str], Any]

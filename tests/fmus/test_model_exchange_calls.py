@@ -336,6 +336,7 @@ def _continued(one: Exchange, next_time: float) -> np.ndarray:
     return importer.run.values()
 
 
+@pytest.mark.each_kind
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_restored_state_continues_identically(
     name: str, version: int, exchange: Callable[..., Exchange], reference: Callable[[str], Any]
@@ -357,7 +358,7 @@ OTHER_PROCESS = """
 import sys
 from pathlib import Path
 import numpy as np
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [sys.argv[1], str(Path(sys.argv[1]).parent)]
 from exchange_importer import Exchange
 from test_model_exchange_calls import _continued
 one = Exchange(Path(sys.argv[2]), Path(sys.argv[3]))

@@ -147,6 +147,7 @@ ROUGH = {"differentiator_cdo": 2e-3, "levant_differentiator": 2e-3, "filtering_d
 """Relative: internal steps of differentiators are of order 1; 1e-7 m of elongation are 0.25 N of 14 kN in a coupler."""
 
 
+@pytest.mark.each_kind
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_fmpy_simulates_it_in_model_exchange(name: str, version: int, reference: Callable[[str], Any]) -> None:
     system = reference(name).system
