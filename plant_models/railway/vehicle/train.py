@@ -328,6 +328,6 @@ def _check(wagons: int, axles: int, effort_per_axle: bool, adhesion: str, delay_
         raise ValueError(f"train: the locomotive has 4 axles, or 1 that stands for all; got axles = {axles!r}.")
     if not isinstance(effort_per_axle, bool):
         raise ValueError(f"train: effort_per_axle must be true or false, got {effort_per_axle!r}.")
-    require_chosen("train", {"adhesion": ADHESION_LAWS}, adhesion=adhesion)
+    require_chosen("train", Train.option_choices, adhesion=adhesion)
     if not isinstance(delay_samples, int) or delay_samples < 1:
         raise ValueError(f"train: delay_samples must be a whole number, 1 at least, got {delay_samples!r}.")
