@@ -30,16 +30,7 @@ def check_expectations(
             be judged; one line for each expectation at fault.
     """
     faults, items = [], []
-    before = Before(
-        start=table.start,
-        stop=table.stop,
-        period=table.step * table.master.record_every,
-        report=table.report,
-        tables=table.components,
-        components=components,
-        receivers=None if table.balises is None else receivers,
-        certificates=table.certificates,
-    )
+    before = _before(table, components, receivers)
     for place, item in enumerate(table.expect, start=1):
         title = f" ({item.name})" if item.name else ""
         try:
@@ -49,3 +40,16 @@ def check_expectations(
     if faults:
         raise ScenarioError("\n".join(faults))
     return table.model_copy(update={"expect": items})
+
+
+def _before(table: ScenarioTable, components: Mapping[str, Component], receivers: Sequence[str]) -> Before:
+    return Before(
+        start=table.start,
+        stop=table.stop,
+        period=table.step * table.master.record_every,
+        report=table.report,
+        tables=table.components,
+        components=components,
+        receivers=None if table.balises is None else receivers,
+        certificates=table.certificates,
+    )

@@ -18,6 +18,10 @@ WALKING = 1.0
 """Who is certified for the gaps of a train at this speed [m/s] is certified for all that a moving train meets."""
 DETECTORS = "fmu_observer.detection."
 """Room of the models that correct no state by a gain, so that there is nothing to certify."""
+UNKNOWN = (
+    "{}: not known before the run whether it stays stable over the gaps between its samples: an FMU, or a model "
+    "without a method certify, does not say. Watch its errors."
+)
 ROUNDING = 1e-9  # relative, of distances between positions
 ASKED_FOR_LIMITS_ONLY = 0.5
 """A gap to ask for [s] where only the limits of a certificate are of interest; they do not depend on it."""
@@ -49,10 +53,7 @@ def check_certificates(
         if type(system).__module__.startswith(DETECTORS):
             continue  # it has no gain that a gap could make unstable
         if not hasattr(system, "certify"):
-            warnings.append(
-                f"{name}: not known before the run whether it stays stable over the gaps between its samples: an FMU, "
-                f"or a model without a method certify, does not say. Watch its errors."
-            )
+            warnings.append(UNKNOWN.format(name))
             continue
         certificates[name], doubt = _known_judgement(name, table, system, gap)
         warnings += [*doubt, *_other_spacing(name, table, system, gap)]

@@ -19,7 +19,7 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.run.backends import FAULTS, Request, Tell, cannot_build, realise
+from cosim.run.backends import FAULTS, Realised, Request, Tell, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.paths import absolute, move_option_files
 from cosim.scenario.scenario_tables import Backend, ComponentTable
@@ -126,32 +126,39 @@ def component_factories(
     """
     places = {name: f"{where}: components.{name}" for name in tables}
     systems = {name: system for name in tables if (system := make_system(tables[name], places[name])) is not None}
-    requests = {
-        name: Request(tables[name], _lasting(tables[name], system), places[name]) for name, system in systems.items()
-    }
-    made = realise(requests, tell)
+    made = realise({n: Request(tables[n], _lasting(tables[n], s), places[n]) for n, s in systems.items()}, tell)
     factories: dict[str, Callable[[], Component]] = {}
     for name, table in tables.items():
         if table.recording is not None:
             recording = open_recording(name, table, folder, places[name], span)
             factories[name] = partial(RecordingComponent, name, recording)
             made.notes += left_out_note(name, recording)
-        elif table.filter is not None:
-            factories[name] = partial(filter_component, name, table, folder, places[name])
-        elif name not in systems and table.fmu is None:
-            factories[name] = partial(python_component, name, table, places[name])
-        elif name in made.files:
-            factories[name] = partial(load_shipped, made.files[name], name)
         elif name in systems:
-            factories[name] = partial(
-                load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table)
-            )
+            factories[name] = _of_system(name, table, systems[name], made)
         else:
-            told = tolerance if table.tolerance is None else table.tolerance
-            factories[name] = partial(load_fmu, (folder / str(table.fmu)).resolve(), name, told)
+            factories[name] = _of_file(name, table, folder, places[name], tolerance)
         if table.can_be_missing:
             factories[name] = partial(_declared, factories[name], table.can_be_missing, places[name])
     return factories, made.notes
+
+
+def _of_system(name: str, table: ComponentTable, system: HybridSystem, made: Realised) -> Callable[[], Component]:
+    """Makes a shipped model: its FMU where there is one, else a block."""
+    if name in made.files:
+        return partial(load_shipped, made.files[name], name)
+    return partial(load_block, system, name, _version(made.kinds[name]), **_block_arguments(table))
+
+
+def _of_file(
+    name: str, table: ComponentTable, folder: Path, where: str, tolerance: float | str | None
+) -> Callable[[], Component]:
+    """Makes a component of an FMU by path, of a filter over one, or of plain Python."""
+    if table.filter is not None:
+        return partial(filter_component, name, table, folder, where)
+    if table.fmu is None:
+        return partial(python_component, name, table, where)
+    chosen = tolerance if table.tolerance is None else table.tolerance
+    return partial(load_fmu, (folder / table.fmu).resolve(), name, chosen)
 
 
 def _declared(factory: Callable[[], Component], missing: Sequence[str], where: str) -> Component:

@@ -42,25 +42,26 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
             )
     try:
         if table.layout == "aperiodic":
-            gaps = {
-                k: getattr(table, k)
-                for k in ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")
-            }
-            return aperiodic(stop, table.seed, start=start, **gaps)
+            keys = ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")
+            return aperiodic(stop, table.seed, start=start, **{key: getattr(table, key) for key in keys})
         if table.layout == "instants":
             return InstantLayout(np.array(table.instants, dtype=float))
         if table.layout == "recorded":
             return _recorded(table, start, folder)
-        layout = _track_layout(table, folder)
-        known = [b.identity for b in layout.balises]
-        for identity in table.missed:
-            if identity not in known:
-                raise ScenarioError(f"missed: no balise {identity!r}; {nearest(identity, known)}")
-        if table.track_end is not None:
-            layout.check_within(table.track_start, table.track_end)
-        return layout
+        return _checked(_track_layout(table, folder), table)
     except ScenarioError as error:
         raise ScenarioError(f"{where}: balises: {error}") from error
+
+
+def _checked(layout: TrackLayout, table: BalisesTable) -> TrackLayout:
+    """The layout, once the balises that are missed are known to be in it, and all of it on the track."""
+    known = [b.identity for b in layout.balises]
+    for identity in table.missed:
+        if identity not in known:
+            raise ScenarioError(f"missed: no balise {identity!r}; {nearest(identity, known)}")
+    if table.track_end is not None:
+        layout.check_within(table.track_start, table.track_end)
+    return layout
 
 
 def _recorded(table: BalisesTable, start: float, folder: Path) -> RecordedLayout:

@@ -51,19 +51,19 @@ def single_tables(
     table: dict[str, Any] = {"fmu": str(path.resolve())}
     tables: dict[str, Any] = {"title": where, "start": begin, "stop": end, "step": length, "components": {name: table}}
     values = dict(parameters)
-    doubts: list[str] = []
+    warnings: list[str] = []
     if isinstance(inputs, Mapping):
         _check_inputs(inputs, component, where)
         values |= inputs
     elif inputs is not None:
         source, said = Path(inputs).resolve(), {} if interpolation is None else {"interpolation": interpolation}
-        tables["connections"], doubts = _matches(source, component, where)
+        tables["connections"], warnings = _matches(source, component, where)
         tables["components"] = {SOURCE: {"recording": str(source)} | said, **tables["components"]}
     if values:
         table["parameters"] = values
     if record:
         table["record"] = list(record)
-    return tables, doubts
+    return tables, warnings
 
 
 def run_times(
@@ -121,7 +121,7 @@ def _matches(source: Path, component: Component, where: str) -> tuple[list[str],
             f"{source.name}: no column is named as an input of {where}. Columns: {', '.join(columns) or 'none'}; "
             f"inputs: {', '.join(sorted(inputs)) or 'none'}."
         )
-    doubts = (
+    warnings = (
         [f"{source.name}: columns that are no inputs of {where} are not used: {', '.join(unused)}."] if unused else []
     )
-    return [f"{SOURCE}.{name} -> {component.name}.{name}" for name in used], doubts
+    return [f"{SOURCE}.{name} -> {component.name}.{name}" for name in used], warnings

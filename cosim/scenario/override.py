@@ -31,22 +31,14 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
     Raises:
         ScenarioError: there is no such component, table or case.
     """
-    head, dot, rest = name.partition(".")
     if name == CASE:
         for key, entry in case_values(tables, value).items():
             override(tables, key, entry)
         return (name,)
-    if not dot:
+    if "." not in name:
         tables[name] = value
         return (name,)
-    components = tables.get("components")
-    if isinstance(components, dict) and head in components:
-        keys = ("components", head, *_component_key(rest))
-    elif head in TABLES:
-        keys = (head, *rest.split("."))
-    else:
-        known = [*(components or ()), *TABLES]
-        raise ScenarioError(f"cannot set {name!r}: no component {head!r}; {nearest(head, known)}")
+    keys = _keys(tables, name)
     node = tables
     for key in keys[:-1]:
         node = node.setdefault(key, {})
@@ -54,6 +46,18 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
             raise ScenarioError(f"cannot set {name!r}: {key!r} is no table.")
     node[keys[-1]] = value
     return keys
+
+
+def _keys(tables: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    """The path of keys that a name with a dot means."""
+    head, _, rest = name.partition(".")
+    components = tables.get("components")
+    if isinstance(components, dict) and head in components:
+        return ("components", head, *_component_key(rest))
+    if head in TABLES:
+        return (head, *rest.split("."))
+    known = [*(components or ()), *TABLES]
+    raise ScenarioError(f"cannot set {name!r}: no component {head!r}; {nearest(head, known)}")
 
 
 def case_values(tables: Mapping[str, Any], case: Any) -> dict[str, Any]:
