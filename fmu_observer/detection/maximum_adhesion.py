@@ -10,30 +10,9 @@ import numpy as np
 from plant_models.railway.adhesion.polach import POLACH_DRY, POLACH_WET, PolachCurve
 
 KMH = 3.6  # km/h in one m/s
-MAP_SPEEDS = tuple(
-    v / KMH
-    for v in (
-        1.0,
-        2.0,
-        3.0,
-        4.0,
-        5.0,
-        6.0,
-        8.0,
-        10.0,
-        12.5,
-        15.0,
-        20.0,
-        25.0,
-        30.0,
-        40.0,
-        50.0,
-        60.0,
-        80.0,
-        110.0,
-        160.0,
-    )
-)  # [m/s], from the lowest the thesis shows, and lower, to the speed limit of its line
+_MAP_KMH = (1, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 20, 25, 30, 40, 50, 60, 80, 110, 160)
+MAP_SPEEDS = tuple(v / KMH for v in _MAP_KMH)
+"""[m/s], from the lowest the thesis shows, and lower, to the speed limit of its line."""
 
 
 @dataclass(frozen=True)

@@ -180,11 +180,9 @@ def _error_model(adaptation: GainAdaptation) -> str:
     learnt = ", the gain set by a spacing learnt within the same range" if a.learnt else ""
     return (
         "position and speed error in units of the gain in force, for every change of gain that a train can cause whose "
-        "speed is "
-        f"never below {far:g} m divided by the longest gap and whose acceleration stays within "
+        f"speed is never below {far:g} m divided by the longest gap and whose acceleration stays within "
         f"{a.acceleration:g} m/s2, with balises "
         f"every {a.spacing:g} m within {100.0 * a.spacing_tolerance:g} % and a speed known within "
         f"{100.0 * a.speed_tolerance:g} %{learnt}; drag slope of 0 to {TOP_SPEED:g} m/s, constant over a gap; "
-        f"standstill and the "
-        "error of the adhesion force, an input to it, are left out"
+        f"standstill and the error of the adhesion force, an input to it, are left out"
     )

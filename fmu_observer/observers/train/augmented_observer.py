@@ -199,8 +199,7 @@ class AugmentedTrainObserver(TrainObserver):
         model = (
             "four-state error of position, speed, unknown acceleration and its rate, drag slopes at their extremes, "
             "constant over a gap; the second derivative of the unknown acceleration and the error of the traction, "
-            "inputs to it, "
-            "and standstill are left out"
+            "inputs to it, and standstill are left out"
         )
         errors = self._errors_of(used[0], p)
         certificate = certify_sampled_error(errors, max_gap, f"{model}; corrected by '{used[0]}' samples")

@@ -102,8 +102,7 @@ class DiscreteUio(TrainObserver):
             f"six-state error of the observer's own linear model (drag slope at {float(p.linearisation_speed):.4g} "
             f"m/s) with "
             "odometer samples at their period and the balise at any phase between them; the difference of the true "
-            "drag, an "
-            "input to it, and the constant resistance near standstill are left out"
+            "drag, an input to it, and the constant resistance near standstill are left out"
         )
         return certify_two_rate_error(error, max_gap, model)
 

@@ -157,8 +157,7 @@ class TakagiSugenoCdo(TrainObserver):
         )
         model = (
             f"position and speed error at both vertices ({slowest:g} and {fastest:g} m/s) and three mixtures, weights "
-            f"{changes}; "
-            "standstill, slip and the neglected wheel inertia, the latter inputs to it, are left out"
+            f"{changes}; standstill, slip and the neglected wheel inertia, the latter inputs to it, are left out"
         )
         return certify_sampled_error(vertices, max_gap, model, switching=not frozen)
 
@@ -173,8 +172,7 @@ class TakagiSugenoCdo(TrainObserver):
         position, speed = gains["balise_gain_position"], gains["balise_gain_speed"]
         return (
             f"innovation_decay = balise_gain_position = {position:g}, balise_gain_speed = {speed:g} and odometer gains "
-            f"of 0 are "
-            f"certified for {max_gap:.3g} s"
+            f"of 0 are certified for {max_gap:.3g} s"
         )
 
     def _error_at(self, h: float, p: Any) -> SampledError:

@@ -166,8 +166,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
         if model.phi is not None or self.hidden < 1 or not np.array_equal(model.C, np.eye(model.order)[self.hidden :]):
             raise ValueError(
                 f"{self.name} does not suit the model {model.name!r}: it must be linear (no phi) with its last states "
-                f"measured, "
-                f"in their order, and at least one state before them; got C = {model.C.tolist()}."
+                f"measured, in their order, and at least one state before them; got C = {model.C.tolist()}."
             )
         require_whole(f"{self.name}, one of {q} measurement(s) at least being sampled", 0, q - 1, continuous=continuous)
 

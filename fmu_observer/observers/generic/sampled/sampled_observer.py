@@ -153,9 +153,7 @@ def check_chain(model: ObserverModel, who: str) -> int:
     if not fits:
         raise ValueError(
             f"{who} does not suit the model {model.name!r}: it needs A the block shift matrix and C = [I 0], each "
-            f"state the "
-            f"derivative of the one before and the first block measured; got A = {model.A.tolist()}, C = "
-            f"{model.C.tolist()}. "
-            "Put the rest into phi."
+            f"state the derivative of the one before and the first block measured; got A = {model.A.tolist()}, C = "
+            f"{model.C.tolist()}. Put the rest into phi."
         )
     return q

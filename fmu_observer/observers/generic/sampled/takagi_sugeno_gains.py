@@ -51,8 +51,7 @@ class TakagiSugenoGains:
                 got = f"shape {array.shape}" if np.all(np.isfinite(array)) else "numbers that are not finite"
                 raise ValueError(
                     f"{name} of model {model.name!r} has {got}, expected finite numbers of shape {shape}: vertices, "
-                    f"states, "
-                    "measurements."
+                    f"states, measurements."
                 )
             if measured:
                 values[name] = tuple(map(float, array.ravel()))

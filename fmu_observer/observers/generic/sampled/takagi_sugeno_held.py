@@ -153,8 +153,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
                 "tolerated_slope": max(0.0, 0.5 * margin / largest) if margin > 0.0 else 0.0,
             },
             statement="one P > 0 decreases for all A_i - L_i C (margin > 0) and an unknown f with |f| <= "
-            "tolerated_slope |e|; "
-            "gaps are judged by certify()",
+            "tolerated_slope |e|; gaps are judged by certify()",
             source=self.source,
         )
 
@@ -172,8 +171,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
         )
         model = (
             f"error equations of the Takagi-Sugeno model {self.model.name!r} at its vertices and mixtures of every "
-            f"two, weights "
-            f"constant over a gap; {self.premise_remark()}, disturbances and noise are left out"
+            f"two, weights constant over a gap; {self.premise_remark()}, disturbances and noise are left out"
         )
         certificate = certify_sampled_error(vertices, max_gap, model)
         return certificate if self.weight_memory() else with_switching_noted(certificate, vertices, "weights")
