@@ -67,7 +67,7 @@ class Declarations:
         self.events = tuple(
             replace(e, payload=marked(e.payload)) if isinstance(e, TriggeredEvent) else e for e in self.events
         )
-        self._sampled = {s.name: s for s in self.input_signals if s.name in names}
+        self._sample_signals = {s.name: s for s in self.input_signals if s.name in names}
 
     @cached_property
     def continuous_count(self) -> int:

@@ -162,7 +162,7 @@ class HybridSystem(Declarations):
             return self._jumped(event, t, x, given, unpacked)
         count, sampled = self.state_count - 1, self._sampling.get(event)
         names = () if sampled is None else sampled.samples
-        values = [value for name in names for value in self._sampled[name].entries(getattr(given, name))]
+        values = [value for name in names for value in self._sample_signals[name].entries(getattr(given, name))]
         lacking = sum(1.0 - is_there(value) for value in values)
         whole = sampled is not None and not sampled.leaves_out
         if whole:

@@ -148,7 +148,7 @@ def _solved(problem: _Problem) -> np.ndarray:
     found = problem.guess
     if not found.size:
         return found
-    found = scipy.optimize.root(problem.residual, found, jac=problem.slope, tol=1e-13).x
+    found = np.asarray(scipy.optimize.root(problem.residual, found, jac=problem.slope, tol=1e-13).x)
     _check_found(problem, found)
     return found
 
