@@ -14,8 +14,8 @@ from cosim.run.coupled import Coupled, couple
 from cosim.run.loaded_components import LoadedComponents, load_components
 from cosim.run.network_remarks import network_warnings
 from cosim.run.remarks import Remarks
-from cosim.run.schedule import StepSchedule, make_schedule
 from cosim.run.starts import all_start_values
+from cosim.run.step_schedule import StepSchedule, make_schedule
 from cosim.run.task import RunTask
 
 

@@ -14,8 +14,8 @@ from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled
 from cosim.run.layouts import Layout, make_layout
 from cosim.run.remarks import Remarks
-from cosim.run.schedule import idle_settings
 from cosim.run.signal_roles import check_roles, inferred_roles, with_roles
+from cosim.run.step_schedule import idle_settings
 from cosim.run.task import RunTask
 
 

@@ -16,8 +16,8 @@ from cosim.run.coupled import Coupled, couple
 from cosim.run.described_components import describe_component
 from cosim.run.movement import movement_chains
 from cosim.run.network import Network
-from cosim.run.schedule import stepping_groups
 from cosim.run.starts import given_values
+from cosim.run.step_schedule import stepping_groups
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.inspect import group_index, make_links, make_part, rate_text
