@@ -193,6 +193,7 @@ def test_a_formula_is_told_from_other_code() -> None:
     assert all(" = " in formula for formula in formulae)
 
 
+@pytest.mark.foreign
 def test_a_page_names_every_platform_and_compiler() -> None:
     system = recipe("odometer")
     description = read_model_description(str(cached_fmu(system)))

@@ -87,6 +87,7 @@ def shipped(*, faults: bool = True, turned: bool = False) -> tuple[Outcome, GapE
 
 
 @pytest.mark.compiler
+@pytest.mark.slow
 def test_the_train_passes_every_linked_group_and_stops() -> None:
     outcome, found = shipped()
     assert [event.true_position for event in outcome.result.events] == layout().positions[2:].tolist()
@@ -100,6 +101,7 @@ def test_the_train_passes_every_linked_group_and_stops() -> None:
 
 
 @pytest.mark.compiler
+@pytest.mark.slow
 def test_who_is_certified_for_the_longest_gap() -> None:
     certificates = shipped()[0].result.summary["certificates"]
     assert [name for name, entry in certificates.items() if not entry["holds"]] == ["adaptive_gain_cdo"]
@@ -107,6 +109,7 @@ def test_who_is_certified_for_the_longest_gap() -> None:
 
 
 @pytest.mark.compiler
+@pytest.mark.slow
 def test_jams_cost_their_length_those_who_are_not_told() -> None:
     """Within the gap of 811 m three jams: 0.8 s, 1.2 s and 0.6 of 0.4 s, at speeds that fall by 0.5 m/s2."""
     outcome, found = shipped()
@@ -125,6 +128,7 @@ def test_jams_cost_their_length_those_who_are_not_told() -> None:
 
 
 @pytest.mark.compiler
+@pytest.mark.slow
 def test_faults_of_the_other_sign_are_those_faults() -> None:
     """What the wheel loses in a jam it wins in a skid of that depth: the plain odometer, by hand as above."""
     outcome, found = shipped(turned=True)
@@ -143,6 +147,7 @@ def test_faults_of_the_other_sign_are_those_faults() -> None:
 
 
 @pytest.mark.compiler
+@pytest.mark.slow
 def test_the_tables_of_the_page_are_those_of_the_study() -> None:
     page = (ROOT / "docs" / "amsterdam_utrecht.md").read_text(encoding="utf-8")
     outcome, found = shipped()
@@ -158,6 +163,7 @@ def test_the_tables_of_the_page_are_those_of_the_study() -> None:
 
 
 @pytest.mark.compiler
+@pytest.mark.slow
 def test_the_train_does_not_know_of_the_communication_step() -> None:
     """With driver and wheel at 50 ms; who reads the odometer at instants of its own hears the same."""
     kept = {"driver__every": 5, "wheel__every": 5, "tachometer__every": 5}

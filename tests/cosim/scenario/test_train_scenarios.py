@@ -81,6 +81,7 @@ def sanded(outcome: Outcome, *, controller: bool = True) -> bool:
 # --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_sc1_nothing_slips_on_clear_water() -> None:
     outcome = run("freight_sc1")
     assert beyond(outcome).max() == 0.0
@@ -90,6 +91,7 @@ def test_sc1_nothing_slips_on_clear_water() -> None:
     assert rows(outcome, "anti_slip.effort_share").min() == 1.0
 
 
+@pytest.mark.slow
 def test_sc2_four_axles_spin_together_and_the_command_goes_on_rising() -> None:
     outcome = run("freight_sc2")
     count, time, command = beyond(outcome), rows(outcome, "time"), rows(outcome, "controller.effort")
@@ -101,6 +103,7 @@ def test_sc2_four_axles_spin_together_and_the_command_goes_on_rising() -> None:
     assert rows(outcome, "excessive_slip.exceedance").max() > 0.25  # published: by 25 points
 
 
+@pytest.mark.slow
 def test_sc2_the_device_is_blind_while_all_axles_spin() -> None:
     outcome = run("freight_sc2")
     flagged = np.array([rows(outcome, f"anti_slip.axle_slipping[{k}]") for k in AXLES]).sum(axis=0)
@@ -116,6 +119,7 @@ def largest_slip(outcome: Outcome) -> tuple[float, float]:
     return float(slips.max()), float(rows(outcome, "time")[slips.argmax()])
 
 
+@pytest.mark.slow
 def test_sc3_the_effort_is_cut_and_hardly_any_sand_is_asked_for() -> None:
     """Published is a slip of 16 to 40 % and no sand; over 20 seeds 13 to 25 %, and sand for up to 1.8 s in 5 of
     them.
@@ -138,6 +142,7 @@ def cut(outcome: Outcome) -> float:
     return float(command[(time > 34.0) & (time < 50.0)].max() / command[time <= 30.0].max())
 
 
+@pytest.mark.slow
 def test_sc4_the_command_is_cut_to_less_than_four_fifths() -> None:
     """Median over five seeds: of 24 the cut is to 0.55 to 0.90, above 0.8 in two."""
     scenario = Scenario.load("freight_sc4")
@@ -145,6 +150,7 @@ def test_sc4_the_command_is_cut_to_less_than_four_fifths() -> None:
     assert np.median([cut(outcome) for outcome in (run("freight_sc4"), *runs)]) < 0.8
 
 
+@pytest.mark.slow
 def test_sc4_the_command_is_cut_before_the_slip_is_excessive() -> None:
     """Published is a slip that the command follows; here the controller knows of it within the step: 11 to 17 % over 20
     seeds.
@@ -158,6 +164,7 @@ def test_sc4_the_command_is_cut_before_the_slip_is_excessive() -> None:
     assert not indicated(outcome)
 
 
+@pytest.mark.slow
 def test_estimates_save_nine_tenths_of_the_energy_lost_in_slip_on_the_same_rail() -> None:
     tables = [Scenario.load(name).table().components["train"] for name in ("freight_sc2", "freight_sc3")]
     assert tables[0] == tables[1]
@@ -165,6 +172,7 @@ def test_estimates_save_nine_tenths_of_the_energy_lost_in_slip_on_the_same_rail(
 
 
 @pytest.mark.parametrize("name", WITH_ESTIMATES)
+@pytest.mark.slow
 def test_with_estimates_the_train_stops_as_near_as_the_receiver_knows(name: str) -> None:
     outcome = run(name)
     assert rows(outcome, "train.speed")[-1] == 0.0
@@ -174,6 +182,7 @@ def test_with_estimates_the_train_stops_as_near_as_the_receiver_knows(name: str)
     assert abs(missed + rows(outcome, "receiver.drift")[-1]) < 0.35
 
 
+@pytest.mark.slow
 def test_spinning_wheels_count_a_way_that_the_train_has_not_run() -> None:
     outcome = run("freight_sc2")
     sliding = axles(outcome, "axle_speed")[0] - rows(outcome, "train.speed")
@@ -183,12 +192,14 @@ def test_spinning_wheels_count_a_way_that_the_train_has_not_run() -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
+@pytest.mark.slow
 def test_speed_errors_are_those_of_the_published_size(name: str) -> None:
     # Published 0.14 to 0.33 km/h; 20 seeds of the receiver: 0.17 to 0.25 without, 0.28 to 0.51 in lasting slip.
     errors = [mean_error(run(name), observer) for observer in OBSERVERS]
     assert max(errors) < (0.6 if name == "freight_sc2" else 0.3)
 
 
+@pytest.mark.slow
 def test_in_slip_the_observer_of_the_adhesion_force_is_the_better_one() -> None:
     first, second = (mean_error(run("freight_sc2"), observer) for observer in OBSERVERS)
     # published: 0.33 against 0.15; Takagi-Sugeno takes the effort for the force at the rail
@@ -196,6 +207,7 @@ def test_in_slip_the_observer_of_the_adhesion_force_is_the_better_one() -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
+@pytest.mark.slow
 def test_couplers_are_never_at_risk(name: str) -> None:
     outcome = run(name)
     assert rows(outcome, "coupler_risk.risk").max() == 0.0
@@ -207,6 +219,7 @@ def test_couplers_are_never_at_risk(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
+@pytest.mark.slow
 def test_energy_is_conserved(name: str) -> None:
     outcome = run(name)
     steps = np.diff(rows(outcome, "time"))
@@ -241,6 +254,7 @@ def test_energy_is_conserved(name: str) -> None:
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
+@pytest.mark.slow
 def test_the_observers_know_of_the_indirect_brake(observer: str) -> None:
     outcome = run("freight_sc3")
     braking = (rows(outcome, "controller.brake_demand") > 0.01) & (rows(outcome, "train.speed") > 0.5)
@@ -279,6 +293,7 @@ def test_the_gains_are_certified_for_ten_fixes_a_second(component: str, observer
 
 
 @pytest.mark.parametrize("name", ["freight_sc2", "freight_sc4"])  # one of each controller
+@pytest.mark.slow
 def test_blocks_and_fmus_give_the_same_run(name: str) -> None:
     short = {"stop": 0.6, "mission.departure_time": 0.1}
     native = Scenario.load(name).run(warn=lambda _warning: None, overrides=short)
@@ -297,6 +312,7 @@ def test_blocks_and_fmus_give_the_same_run(name: str) -> None:
 
 
 @BOTH
+@pytest.mark.slow
 def test_read_fixes_count_like_events_at_their_own_stamps(component: str, observer: Any) -> None:
     # The scenarios read the receiver's held output; here a block is told the same fixes as events of FMI 2, by count
     # and stamp.
