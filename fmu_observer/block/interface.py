@@ -64,6 +64,8 @@ def allowed_in(*modes: Mode) -> Callable[[Call[P, R]], Call[P, R]]:
     """
 
     def decorate(function: Call[P, R]) -> Call[P, R]:
+        """The call of this function."""
+
         @wraps(function)
         def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
             try:

@@ -125,7 +125,7 @@ def first_proven(
 
 
 def largest_feasible(feasible: Callable[[float], bool], most: float, smallest: float, bisections: int) -> float | None:
-    """Largest value up to `most` that is feasible, by bisection; None if `smallest` is not."""
+    """Largest value up to `most` that is feasible, by so many bisections; None if `smallest` is not."""
     if feasible(most):
         return most
     return bisected(feasible, smallest, most, bisections)[0] if feasible(smallest) else None

@@ -26,7 +26,7 @@ FmuSlave = FmuSlave2 | FmuSlave3
 def make_slave(
     folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
 ) -> FmuSlave:
-    """A co-simulation instance of an unpacked FMU, not yet instantiated; arguments as for `FmuInstance`.
+    """See `FmuInstance`: one for co-simulation, of the version of its description, not yet instantiated.
 
     Raises:
         SlaveError: the library cannot be loaded.

@@ -175,7 +175,7 @@ def memory(
     shape: tuple[int, int] | None = None,
     symmetric: bool = False,
 ) -> Signal:
-    """A discrete state: constant between events, changes only in jumps; all else as of a `state`."""
+    """See `state`: a discrete one, constant between events, which changes only in jumps."""
     flowing = state(name, unit, start, description, size=size, shape=shape, symmetric=symmetric)
     return replace(flowing, variability="discrete")
 

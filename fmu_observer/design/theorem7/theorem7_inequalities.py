@@ -64,6 +64,9 @@ class Theorem7Problem:
     ) -> Theorem7Problem:
         """The question for a model.
 
+        Args:
+            model: with a sampled measurement. gap: longest [s]. eta: decay [1/s]. options: see `Theorem7Options`.
+
         Raises:
             ValueError: gap, eta or mu is not a legal number, or the scaling is not n positive numbers.
         """

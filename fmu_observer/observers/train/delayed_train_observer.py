@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
@@ -73,14 +73,14 @@ class DelayedTrainObserver(DelayedStateObserver):
         """Balises tell the position, packets the speed."""
         return ("balise", "packet")
 
-    def remembering(self, memory_places: int) -> DelayedTrainObserver:
+    def remembering(self, memory_places: int) -> Self:
         """The same observer with another memory.
 
         Args:
             memory_places: see the class.
         """
         between: Between = "predicted" if self.predicts_output else "held"
-        return DelayedTrainObserver(predictors=self.predictors, memory_places=memory_places, between_samples=between)
+        return type(self)(predictors=self.predictors, memory_places=memory_places, between_samples=between)
 
     def _events(self) -> tuple[Any, ...]:
         position, speed = self.model.measurements

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -336,14 +336,14 @@ class DelayedStateObserver(HighGainSampled):
         packets = packet_limit(self, p, named, bounds)
         return (packets, delay_limit(self, p, named, bounds)) if self.predictors else (packets,)
 
-    def remembering(self, memory_places: int) -> DelayedStateObserver:
+    def remembering(self, memory_places: int) -> Self:
         """The same observer with another memory.
 
         Args:
             memory_places: see the class.
         """
         between: Between = "predicted" if self.predicts_output else "held"
-        return DelayedStateObserver(
+        return type(self)(
             self.model,
             predictors=self.predictors,
             memory_places=memory_places,

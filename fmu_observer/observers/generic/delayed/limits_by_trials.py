@@ -1,22 +1,22 @@
 """How long between two packets, and how late, the delayed-state observer survives: printed, exact and by trials.
 
-It knows the observer by its type only; bounds come from `design.network_bounds`.
+Bounds come from `certificates.printed_bounds.network_bounds`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, Self, cast
 
 import numpy as np
 
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.observer_limits import Limit, PrintedBound, Trial, Varied
 from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, exact_predictor_delay
+from fmu_observer.models.observer_model import ObserverModel
+from fmu_observer.observers.model_observer import ModelObserver
 from fmu_observer.observers.model_trial import WRONG_START, model_trial
-
-if TYPE_CHECKING:
-    from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
 
 _MOST_PLACES = 60  # of a trial
 _LONGEST_INTERVAL = 100.0  # [s] to which the exact limit of the packets is looked for
@@ -24,7 +24,40 @@ _LONGEST_TRIAL = 2.0  # [s] of trials, each predictor its own share
 _THEOREM = "Hann 2014, (2.17)"
 
 
-def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
+class DelayedObserver(Protocol):
+    """What is asked of an observer of late measurements, see `DelayedStateObserver`."""
+
+    model: ObserverModel
+    predictors: int
+    memory_places: int
+
+    @property
+    def turns(self) -> tuple[tuple[int, ...], ...]:
+        """Measurements of each node, from 0: the turns of a round."""
+
+    @property
+    def total_places(self) -> int:
+        """Longest delay in memory periods."""
+
+    @property
+    def prediction_starts(self) -> tuple[float, ...]:
+        """Starts of the predictions, predictor by predictor."""
+
+    @property
+    def node_events(self) -> tuple[str, ...]:
+        """Event of each node in the order of `turns`."""
+
+    def linearised_drift(self) -> np.ndarray:
+        """Jacobian of the model at its start, shape (n, n)."""
+
+    def turned_error(self, drift: np.ndarray, p: Any, turns: Sequence[Sequence[int]]) -> ImpulsiveError:
+        """Error from packet to packet; drift of shape (n, n), p as in `HybridSystem.flow`, turns of a round."""
+
+    def remembering(self, memory_places: int) -> Self:
+        """The same observer with memory_places of memory."""
+
+
+def packet_limit(observer: DelayedObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
     """Longest interval of the packets: (2.17), the spectral radius over a period of the protocol, trials.
 
     Args:
@@ -54,7 +87,7 @@ def packet_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any
     )
 
 
-def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
+def delay_limit(observer: DelayedObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
     """Longest delay of an observer with predictors: (2.17) and (2.59), the roots of the linearised model, trials.
 
     Args:
@@ -88,19 +121,19 @@ def delay_limit(observer: DelayedStateObserver, p: Any, named: Mapping[str, Any]
     )
 
 
-def _interval(observer: DelayedStateObserver, p: Any) -> float:
+def _interval(observer: DelayedObserver, p: Any) -> float:
     """First interval between packets at which the error grows from round to round [s]."""
     return first_unstable_gap(
         [observer.turned_error(observer.linearised_drift(), p, observer.turns)], _LONGEST_INTERVAL
     )
 
 
-def _trial(
-    observer: DelayedStateObserver, what: Varied, high: float, named: Mapping[str, Any], **settings: Any
-) -> Trial:
+def _trial(observer: DelayedObserver, what: Varied, high: float, named: Mapping[str, Any], **settings: Any) -> Trial:
     settings |= {"nodes": _nodes(observer), "node_events": observer.node_events}
-    return model_trial(observer, what, high / 50.0, high, named, delay_parameter="delay", **settings)
+    return model_trial(
+        cast(ModelObserver, observer), what, high / 50.0, high, named, delay_parameter="delay", **settings
+    )
 
 
-def _nodes(observer: DelayedStateObserver) -> int:
+def _nodes(observer: DelayedObserver) -> int:
     return len(observer.turns) if len(observer.turns) > 1 else 0
