@@ -171,14 +171,14 @@ class BlockVariables:
         return self.check_settable(reference, self.readable(reference), mode)
 
     def all_readable(self, references: Sequence[int]) -> list[Place]:
-        """The places of real variables, looked up once for each list of them; raises as `readable`."""
+        """The places of the real variables of these references, looked up once for each list; raises as `readable`."""
         key = tuple(references), None
         if key not in self._listed:
             self._listed[key] = [self.readable(reference) for reference in references]
         return self._listed[key]
 
     def all_settable(self, references: Sequence[int], mode: Mode) -> list[Place]:
-        """The places of real variables that may all be set in this mode, looked up once; raises as `settable`."""
+        """The places of the variables of these references, all to be set in this mode, looked up once; see `settable`."""
         key = tuple(references), mode
         if key not in self._listed:
             self._listed[key] = [self.settable(reference, mode) for reference in references]

@@ -31,11 +31,9 @@ def module_name(path: Path) -> str:
 
 
 def imports(node: ast.AST, hidden: bool = False) -> Iterator[Import]:
-    """All imports but those for type checkers; an expression holds none."""
+    """All imports, those for type checkers too; an expression holds none."""
     for child in ast.iter_child_nodes(node):
         if not isinstance(child, HOLDERS):
-            continue
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
             continue
         if isinstance(child, ast.Import):
             yield Import(tuple(alias.name for alias in child.names), hidden, child.lineno)
