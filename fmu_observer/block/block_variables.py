@@ -178,7 +178,7 @@ class BlockVariables:
         return self._listed[key]
 
     def all_settable(self, references: Sequence[int], mode: Mode) -> list[Place]:
-        """The places of the variables of these references, all to be set in this mode, see `settable`; looked up once."""
+        """The places of the variables of these references, all to be set in this mode; see `settable`."""
         key = tuple(references), mode
         if key not in self._listed:
             self._listed[key] = [self.settable(reference, mode) for reference in references]
