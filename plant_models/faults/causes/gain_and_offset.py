@@ -84,6 +84,8 @@ class GainAndOffset(TimedFaults):
         """Share of fault i that acts now [1]."""
         since, end = t - p.fault_onset[i], p.fault_rise[i] + p.fault_length[i]
         risen, falls = passed[2 * self.count + i], passed[3 * self.count + i]
-        rising = np.where(risen > 0.0, 1.0, since / np.maximum(p.fault_rise[i], 1e-300))
-        falling = np.where(falls > 0.0, 1.0 - (since - end) / np.maximum(p.fault_fall[i], 1e-300), 1.0)
+        # Where nothing rises or falls the quotient is not used, and its derivative is finite.
+        rise, fall = (np.where(duration > 0.0, duration, 1.0) for duration in (p.fault_rise[i], p.fault_fall[i]))
+        rising = np.where(risen > 0.0, 1.0, since / rise)
+        falling = np.where(falls > 0.0, 1.0 - (since - end) / fall, 1.0)
         return self.window(i, passed) * np.minimum(rising, falling)
