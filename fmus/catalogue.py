@@ -18,8 +18,8 @@ from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.files import file_digest
+from plant_models.explained_error import explained
 from plant_models.registry import Registry, RegistryError
-from plant_models.user_file import explained
 
 PACKAGES = ("plant_models", "fmu_observer")
 _READERS = ("catalogue.py", "recipes.py")

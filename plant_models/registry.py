@@ -20,6 +20,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
+from plant_models.explained_error import explained
+
 T = TypeVar("T")
 LOG = logging.getLogger("plant_models")
 
@@ -135,8 +137,8 @@ class Registry(MutableMapping[str, T], Generic[T]):
         member, *others = self.members[name]
         if others:
             raise RegistryError(
-                f"the {self.kind} name {name!r} is taken twice, by {self.origin(name)}; uninstall one of them, or use "
-                "file.py:Class or package.module:Class in place of the name."
+                f"the {self.kind} name {name!r} is taken twice, by {self.origin(name)}; rename or uninstall one of "
+                "them, or use file.py:Class or package.module:Class in place of the name."
             )
         loaded: T = _load(member, self.kind, self.base)
         return loaded
@@ -313,15 +315,11 @@ def _require_whole(found: Any, what: str) -> None:
 
 def _load(member: Member, kind: str, base: str) -> Any:
     what = f"the {kind} {member.name!r} of {member.origin}"
-    if member.room:
-        found = load(member.target)
-        _require_whole(found, what)
-        return found
     try:
         found = load(member.target)
-    except (Exception, SystemExit) as error:  # whatever the code of others raises while it is imported
-        raise RegistryError(f"{what} cannot be loaded: {type(error).__name__}: {error}") from error
-    if not _is_member(found, base):
+    except (Exception, SystemExit) as error:  # whatever the code of others, or a file being written, raises on its way
+        raise RegistryError(f"{what} cannot be loaded: {explained(error)}") from error
+    if not member.room and not _is_member(found, base):
         raise RegistryError(f"{what} is no subclass of {base.replace(':', '.')}.")
     _require_whole(found, what)
     return found

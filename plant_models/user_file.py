@@ -5,7 +5,6 @@ module.
 from __future__ import annotations
 
 import sys
-import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -15,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from plant_models.explained_error import explained
 from plant_models.local_files import files_digest, local_files
 from plant_models.registry import load, unwritten
 
@@ -134,20 +134,6 @@ def make(cls: type, options: Mapping[str, Any]) -> Any:
         return cls(**options)
     except Exception as error:
         raise UserFileError(f"{cls.__name__} cannot be made: {explained(error)}") from error
-
-
-def explained(error: BaseException, path: Path | str | None = None) -> str:
-    """An error of a user's code in one line: its kind, its message, and the file and line that it comes from.
-
-    Args:
-        error: what was raised. path: of the user's file, whose last line on the way is named; None for the last of all.
-    """
-    text = f"{type(error).__name__}: {error}".removesuffix(": ")
-    if isinstance(error, SyntaxError) and error.filename:
-        return f"SyntaxError: {error.msg} ({error.filename}:{error.lineno})"
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if path is not None and frame.filename == str(path)] or frames
-    return f"{text} ({own[-1].filename}:{own[-1].lineno})" if own else text
 
 
 def name_of(model: Any) -> str:

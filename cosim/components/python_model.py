@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import ScenarioError, nearest
+from plant_models.explained_error import explained
 from plant_models.hybrid.signal import Causality, Signal
 from plant_models.hybrid.units import parse_unit
 from plant_models.local_files import files_digest
-from plant_models.user_file import UserFileError, explained, make
+from plant_models.user_file import UserFileError, make
 
 TELEGRAM = ("stamp", "position", "location_accuracy", "odometer_reading", "delivered_at")
 """What ``balise`` may take, by these names; times in [s], lengths in [m], speed in [m/s]."""

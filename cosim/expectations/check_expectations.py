@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cosim.components.component import Component
 from cosim.errors import CosimError, ScenarioError
 from cosim.expectations.before import Before
+from plant_models.explained_error import explained
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
@@ -34,12 +35,24 @@ def check_expectations(
     for place, item in enumerate(table.expect, start=1):
         title = f" ({item.name})" if item.name else ""
         try:
-            items.append(item.prepare(before))
+            items.append(_prepared(item, before))
         except CosimError as error:
             faults.append(f"{where}: expect, number {place}{title}, {item.check!r}: {error}")
     if faults:
         raise ScenarioError("\n".join(faults))
     return table.model_copy(update={"expect": items})
+
+
+def _prepared(item: Any, before: Before) -> Any:
+    try:
+        prepared = item.prepare(before)
+    except CosimError:
+        raise
+    except Exception as error:  # code of others
+        raise CosimError(f"prepare() failed: {explained(error)}") from error
+    if not isinstance(prepared, type(item)):
+        raise CosimError(f"prepare() returned {type(prepared).__name__}; expected itself or another {item.check!r}.")
+    return prepared
 
 
 def _before(table: ScenarioTable, components: Mapping[str, Component], receivers: Sequence[str]) -> Before:

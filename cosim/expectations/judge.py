@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, NotRecordedError
+from plant_models.explained_error import explained
 
 if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
@@ -31,6 +32,11 @@ def _judge(place: int, item: Any, run: JudgedRun) -> list[Judged]:
         parts = item.judge(run)
     except NotRecordedError as error:
         parts = [Judged(item.check, item.check, passed=False, text=str(error))]
+    except Exception as error:  # code of others
+        parts = [Judged(item.check, item.check, passed=False, text=f"judge() failed: {explained(error)}")]
+    if not isinstance(parts, list) or not all(isinstance(part, Judged) for part in parts):
+        text = f"judge() returned {type(parts).__name__}; expected a list of Judged"
+        parts = [Judged(item.check, item.check, passed=False, text=text)]
     if item.name is not None:
         parts = [replace(j, name=item.name if len(parts) == 1 else f"{item.name} ({j.name})") for j in parts]
     return [replace(j, number=place) for j in parts]

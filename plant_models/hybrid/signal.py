@@ -1,7 +1,7 @@
 """Signals: the names, units and attributes of everything that crosses a boundary.
 
 A `Signal` uses FMI's own words, so that a model description is a transcription and not a translation.
-This file imports NumPy, and the warning that an output may carry.
+This file imports NumPy, units, and the warning that an output may carry.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from plant_models.hybrid.output_warning import OutputWarning
+from plant_models.hybrid.units import UnitError, parse_unit
 
 Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -45,7 +46,8 @@ class Signal:
             what is missing.
 
     Raises:
-        ValueError: the name is not an identifier or is a keyword, the start does not fit the size, an integer is no
+        ValueError: the name is not an identifier or is a keyword, the unit has no meaning, the start is no number or
+            does not fit the size, an integer is no
             discrete output, something else than a scalar output warns, something else than an input is optional, or
             what is no number from outside or to it, or an integer, can be missing.
     """
@@ -84,6 +86,10 @@ class Signal:
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
             raise ValueError(f"Signal name {self.name!r} is a Python keyword or begins with '_'; choose another one.")
+        self._check_unit()
+        start: object = self.start
+        if isinstance(start, str) or start is None:
+            raise ValueError(f"Signal {self.name!r} starts with {start!r}; expected a number.")
         if self.size is None:
             if isinstance(self.start, tuple):
                 raise ValueError(f"Signal {self.name!r} is a scalar but its start is {self.start!r}.")
@@ -91,6 +97,12 @@ class Signal:
             object.__setattr__(self, "start", (float(self.start),) * self.size)
         elif len(self.start) != self.size:
             raise ValueError(f"Signal {self.name!r} has size {self.size} but {len(self.start)} start values.")
+
+    def _check_unit(self) -> None:
+        try:
+            parse_unit(self.unit)
+        except UnitError as error:
+            raise ValueError(f"Signal {self.name!r}: {error}") from error
 
     @property
     def width(self) -> int:

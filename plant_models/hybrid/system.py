@@ -64,12 +64,13 @@ class HybridSystem(Declarations):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         check_declarations(self)
+        self._require_equations()
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the continuous states by name; without it they stand still."""
-        return {s.name: np.zeros(s.dimensions) for s in self.states if s.variability == "continuous"}
+        """Derivatives of the continuous states by name."""
+        return {}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Values of all outputs by name."""
@@ -77,7 +78,7 @@ class HybridSystem(Declarations):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """What the event changes: new values of states by name."""
-        raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no jump for it.")
+        return {}
 
     def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Magnitudes of the dry frictions in units of the derivatives, shape (len(frictions),)."""
@@ -103,6 +104,23 @@ class HybridSystem(Declarations):
             x: states with which time would begin, before any event. p: named tuple of all parameters.
         """
         return {}
+
+    def _require_equations(self) -> None:
+        """What is declared without its equation would stand still and say nothing."""
+        continuous = [s.name for s in self.states if s.variability == "continuous"]
+        declared = (
+            ("flow", "states that flow", continuous),
+            ("output", "outputs", [s.name for s in self.outputs]),
+            ("jump", "events", [event.name for event in self.events]),
+            ("switching", "switching functions", list(self.switchings)),
+            ("friction", "dry friction of", list(self.frictions)),
+        )
+        for equation, what, names in declared:
+            if names and getattr(type(self), equation) is getattr(HybridSystem, equation):
+                raise ValueError(
+                    f"{type(self).__name__} ({self.name!r}) declares {what} ({', '.join(names)}) but has no "
+                    f"{equation}(); write it, or leave them out."
+                )
 
     # -- for those who write these functions ------------------------------------------------------------------------
 

@@ -30,6 +30,15 @@ class OutputsCheck(Check):
     @staticmethod
     def run(context):
         return noted(f"{sum(v.causality == 'output' for v in context.description.modelVariables)} outputs")
+
+
+class TextCheck(Check):
+    name = "text"
+    failing = NOTE
+
+    @staticmethod
+    def run(context):
+        return "fine"
 """
 
 
@@ -50,8 +59,12 @@ def test_a_registered_check_is_made_by_the_child_process(tmp_path: Path, monkeyp
     (tmp_path / "own_checks.py").write_text(OWN)
     monkeypatch.syspath_prepend(str(tmp_path))
     CHECKS["outputs"] = import_module("own_checks").OutputsCheck
+    CHECKS["text"] = import_module("own_checks").TextCheck
     report = check_fmu(cached_fmu(recipe("odometer")))
     assert report.finding("outputs").detail == "2 outputs"
+    assert report.finding("text").verdict is Verdict.ERROR
+    assert "of this check, not of the FMU" in report.finding("text").detail
+    assert "run() returned str; expected a CheckOutcome" in report.finding("text").detail
     left_out = report.finding("gone")
     assert left_out.verdict is Verdict.NOTE
     assert "left out: the check 'gone' of an installed package (no_such_module:Gone) cannot be" in left_out.detail

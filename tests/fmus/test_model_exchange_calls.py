@@ -26,7 +26,7 @@ from fmu_observer.event_protocol import EventProtocol
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.build import build_fmu, plan_fmu, write_fmu
 from fmus.toolchain.targets import choose_targets
-from plant_models.hybrid import CommunicationEvent, HybridSystem, input_signal, output_signal, state
+from plant_models.hybrid import CommunicationEvent, HybridSystem, input_signal, memory, output_signal, state
 
 pytestmark = pytest.mark.compiler
 
@@ -54,7 +54,7 @@ class Follower(HybridSystem):
     """Works on communication steps, so it has no model exchange."""
 
     name = "follower"
-    states = (state("held", "m"),)
+    states = (memory("held", "m"),)
     inputs = (input_signal("given", "m"),)
     outputs = (output_signal("held_out", "m"),)
     events = (CommunicationEvent("reading"),)

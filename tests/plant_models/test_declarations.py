@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from toy_systems import Clockwork, Hyperbola
 
@@ -71,7 +70,7 @@ def test_an_unknown_preset_names_the_known_ones() -> None:
 def test_presets_fill_vectors_and_states() -> None:
     system = _system(
         parameters=(parameter("table", "m", 0.0, size=3),),
-        states=(state("x", "m"),),
+        states=(memory("x", "m"),),
         presets={"set": {"table": (1.0, 2.0, 3.0), "x": 7.0}, "same": {"table": 4.0}},
     )
     assert list(system.start_parameters("set")[:3]) == [1.0, 2.0, 3.0]
@@ -89,10 +88,30 @@ def test_missing_and_undeclared_outputs_are_named() -> None:
         system.output_vector(0.0, system.start_state(), system.start_inputs(), system.start_parameters())
 
 
-def test_an_event_without_a_jump_is_named() -> None:
-    system = _system(states=(memory("m", "1"),), events=(TriggeredEvent("balise"),))
-    with pytest.raises(NotImplementedError, match="'balise'"):
-        system.jump("balise", 0.0, np.zeros(1), None, None)
+@pytest.mark.parametrize(
+    ("declared", "words"),
+    [
+        ({"states": (state("place", "m"),)}, r"declares states that flow \(place\) but has no flow\(\)"),
+        ({"outputs": (output_signal("speed", "m/s"),)}, r"declares outputs \(speed\) but has no output\(\)"),
+        ({"events": (TriggeredEvent("balise"),)}, r"declares events \(balise\) but has no jump\(\)"),
+        ({"switchings": ("edge",)}, r"declares switching functions \(edge\) but has no switching\(\)"),
+    ],
+)
+def test_what_is_declared_has_its_equation(declared: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        _system(**declared)
+
+
+@pytest.mark.parametrize(
+    ("declared", "words"),
+    [
+        ({"unit": "Ns/m"}, "Signal 'drag': unknown unit symbol 'Ns' in 'Ns/m'"),
+        ({"start": "zero"}, "Signal 'drag' starts with 'zero'; expected a number"),
+    ],
+)
+def test_a_signal_says_what_is_wrong_with_it(declared: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Signal("drag", **declared)
 
 
 def test_branching_on_values_is_explained_when_traced() -> None:

@@ -31,7 +31,7 @@ def _payload(name: str) -> Signal:
 
 
 def _system(**attributes: Any) -> HybridSystem:
-    made: HybridSystem = type("Faulty", (HybridSystem,), {"name": "faulty", **attributes})()
+    made: HybridSystem = type("Faulty", (HybridSystem,), {"name": "faulty", "jump": None, **attributes})()
     return made
 
 

@@ -84,7 +84,7 @@ def test_an_installed_package_brings_a_member(plugins: Registry[Any]) -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("thau", "taken twice, by this package .* and the package clashing 1.0 .*; uninstall one of them"),
+        ("thau", "taken twice, by this package .* and the package clashing 1.0 .*; rename or uninstall one of them"),
         ("gone", "'gone' of the package broken 1.0 .* cannot be loaded: ModuleNotFoundError"),
         ("wrong", "'wrong' of the package odd 1.0 .* is no subclass of plant_models.hybrid.system.HybridSystem"),
     ],
@@ -191,22 +191,22 @@ def test_no_name_of_a_lazy_room_is_that_of_a_file_in_it() -> None:
 def test_an_expectation_may_be_registered_at_any_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(EXPECTATIONS, "_own", {})
     scenario = Scenario(stop=1.0, step=0.5).add("driver", model="driver")
-    given = {"check": "settles", "signal": "driver.effort", "within": 1e9}
-    with pytest.raises(ValueError, match="expect, number 1: unknown check 'settles'"):
+    given = {"check": "test_settles", "signal": "driver.effort", "within": 1e9}
+    with pytest.raises(ValueError, match="expect, number 1: unknown check 'test_settles'"):
         scenario.set("expect", [given]).table()
 
     class SettlesExpectation(WindowExpectation):
-        check: Literal["settles"] = "settles"
+        check: Literal["test_settles"] = "test_settles"
         signal: str
         within: float
 
         def judge(self, run: Any) -> list[Any]:
             return []
 
-    EXPECTATIONS["settles"] = SettlesExpectation
+    EXPECTATIONS["test_settles"] = SettlesExpectation
     (found,) = scenario.table().expect
     assert isinstance(found, SettlesExpectation)
-    with pytest.raises(ValueError, match="expect, number 1, 'settles', within: "):
+    with pytest.raises(ValueError, match="expect, number 1, 'test_settles', within: "):
         scenario.set("expect", [given | {"within": "x"}]).table()
 
 

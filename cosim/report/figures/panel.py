@@ -25,6 +25,13 @@ class Panel(ABC):
     caption: ClassVar[str]
     place: ClassVar[float] = 100.0
 
+    def __init_subclass__(cls) -> None:
+        lacking = [word for word in ("title", "caption") if "name" in vars(cls) and not hasattr(cls, word)]
+        if lacking:
+            raise TypeError(
+                f"the figure {cls.__name__} has no {' and no '.join(lacking)}; write it as a class attribute"
+            )
+
     @staticmethod
     @abstractmethod
     def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+
 from cosim.drawing.style import png
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
+from plant_models.explained_error import explained
 from plant_models.registry import Registry
+
+LOG = logging.getLogger("cosim")
 
 FIGURES: Registry[type[Panel]] = Registry(
     "figure", ("cosim.report.figures",), "cosim.figures", "cosim.report.figures.panel:Panel"
@@ -25,4 +31,14 @@ def draw_all(result: Result, spec: ReportSpec) -> dict[type[Panel], bytes]:
         result: the run.
         spec: roles of the signals, labels, phases and zones.
     """
-    return {panel: png(panel.draw(result, spec, None).figure) for panel in panels() if panel.available(result, spec)}
+    return dict(_drawn(result, spec))
+
+
+def _drawn(result: Result, spec: ReportSpec) -> Iterator[tuple[type[Panel], bytes]]:
+    """A figure that fails is left out with a warning: it takes nothing along that is computed already."""
+    for panel in panels():
+        try:
+            if panel.available(result, spec):
+                yield panel, png(panel.draw(result, spec, None).figure)
+        except Exception as error:
+            LOG.warning("the figure %r is left out: %s", panel.name, explained(error))

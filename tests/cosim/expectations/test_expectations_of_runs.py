@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -18,6 +18,8 @@ from cosim.cli import main
 from cosim.components.component import Component
 from cosim.errors import ScenarioError
 from cosim.expectations.check_expectations import check_expectations
+from cosim.expectations.expectation import WindowExpectation
+from cosim.expectations.registry import EXPECTATIONS
 from cosim.run.component_models import component_factories
 from cosim.scenario.schema import ScenarioTable
 
@@ -219,3 +221,37 @@ def test_a_copy_and_a_saved_file_keep_the_expectations(tmp_path: Path) -> None:
     assert scenario.copy().table().expect == scenario.table().expect
     scenario.save(tmp_path / "saved.toml")
     assert Scenario.load(tmp_path / "saved.toml").table().expect == scenario.table().expect
+
+
+class Broken(WindowExpectation):
+    """An expectation with a mistake of its author: which one is its key."""
+
+    check: Literal["test_broken"] = "test_broken"
+    mistake: str
+
+    def prepare(self, before: Any) -> Any:
+        return {"raises": lambda: 1 / 0, "nothing": lambda: None}.get(self.mistake, lambda: self)()
+
+    def judge(self, run: Any) -> Any:
+        return 1 / 0 if self.mistake == "later" else "met"
+
+
+@pytest.mark.parametrize(("mistake", "text"), [("raises", "ZeroDivisionError"), ("nothing", "returned NoneType")])
+def test_a_mistake_in_prepare_is_that_of_the_expectation(
+    mistake: str, text: str, check: Callable[..., ScenarioTable], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(EXPECTATIONS, "test_broken", Broken)
+    with pytest.raises(ScenarioError, match=rf"expect, number 1, 'test_broken': prepare\(\) .*{text}"):
+        check({"check": "test_broken", "mistake": mistake})
+
+
+def test_a_mistake_in_judge_is_an_expectation_that_is_not_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(EXPECTATIONS, "test_broken", Broken)
+    items = [{"check": "test_broken", "mistake": mistake} for mistake in ("later", "text")]
+    outcome = small(expect=[*items, {"check": "warnings", "at_most": 99}]).run()
+    first, second, third = outcome.result.summary["expectations"]
+    assert not first["passed"]
+    assert "ZeroDivisionError" in first["text"]
+    assert not second["passed"]
+    assert "returned str; expected a list of Judged" in second["text"]
+    assert third["passed"]

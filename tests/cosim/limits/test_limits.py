@@ -13,7 +13,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.certificates.observer_limits import Trial
 from fmu_observer.observers.generic.sampled import OutputPredictor
 from fmu_observer.observers.train import DelayedTrainObserver, MultirateCdo
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, parameter
 
 
 class Relaxation(HybridSystem):
@@ -21,7 +21,7 @@ class Relaxation(HybridSystem):
 
     name = "relaxation"
     description = "One state that is corrected by its own gain times the period"
-    states = (state("x", "1", 1.0, "Estimate"),)
+    states = (memory("x", "1", 1.0, "Estimate"),)
     outputs = (output_signal("value", "1", "Estimate"),)
     parameters = (parameter("period", "s", 0.1, "Period"), parameter("gain", "1/s", 4.0, "Gain"))
     events = (TriggeredEvent("packet", (input_signal("packet_y", "1", 0.0, "Measured", variability="discrete"),)),)
@@ -82,7 +82,7 @@ class Told(Relaxation):
     """`x` and `y` from two nodes, each with an event of its own: what came last, and how often."""
 
     name = "told"
-    states = (state("x", "1", 9.0, "First"), state("y", "1", 9.0, "Second"))
+    states = (memory("x", "1", 9.0, "First"), memory("y", "1", 9.0, "Second"))
     outputs = (output_signal("first", "1", "First"), output_signal("second", "1", "Second"))
     parameters = (parameter("period", "s", 0.1, "Period"),)
     events = tuple(

@@ -28,7 +28,7 @@ from cosim.report.figures.gap_figure import GapErrorsPanel, GapsPanel, certified
 from cosim.report.figures.main_picture import main_picture
 from cosim.report.figures.other_trains_figure import OtherTrainsPanel
 from cosim.report.figures.panel import Panel
-from cosim.report.figures.panels import draw_all, panels
+from cosim.report.figures.panels import FIGURES, draw_all, panels
 from cosim.report.figures.run_figures import SpeedPanel, adhesion_figure, slip_figure
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.render import first_sentence
@@ -398,3 +398,27 @@ def test_a_long_text_folds_behind_its_first_part_and_loses_no_word() -> None:
     assert shown == "unstable at a gap of 1 s: the error grows"
     assert rest.count("certified up to 0.5 s") == 10
     assert first_sentence("short; and seen whole") == ("short; and seen whole", "")
+
+
+def test_a_figure_that_fails_is_left_out(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    class BrokenPanel(Panel):
+        name, title, caption = "test_broken", "Broken", "Nothing."
+
+        @staticmethod
+        def available(_result: Result, spec: ReportSpec) -> bool:
+            return bool(spec.no_such_role)  # type: ignore[attr-defined]
+
+        @staticmethod
+        def draw(_result: Result, _spec: ReportSpec, _ax: Axes | None) -> Axes:
+            raise AssertionError
+
+    monkeypatch.setitem(FIGURES, "test_broken", BrokenPanel)
+    drawn = draw_all(synthetic_result(), synthetic_spec())
+    assert BrokenPanel not in drawn
+    assert set(PANELS) <= set(drawn)
+    assert "figure 'test_broken' is left out: AttributeError" in caplog.text
+
+
+def test_a_figure_says_what_it_is() -> None:
+    with pytest.raises(TypeError, match="the figure Untitled has no title and no caption"):
+        type("Untitled", (Panel,), {"name": "untitled"})

@@ -1,0 +1,20 @@
+"""An error of somebody's code in one line. Standard library only."""
+
+from __future__ import annotations
+
+import traceback
+from pathlib import Path
+
+
+def explained(error: BaseException, path: Path | str | None = None) -> str:
+    """An error of a user's code in one line: its kind, its message, and the file and line that it comes from.
+
+    Args:
+        error: what was raised. path: of the user's file, whose last line on the way is named; None for the last of all.
+    """
+    text = f"{type(error).__name__}: {error}".removesuffix(": ")
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"SyntaxError: {error.msg} ({error.filename}:{error.lineno})"
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if path is not None and frame.filename == str(path)] or frames
+    return f"{text} ({own[-1].filename}:{own[-1].lineno})" if own else text
