@@ -161,10 +161,14 @@ def _traced(name: str) -> Iterator[None]:
     try:
         yield
     except TracingError as error:
-        raise ScenarioError(
-            f"Component {name!r}: {error} Where it is right as it is, declare traceable = False in the class: it then "
-            "runs in Python, which is slower."
-        ) from error
+        misspelt = isinstance(error.__cause__, (AttributeError, NameError, LookupError))
+        way_out = (
+            ""
+            if misspelt
+            else " Where it is right as it is, declare traceable = False in the class: it then runs in Python, which "
+            "is slower."
+        )
+        raise ScenarioError(f"Component {name!r}: {error}{way_out}") from error
 
 
 def _library(folder: Path, description: ModelDescription) -> Path:

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -298,8 +299,16 @@ class TracedSystem:
         told = bool(users) and "raise " in str(users[-1].line)  # in words of its own, which know better
         of_kind = isinstance(error, (AttributeError, NameError, LookupError)) or not users
         advice = "" if of_kind or told else f" {ADVICE}"
-        reason = str(error).removeprefix(f"{self.system.name}: ").removesuffix(".")
+        reason = str(error).removeprefix(f"{self.system.name}: ").removesuffix(".") + _hint(error)
         return f"{self.system.name}: cannot trace {WRITTEN_AS.get(function, function)}: {reason} (at {place}).{advice}"
+
+
+def _hint(error: Exception) -> str:
+    """The signals nearest to a misspelt one, of the named tuple that was asked for it."""
+    if not isinstance(error, AttributeError) or error.name is None:
+        return ""
+    close = get_close_matches(error.name, getattr(error.obj, "_fields", ()), 3)
+    return f"; did you mean {', '.join(map(repr, close))}?" if close else ""
 
 
 @lru_cache(maxsize=8)

@@ -114,6 +114,15 @@ def test_a_signal_says_what_is_wrong_with_it(declared: dict[str, Any], words: st
         Signal("drag", **declared)
 
 
+def test_a_misspelt_signal_is_named_when_traced() -> None:
+    class Misspelt(Hyperbola):
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+            return {"x": x.xx}
+
+    with pytest.raises(TracingError, match=r"has no attribute 'xx'; did you mean 'x'\? \(at .*test_declarations"):
+        _ = TracedSystem(Misspelt()).step
+
+
 def test_branching_on_values_is_explained_when_traced() -> None:
     class Branching(Hyperbola):
         def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
