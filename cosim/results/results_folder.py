@@ -7,7 +7,7 @@ or a stopped program leaves the former files whole.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,21 @@ from cosim.results.unfinished import read_unfinished
 
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 PACKETS = "packets.csv"  # of runs with a network
+REPORT, FIGURES = "report.html", "figures"
 LAYOUT = 1  # version of the layout of summary.json
+
+
+def remove_report(directory: str | Path, keep: Collection[str] = ()) -> None:
+    """Remove the page and the pictures of an earlier run, which would not speak of these results.
+
+    Args:
+        directory: the results folder. keep: stems of the pictures that are of this run.
+    """
+    folder = Path(directory)
+    (folder / REPORT).unlink(missing_ok=True)
+    for picture in (folder / FIGURES).glob("*.png"):
+        if picture.stem not in keep:
+            picture.unlink(missing_ok=True)
 
 
 def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:

@@ -11,7 +11,7 @@ from cosim.errors import CosimError
 from cosim.results.block_file import BLOCK_FILE, read_block
 from cosim.results.formats.growing_npy import growing_header, read_grown
 from cosim.results.formats.known_formats import usual_file
-from cosim.results.results_folder import SUMMARY, read_results, write_results
+from cosim.results.results_folder import SUMMARY, read_results, remove_report, write_results
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import DID_NOT_END
 
@@ -34,7 +34,7 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
         result = read_results(spare)
         if spare != out:
             write_results(result, out, note["formats"])
-            (out / "report.html").unlink(missing_ok=True)  # of an earlier run, as what it was made from
+            remove_report(out)
             shutil.rmtree(out / "made_from", ignore_errors=True)
     except (CosimError, OSError, ValueError) as error:
         return f"What was computed could not be brought to {out}: {error} It is in {spare}."

@@ -26,7 +26,7 @@ from cosim.results.formats.growing_npy import growing_header
 from cosim.results.formats.known_formats import table_files, usual_file
 from cosim.results.packets_file import packet_row, write_packets
 from cosim.results.result_data import BaliseRecord, PacketRecord, SignalInfo
-from cosim.results.results_folder import EVENTS, LAYOUT, MESSAGES, PACKETS, SUMMARY, check_writable
+from cosim.results.results_folder import EVENTS, LAYOUT, MESSAGES, PACKETS, SUMMARY, check_writable, remove_report
 from cosim.results.row_file import RowFile
 from cosim.results.si import UnitOf, convert, described, foreign_units
 from cosim.results.summary_file import write_summary
@@ -149,8 +149,9 @@ class Stream:
         """
         folder = self.directory
         try:
-            for name in (SUMMARY, "report.html", BLOCK_FILE, PACKETS, *table_files().values()):
+            for name in (SUMMARY, BLOCK_FILE, PACKETS, *table_files().values()):
                 (folder / name).unlink(missing_ok=True)
+            remove_report(folder)
             write_events(folder / EVENTS, ())
             if self._packets is not None:
                 write_packets(folder / PACKETS, ())

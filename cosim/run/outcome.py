@@ -12,7 +12,7 @@ from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged, judged_text
 from cosim.results.result import Result
-from cosim.results.results_folder import write_results
+from cosim.results.results_folder import remove_report, write_results
 from cosim.run.made_from import renewed
 
 if TYPE_CHECKING:
@@ -112,6 +112,5 @@ class Outcome:
 
             paths["report"] = write_report(self.result, self.spec, directory)
         else:
-            # of an earlier run: it would not speak of these results
-            (Path(directory) / "report.html").unlink(missing_ok=True)
+            remove_report(directory)
         return paths

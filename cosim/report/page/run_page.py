@@ -18,8 +18,8 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, statement
 from cosim.expectations.judged import Judged
 from cosim.report.figures.panel import Panel
-from cosim.report.figures.panels import draw_all, panels
-from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
+from cosim.report.figures.panels import draw_all
+from cosim.report.figures.zooms import Zoom, draw_zooms
 from cosim.report.page import run_tables
 from cosim.report.page.gaps import gaps_table
 from cosim.report.page.page_files import explained, page_bytes, write_file, write_page
@@ -27,8 +27,7 @@ from cosim.report.page.phases import errors_table, phases_table
 from cosim.report.page.render import render
 from cosim.report.page.run_statements import run_statements
 from cosim.results.result import Result
-
-PAGE, FIGURES = "report.html", "figures"
+from cosim.results.results_folder import FIGURES, REPORT, remove_report
 
 
 def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Path:
@@ -49,15 +48,13 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Pat
     figures, zooms = draw_all(result, spec), draw_zooms(result, spec)
     text = report_page(result, spec, figures, zooms)
     files = {panel.name: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
-    stale = ({panel.name for panel in panels()} | set(ZOOM_KEYS)) - set(files)  # of an earlier run
     with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)
         for key, data in files.items():
             write_file(folder / FIGURES / f"{key}.png", data)
-        for key in stale:
-            (folder / FIGURES / f"{key}.png").unlink(missing_ok=True)
-        write_file(folder / PAGE, page_bytes(text))
-    return folder / PAGE
+        remove_report(folder, keep=files)
+        write_file(folder / REPORT, page_bytes(text))
+    return folder / REPORT
 
 
 def write_report_page(result: Result, spec: ReportSpec, path: str | Path) -> Path:

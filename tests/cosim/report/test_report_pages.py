@@ -35,6 +35,7 @@ from cosim.report.page.render import first_sentence
 from cosim.report.page.run_page import report_page, write_report
 from cosim.results.result import Result
 from cosim.results.results_folder import read_results, write_results
+from cosim.run.outcome import Outcome
 
 PANELS = [panel for panel in panels() if panel.available(synthetic_result(), synthetic_spec())]
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -374,6 +375,9 @@ def test_figures_of_an_earlier_run_do_not_stay(result: Result, tmp_path: Path) -
     write_report(result, synthetic_spec(), tmp_path)
     write_report(result, ReportSpec(), tmp_path)
     assert [p.name for p in (tmp_path / "figures").iterdir()] == ["gaps.png"]
+    Outcome(result, ReportSpec(), ("csv",)).write(tmp_path, report=False)
+    assert list((tmp_path / "figures").iterdir()) == []
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_folder_that_cannot_be_written_is_refused(result: Result, tmp_path: Path) -> None:
