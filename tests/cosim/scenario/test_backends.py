@@ -207,3 +207,32 @@ def test_a_late_policy_for_a_model_without_events_is_refused(backend: str) -> No
         ScenarioError, match=r"components\.plant: this (FMU|block) has no parameter late_policy; it is told"
     ):
         run(made)
+
+
+class Branching(Reckoning):
+    """An `if` on a value, which cannot be traced and may be meant."""
+
+    name = "branching"
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.odometer if u.odometer > 0.0 else 0.0}
+
+
+class Misspelt(Reckoning):
+    """A signal that there is not."""
+
+    name = "misspelt"
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"place": u.odometr}
+
+
+def test_only_what_may_be_meant_is_advised_to_run_in_python() -> None:
+    refused = {}
+    for model in (Branching, Misspelt):
+        with pytest.raises(ScenarioError) as raised:
+            Scenario(stop=0.1, step=0.01).add("reckoning", model=model).run()
+        refused[model] = str(raised.value)
+    assert "declare traceable = False" in refused[Branching]
+    assert "did you mean 'odometer'?" in refused[Misspelt]
+    assert "traceable" not in refused[Misspelt]
