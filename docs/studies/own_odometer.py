@@ -33,8 +33,8 @@ STOP = 330.0  # [s]
 MARGIN = 0.5 * TOP * PERIOD
 """What the age of a reading may cost, half a period at the top speed [m]: less is no difference between observers."""
 
-# observers by label: name and preset
-JUDGED: Mapping[str, tuple[str, str | None]] = {
+# observers by label: name and preset; train observers that are not named here stand with their own preset
+_LABELLED: Mapping[str, tuple[str, str | None]] = {
     "odometer_reset": (RESET, None),
     "balise_odometer_ekf": ("balise_odometer_ekf", None),
     "ekf_tuned": ("balise_odometer_ekf", "tuned"),
@@ -72,6 +72,11 @@ NOT_HERE: Mapping[str, str] = {
     "stopping_uio": "hears a speed every 1 to 2 ms",
 }
 """Train observers that stand in no run of this study, with the reason."""
+_NAMED = {*NOT_HERE, *(name for name, _ in _LABELLED.values())}
+JUDGED: Mapping[str, tuple[str, str | None]] = {
+    **_LABELLED,
+    **{name: (name, None) for name in OBSERVERS if OBSERVERS.room(name).endswith(".train") and name not in _NAMED},
+}
 
 
 @dataclass(frozen=True)
