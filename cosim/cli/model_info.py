@@ -13,8 +13,7 @@ from fmu_observer import OBSERVERS
 from fmus.recipes import legal_values
 from plant_models import PLANTS
 from plant_models.explained_error import explained
-from plant_models.hybrid import TracingError
-from plant_models.hybrid.signal import Signal
+from plant_models.hybrid import Signal, TracingError
 from plant_models.user_file import names_code
 
 _REGISTRIES = {"model": PLANTS, "observer": OBSERVERS}

@@ -21,8 +21,7 @@ from cosim.errors import CosimError
 from cosim.scenario.shipped import shipped_scenarios
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
-from plant_models.hybrid import HybridSystem
-from plant_models.hybrid.signal import scalar_names
+from plant_models.hybrid import HybridSystem, scalar_names
 
 POINTS = 20
 MOST = 6  # values of an option: some are counts up to hundreds

@@ -17,9 +17,7 @@ import numpy as np
 import fmus
 from fmu_observer.observers.exhibits.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
 from plant_models.exhibits.wind_turbine import Wind, WindTurbine, WindTurbineController
-from plant_models.hybrid import HybridSystem, PeriodicEvent, memory, output_signal, parameter, vector
-from plant_models.hybrid.signal import Signal
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, Signal, memory, output_signal, parameter, vector
 
 PARTS = {"wind": Wind(), "turbine": WindTurbine(), "controller": WindTurbineController()}
 DIAGNOSIS = WindTurbineDiagnosis()

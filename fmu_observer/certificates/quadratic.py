@@ -14,7 +14,7 @@ import clarabel
 import numpy as np
 import scipy
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent
-from plant_models.hybrid.signal import scalar_names
+from plant_models.hybrid import HybridSystem, PeriodicEvent, scalar_names
 from plant_models.hybrid.tracing import TracedSystem
 
 Array = NDArray[np.float64]

@@ -11,6 +11,7 @@ from fmu_observer.detection.maximum_adhesion import MAP_SPEEDS, AdhesionMap, deg
 from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL
 from fmu_observer.detection.slip_ratio import speed_slip_from_odometer_slip
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     discrete_output,
@@ -21,7 +22,6 @@ from plant_models.hybrid import (
     state,
 )
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
 _SlipDefinition = Literal["odometer", "speed"]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     discrete_output,
@@ -17,7 +18,6 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
-from plant_models.hybrid.system import Array
 
 
 class CouplerRisk(HybridSystem):

@@ -18,6 +18,7 @@ from fmu_observer.detection.slip_indicator import (
 )
 from fmu_observer.detection.slip_ratio import odometer_slip
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     discrete_output,
@@ -26,7 +27,6 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
 )
-from plant_models.hybrid.system import Array
 
 
 class ExcessiveSlip(HybridSystem):

@@ -16,9 +16,8 @@ from fmu_observer.detection.jam_rules import (
     doubt_limit,
 )
 from fmu_observer.detection.printed_jam_rules import PrintedRules
-from plant_models.hybrid import HybridSystem, PeriodicEvent, discrete_output, input_signal
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, discrete_output, input_signal
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 NOISE = "odometer_noise"
 RuleChoice = Literal["repaired", "printed"]

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from plant_models.hybrid import Signal, memory, parameter
+from plant_models.hybrid import Array, Signal, memory, parameter
 from plant_models.hybrid.arrays import indicator
-from plant_models.hybrid.system import Array
 
 TRUSTED, HELD, UNCONFIRMED = 0.0, 1.0, 2.0
 """Modes: the odometer is believed; it is not, and the model alone runs on; the model alone has run too long, and the

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.detection.jam_rules import ROUNDING, Judgement, Reading, Rules
-from plant_models.hybrid import Signal, memory, parameter
-from plant_models.hybrid.arrays import Array, indicator
+from plant_models.hybrid import Array, Signal, memory, parameter
+from plant_models.hybrid.arrays import indicator
 
 
 class PrintedRules(Rules):

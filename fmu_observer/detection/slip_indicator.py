@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.detection.slip_ratio import odometer_slip
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
 
 NOMINAL, DEGRADED = 1.0, 2.0
 

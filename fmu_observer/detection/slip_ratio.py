@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def speed_slip(odometer: Array, speed: Array, floor: Array) -> Array:

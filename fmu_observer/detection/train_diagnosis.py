@@ -24,11 +24,10 @@ from fmu_observer.detection.train_verdict import (
     wheels,
 )
 from fmu_observer.formulas.diagnosis.isolation_table import largest
-from plant_models.hybrid import HybridSystem, vector
+from plant_models.hybrid import Array, HybridSystem, vector
 from plant_models.hybrid.event import IGNORED, USED
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.pneumatic_brake import filling, limited
 
 _SPEED_PAIRS = 6  # residuals of speed stand first in `MOTION`

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.diagnosis.window_inversion import Inverted, grid_around, invert, smoothed
+from plant_models.hybrid import Array, vector
 from plant_models.hybrid.scan import Arrays, enclosed, scan
-from plant_models.hybrid.system import Array, vector
 
 GRID = 5  # values of the parameter, as in the thesis
 

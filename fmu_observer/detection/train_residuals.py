@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_observer.formulas.diagnosis.isolation_table import largest
 from fmu_observer.formulas.diagnosis.windowed_residual import windowed_square
-from plant_models.hybrid.system import Array, vector
+from plant_models.hybrid import Array, vector
 
 ABSENT = -1e9
 """Start value of the inputs of sensors that a train need not have: a sensor that reads this is not fitted."""

@@ -25,7 +25,7 @@ from fmu_observer.detection.train_isolation import (
 from fmu_observer.detection.train_residuals import Readings, tolerance
 from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable, IsolationVerdict, largest
 from fmu_observer.formulas.diagnosis.windowed_residual import Alarm, judge
-from plant_models.hybrid.system import Array, vector
+from plant_models.hybrid import Array, vector
 
 _GROUPS = (MOTION, BRAKE, TRACTION)
 _UNPROVED = 3.0  # telegrams

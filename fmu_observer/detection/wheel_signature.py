@@ -15,9 +15,8 @@ from fmu_observer.formulas.signatures.classification import Plane, SignatureClas
 from fmu_observer.formulas.signatures.clouds import Coordinate
 from fmu_observer.formulas.signatures.pencil import pencil_point
 from fmu_observer.formulas.signatures.properties import PROPERTIES
-from plant_models.hybrid import HybridSystem, discrete_output, input_signal, memory, parameter, vector
+from plant_models.hybrid import Array, HybridSystem, discrete_output, input_signal, memory, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 _TRAINED_PERIOD = 0.2  # [s]
 CODES: Mapping[str, float] = {STEADY: 0.0, DROP: -1.0, RISE: 1.0}

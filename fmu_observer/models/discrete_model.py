@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel
+from plant_models.hybrid import Array
 from plant_models.hybrid.integration import rk4_step
-from plant_models.hybrid.system import Array
 
 _TAYLOR_DEGREE = 10
 _SQUARINGS = 6  # the remainder of the series is below 1e-14 while the norm of A times the period is below 16

@@ -18,10 +18,8 @@ from fmu_observer.models.checks import check_identifiers, check_numbers, check_s
 from fmu_observer.models.discrete_model import transition
 from fmu_observer.models.named_states import NamedStates
 from fmu_observer.models.observer_model import ObserverModel
-from plant_models.hybrid import Signal
+from plant_models.hybrid import Array, Signal, width
 from plant_models.hybrid.exact_jacobian import exact_jacobian, is_affine
-from plant_models.hybrid.signal import width
-from plant_models.hybrid.system import Array
 
 
 class Known(NamedTuple):

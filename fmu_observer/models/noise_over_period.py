@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fmu_observer.formulas.filtering.kalman import symmetric
 from fmu_observer.models.filter_models import FilterModel, Known
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def noise_over(model: FilterModel, x: Array, known: Known, period: Array, density: Array) -> Array:

@@ -15,9 +15,8 @@ import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
 from fmu_observer.models.named_states import NamedStates
-from plant_models.hybrid import Signal
+from plant_models.hybrid import Array, Signal, vector
 from plant_models.hybrid.exact_jacobian import exact_jacobian
-from plant_models.hybrid.system import Array, vector
 
 _PROBES = 5  # states at which a phi of unknown slope is looked at
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fmu_observer.models.filter_models import FilterModel, Known
-from plant_models.hybrid import Signal, input_signal, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, input_signal, state
 
 
 def with_unknown(model: FilterModel, names: Sequence[str]) -> FilterModel:

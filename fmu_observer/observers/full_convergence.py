@@ -19,9 +19,8 @@ from fmu_observer.formulas.moving_horizon.gauss_newton import WindowProblem, pas
 from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, Iterated, contradicted, unsettled
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import OutputWarning, discrete_output, memory
+from plant_models.hybrid import Array, OutputWarning, discrete_output, memory
 from plant_models.hybrid.option import is_number, require_whole
-from plant_models.hybrid.system import Array
 
 TOLERANCE, _MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
 ENDED = (

@@ -16,10 +16,9 @@ from fmu_observer.observers.innovation_gate import (
     ReportedPlace,
     judge,
 )
-from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal
+from plant_models.hybrid import Array, Event, HybridSystem, Signal, TriggeredEvent, input_signal
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 GATED_EVENT = "balise"
 _REPORTED_POSITION = "balise_position"

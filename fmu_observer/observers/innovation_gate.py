@@ -35,8 +35,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import memory, parameter
-from plant_models.hybrid.arrays import Array, indicator
+from plant_models.hybrid import Array, memory, parameter
+from plant_models.hybrid.arrays import indicator
 from plant_models.hybrid.event import DOUBTED, IGNORED, USED
 
 OFF, WARN, REJECT = 0.0, 1.0, 2.0

@@ -21,9 +21,8 @@ from fmu_observer.observers.model_signals import (
     measured_inputs,
     sampling_event,
 )
-from plant_models.hybrid import Signal, discrete_output, memory, output_signal, parameter, state
+from plant_models.hybrid import Array, Signal, discrete_output, memory, output_signal, parameter, state
 from plant_models.hybrid.missing import or_else
-from plant_models.hybrid.system import Array
 
 Timing = Literal["continuous", "periodic", "event"]
 

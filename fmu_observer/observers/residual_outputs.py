@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel, named_as
-from plant_models.hybrid import Signal, output_signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, output_signal, parameter
 
 
 def residual_gain(model: ObserverModel) -> Signal:

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant, solved_3
-from plant_models.hybrid import input_signal, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, output_signal, parameter, state
 
 Pair = tuple[Array, Array]
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant, solved_2
-from plant_models.hybrid import input_signal, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, output_signal, parameter, state
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import output_signal, parameter, state
+from plant_models.hybrid import Array, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Glycerol = Literal["clamped", "as_published"]
 HOUR = 3600.0  # [s]

@@ -9,9 +9,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Gravity = Literal["link_angle", "motor_speed"]
 GRAVITY: tuple[Gravity, ...] = ("link_angle", "motor_speed")

@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, output_signal, parameter, state
 
 
 class GasPhaseReaction(NoisyPlant):

@@ -5,16 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    input_signal,
-    memory,
-    parameter,
-    vector,
-)
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, Signal, input_signal, memory, parameter, vector
 
 
 class NoisyPlant(HybridSystem):

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
 
 
 class Pendulum(HybridSystem):

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     Signal,
@@ -18,7 +19,6 @@ from plant_models.hybrid import (
     parameter,
 )
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 
 @dataclass(frozen=True)

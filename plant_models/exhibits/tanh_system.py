@@ -7,9 +7,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, output_signal, parameter, state
+from plant_models.hybrid import Array, HybridSystem, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Reading = Literal["minus", "as_published", "product"]
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.arrays import Array
+from plant_models.hybrid import Array
 from plant_models.hybrid.event import PeriodicEvent
 from plant_models.hybrid.signal import Signal, input_signal, parameter
 

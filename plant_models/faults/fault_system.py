@@ -9,11 +9,10 @@ import numpy as np
 
 from plant_models import FAULT_CAUSES
 from plant_models.faults.fault_cause import Carrier, Fault, FaultCause, one_where
-from plant_models.hybrid import HybridSystem, OutputWarning, Signal, output_signal, vector
+from plant_models.hybrid import Array, HybridSystem, OutputWarning, Signal, output_signal, vector
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import MemberNames, require_whole
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.user_file import Expected, load_class, make, names_code
 
 CAUSES = MemberNames(FAULT_CAUSES)

@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 
 from plant_models.faults.fault_cause import Carrier
 from plant_models.faults.fault_system import CAUSES, FaultSystem, active, unfinished_output
-from plant_models.hybrid import input_signal, output_signal, vector
+from plant_models.hybrid import Array, input_signal, output_signal, vector
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.system import Array
 from plant_models.hybrid.units import parse_unit
 
 LOST_SAMPLES = "lost_samples"

@@ -9,9 +9,8 @@ import numpy as np
 
 from plant_models.faults.fault_cause import ADHESION_LIMIT, BRAKE_RELEASED, EFFORT, RELEASE_TIME, Carrier
 from plant_models.faults.fault_system import CAUSES, FaultSystem, active, unfinished_output
-from plant_models.hybrid import input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 DistanceFrom = Literal["speed", "position"]
 

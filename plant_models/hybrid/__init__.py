@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from plant_models.hybrid.arrays import matrix, vector
+from plant_models.hybrid.arrays import Array, matrix, vector
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.resource import Resource
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from plant_models.hybrid.tracing_error import TracingError
 
 __all__ = [
+    "Array",
     "CommunicationEvent",
     "Event",
     "HybridSystem",

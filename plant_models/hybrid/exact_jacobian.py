@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid.arrays import Array
 
 
 def exact_jacobian(

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array, HybridSystem
+from plant_models.hybrid.arrays import Array
+from plant_models.hybrid.system import HybridSystem
 
 Derivative = Callable[[Array, Array], Array]  # (t, x) -> derivative of the continuous states
 Jacobian = Callable[[Array, Array], tuple[Array, Array]]  # (t, x) -> (d/dx of shape (nc, nc), d/dt of shape (nc,))

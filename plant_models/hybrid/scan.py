@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid.arrays import Array
 
 CHUNK = 16  # rows in one function: a longer loop is one of chunks, which a compiler takes in its stride
 KEPT = 32  # traced functions, for the other events and functions of the same system

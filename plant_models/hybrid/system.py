@@ -16,11 +16,11 @@ import numpy as np
 
 from plant_models.hybrid.arrays import Array, of_length, vector
 from plant_models.hybrid.declaration_checks import check_declarations
-from plant_models.hybrid.declarations import Declarations, Method
+from plant_models.hybrid.declarations import Declarations
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.signal_layout import SignalLayout
 
-__all__ = ["Array", "HybridSystem", "Method", "vector"]
+__all__ = ["HybridSystem"]
 
 
 class HybridSystem(Declarations):

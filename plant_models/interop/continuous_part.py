@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, vector
+from plant_models.hybrid import Array, HybridSystem, TracedSystem, scalar_names, vector
 from plant_models.hybrid.integration import effective_flow
-from plant_models.hybrid.system import Array
 
 Values = Mapping[str, float] | Sequence[float] | np.ndarray
 """Numbers by name, those left out at their starts; or all of them in the declared order."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     Signal,
@@ -24,8 +25,8 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.arrays import of_length
 from plant_models.hybrid.declaration_checks import RESERVED_NAMES
+from plant_models.hybrid.declarations import Method
 from plant_models.hybrid.signal import Variability
-from plant_models.hybrid.system import Array, Method
 from plant_models.interop.continuous_part import Values, filled, known
 
 if TYPE_CHECKING:

@@ -22,8 +22,7 @@ from fmu_observer.observers.generic.continuous import HighGain, Thau
 from fmu_observer.observers.generic.discrete import ExtendedLuenberger
 from fmu_observer.observers.generic.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, RiccatiHighGain
 from fmu_observer.observers.train import AdaptiveGainCdo
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 STEEP = (np.array([[0.0, 0.0], [-50.0, -30.0]]), np.array([[0.0, 0.0], [50.0, 30.0]]))
 

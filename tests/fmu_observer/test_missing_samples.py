@@ -19,9 +19,8 @@ from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilt
 from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.generic.discrete.member_filter import MemberFilter
 from fmus import Batch
-from plant_models.hybrid import Runtime, TracedSystem, scalar_names
+from plant_models.hybrid import Runtime, TracedSystem, input_signal, scalar_names, state
 from plant_models.hybrid.missing import MISSED_SAMPLES, is_there, or_else
-from plant_models.hybrid.signal import input_signal, state
 
 NAMES = list(OBSERVERS)
 MISSED_PLACE = -1  # of the count in a state

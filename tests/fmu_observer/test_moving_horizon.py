@@ -29,9 +29,8 @@ from fmu_observer.models.known_models import find_model
 from fmu_observer.observability.window_observability import window_observability
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import Runtime, scalar_names
+from plant_models.hybrid import Runtime, scalar_names, vector
 from plant_models.hybrid.scan import enclosed, scan_table
-from plant_models.hybrid.system import vector
 
 N = 3  # position, speed, an unknown input
 LAYOUT = RowLayout(inputs=1, measurements=2)

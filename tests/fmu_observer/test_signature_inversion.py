@@ -18,8 +18,7 @@ from fmu_observer.formulas.signatures.envelope import best_envelope
 from fmu_observer.formulas.signatures.envelope_distance import line_distance
 from fmu_observer.observers.exhibits import CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature
 from fmu_observer.observers.generic.signature.signature_observer import SignatureObserver
-from plant_models.hybrid import Runtime, scalar_names
-from plant_models.hybrid.system import HybridSystem
+from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 ROUNDING = 1e-12
 RNG = np.random.default_rng(4)

@@ -23,8 +23,7 @@ from plant_models.disk_cache import files, identity
 from plant_models.disk_cache.description import Description, NoIdentityError
 from plant_models.disk_cache.entries import entry_path, recall, remembered
 from plant_models.disk_cache.identity import folder_digest
-from plant_models.hybrid import HybridSystem, kernel
-from plant_models.hybrid.signal import Signal, parameter
+from plant_models.hybrid import HybridSystem, Signal, kernel, parameter
 
 KEY = "0" * 64
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _ORDER = 3
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def dmo_bound(s: Array, sample_error: Array, beta: Array, m: Array, gain: Array, deviation: Array) -> Array:

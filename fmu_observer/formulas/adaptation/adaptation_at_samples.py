@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.adaptation.adaptive_law import Sizes
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class Since(NamedTuple):

@@ -24,8 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import Signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, state, vector
 
 _LARGEST_CLOSED = 3  # sizes whose smallest eigenvalue is given in closed form
 _TINY = 1e-60  # keeps quotients and slopes finite where there is nothing yet

@@ -7,7 +7,7 @@ stored.
 
 from __future__ import annotations
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 # K = inv(P) C' with P + A'P + P A = C'C, A the shift matrix: Bouchama 2024, (3.29) with A for Abar
 HIGH_GAIN_K = (2.0, 1.0)

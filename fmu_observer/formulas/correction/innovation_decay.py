@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid import Signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, parameter, state
 
 _NOTHING = 1e-300  # in place of zero, of which a power has no derivative by its exponent
 ELAPSED = state("elapsed", "s", 0.0, "Time since the last sample")

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def at_age(age: Array, values: Sequence[Array]) -> Array:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.delay.delay_memory import weighted
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _ITERATIONS = 3  # of the implicit end of the trapezoidal rule; each wins a factor of 2 / (period Lipschitz)
 

@@ -5,7 +5,7 @@ derivative of a noisy reading is taken. Pure functions that trace; they rest on 
 from __future__ import annotations
 
 from fmu_observer.formulas.diagnosis.residual_filters import Filtered, ResidualFilter, filtered, settled
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def second_order_residual(

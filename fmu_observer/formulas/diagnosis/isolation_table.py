@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _NOWHERE: Mapping[str, Mapping[str, Array]] = {}
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class Isolation(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class ResidualFilter(NamedTuple):

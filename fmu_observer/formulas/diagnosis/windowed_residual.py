@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array, vector
+from plant_models.hybrid import Array, vector
 
 
 class Windowed(NamedTuple):

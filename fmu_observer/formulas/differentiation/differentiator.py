@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def differentiator_flow(z: Sequence[Array], signal: Array, L: Array) -> list[Array]:

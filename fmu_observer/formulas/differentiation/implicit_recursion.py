@@ -9,7 +9,7 @@ import numpy as np
 
 from fmu_observer.formulas.differentiation.differentiator import power
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 ITERATIONS = 7  # Newton from at most twice the root: the last two change nothing any more
 _SMALLEST = 1e-200  # stands in for an excess that is not positive, where the root is not used

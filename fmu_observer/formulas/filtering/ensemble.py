@@ -12,7 +12,7 @@ import numpy as np
 
 from fmu_observer.formulas.filtering.kalman import normalised_square
 from fmu_observer.formulas.filtering.square_root import factor
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class EnsembleCorrected(NamedTuple):

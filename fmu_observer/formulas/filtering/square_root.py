@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.formulas.filtering.kalman import Corrected
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def factor(covariance: Array) -> Array:

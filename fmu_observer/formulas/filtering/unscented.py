@@ -16,7 +16,7 @@ import numpy as np
 
 from fmu_observer.formulas.filtering.kalman import Corrected, solved, symmetric
 from fmu_observer.formulas.filtering.square_root import corrected_by, triangular
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 Function = Callable[[Array], Array]  # (state of shape (n,)) -> shape (m,)
 

@@ -29,8 +29,8 @@ from fmu_observer.formulas.filtering.kalman import Form, correct, predicted_cova
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.formulas.moving_horizon.robust_loss import Loss, weight
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
+from plant_models.hybrid import Array, vector
 from plant_models.hybrid.scan import Arrays, scan_table
-from plant_models.hybrid.system import Array, vector
 
 
 class Moved(NamedTuple):

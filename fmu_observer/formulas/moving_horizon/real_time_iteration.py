@@ -13,10 +13,9 @@ import numpy as np
 
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.formulas.moving_horizon.gauss_newton import FAR, KEPT, WindowProblem, passed, solve
-from plant_models.hybrid import OutputWarning, Signal, memory, output_signal
+from plant_models.hybrid import Array, OutputWarning, Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
-from plant_models.hybrid.system import Array
 
 MOST_ROWS, MOST_PASSES = 1000, 20
 _MUCH = 3.0  # standard deviations: an estimate that is moved by more is not within its own deviation [ours]

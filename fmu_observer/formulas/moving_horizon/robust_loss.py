@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 Loss = Literal["squares", "huber", "geman_mcclure"]
 LOSSES: tuple[Loss, ...] = ("squares", "huber", "geman_mcclure")

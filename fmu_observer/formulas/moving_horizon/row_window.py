@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import memory
+from plant_models.hybrid import Array, memory
 from plant_models.hybrid.signal_layout import SignalLayout
-from plant_models.hybrid.system import Array
 
 
 class WindowRow(NamedTuple):

@@ -15,7 +15,7 @@ from fmu_observer.formulas.filtering.kalman import symmetric
 from fmu_observer.formulas.filtering.square_root import factor, solved_lower
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.formulas.moving_horizon.gauss_newton import WindowProblem
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _Numbers = np.ndarray
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def blended(predicted: Array, estimate: Array, gain: Array, ready: Array = 1.0) -> Array:

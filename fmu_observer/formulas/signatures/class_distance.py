@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.formulas.signatures.envelope import Envelope
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _NO_LINE = 1e9
 """Distance along a line that misses the envelope; finite, so that it traces."""

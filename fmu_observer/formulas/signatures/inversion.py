@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plant_models.hybrid import Array
 from plant_models.hybrid.scan import enclosed, scan
-from plant_models.hybrid.system import Array
 
 _TINY = 1e-300
 """Keeps quotients finite where both of their sides vanish."""

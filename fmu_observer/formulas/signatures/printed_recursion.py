@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.formulas.signatures.tip_recursion import next_tips
-from plant_models.hybrid import Signal, memory
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory
 
 _TOLERANCE = 0.01
 """Of the ordinate, as printed."""

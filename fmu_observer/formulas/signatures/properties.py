@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _Property = Callable[[np.ndarray], np.ndarray]
 _SMALLEST = 1e-3

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Signal, memory
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory
 
 CYCLES = 4.0
 """Tips before the properties count: the first two may be those of a transient."""

@@ -6,8 +6,7 @@ import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel
 from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3, accelerations
-from plant_models.hybrid import input_signal, state
-from plant_models.hybrid.system import Array, vector
+from plant_models.hybrid import Array, input_signal, state, vector
 
 _CHAINS = np.kron(np.eye(3), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, each angle and its rate
 

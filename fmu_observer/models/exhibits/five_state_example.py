@@ -6,8 +6,7 @@ import numpy as np
 
 from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
-from plant_models.hybrid import input_signal, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state
 
 
 def non_triangularisable_example() -> TakagiSugenoModel:

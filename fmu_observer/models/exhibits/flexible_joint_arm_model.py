@@ -16,8 +16,7 @@ from plant_models.exhibits.flexible_joint_arm import (
     Gravity,
     checked_gravity,
 )
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 _NAMES = ("motor_angle", "link_angle", "motor_speed", "link_speed")
 

@@ -9,8 +9,7 @@ import numpy as np
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 _LARGEST_PREMISE = 5.0  # sum of the printed bounds, 1 of sin(y1) and 4 of y2^2
 _STATES = tuple(state(f"x{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4))

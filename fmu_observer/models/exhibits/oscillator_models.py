@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.state_affine import StateAffineModel
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 _PULSATION = 20.0  # [rad/s], w1
 _DRIVE = 10.0  # size of the printed drive, u = 10 sin t

@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 STIFFNESS = 1.0  # g / l [1/s2]
 DAMPING = 0.2  # [1/s]

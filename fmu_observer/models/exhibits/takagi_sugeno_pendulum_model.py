@@ -7,7 +7,7 @@ import numpy as np
 from fmu_observer.models.exhibits.pendulum_model import DAMPING, STIFFNESS, pendulum
 from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _LOWEST = -0.21723362821122166  # smallest value of sin(x)/x, at 4.4934 rad
 _SMALL = 1e-4  # [rad]; below it the series 1 - x^2/6 is exact to rounding

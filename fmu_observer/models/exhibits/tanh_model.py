@@ -8,8 +8,7 @@ import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from plant_models.exhibits.tanh_system import Reading, tanh_term
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 _STIFFNESS = 0.1  # [1/s2]
 _LARGEST_SECOND = 3.2  # of x2, on the orbit through (5, 3)

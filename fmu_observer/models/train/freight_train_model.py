@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
-from plant_models.hybrid import input_signal, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, state, vector
 
 MASS = 90e3  # [kg]
 _DAVIS_A, DAVIS_B, DAVIS_C = 900.0, 32.4, 1.65287  # [N], [N.s/m], [N.s2/m2]

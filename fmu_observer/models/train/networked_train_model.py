@@ -6,8 +6,7 @@ import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.train.freight_train_model import MASS, freight_train
-from plant_models.hybrid import input_signal, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal, vector
 
 
 def networked_train() -> ObserverModel:

@@ -9,8 +9,7 @@ import numpy as np
 from fmu_observer.models.sector_vertices import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from fmu_observer.models.train.freight_train_model import DAVIS_B, DAVIS_C, MASS, TOP_SPEED, freight_train
-from plant_models.hybrid import input_signal
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, input_signal
 
 _SLOWEST = 5.0  # [m/s] of the first vertex, printed
 

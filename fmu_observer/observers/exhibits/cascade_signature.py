@@ -13,9 +13,9 @@ from fmu_observer.formulas.signatures.inversion import curve_distances, interpol
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from fmu_observer.observers.generic.signature.signature_observer import InvertedWindow, SignatureObserver
 from plant_models.exhibits.three_state_cascade import ThreeStateCascade
+from plant_models.hybrid import Array
 from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.scan import enclosed, scan
-from plant_models.hybrid.system import Array
 
 ORDER, POINTS = 67, 34  # printed N and M; N_O = 101
 SIZE = 3.0  # printed set [-3, 3]^3

@@ -12,11 +12,10 @@ from fmu_observer.formulas.signatures.pencil import NextScaling
 from fmu_observer.observers.generic.signature.signature_observer import InvertedWindow, SignatureObserver
 from fmu_observer.observers.parameter_values import Value
 from plant_models.exhibits.ecoli_culture import HOUR, EcoliCulture
-from plant_models.hybrid import parameter, vector
+from plant_models.hybrid import Array, parameter, vector
 from plant_models.hybrid.integration import rk4_step
 from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.scan import enclosed, scan
-from plant_models.hybrid.system import Array
 
 ORDER, POINTS = 6, 2  # printed N; N_O = 8
 NOMINAL = 32

@@ -16,8 +16,7 @@ from fmu_observer.formulas.diagnosis.residual_filters import residual_filter
 from fmu_observer.formulas.diagnosis.windowed_residual import windowed_square
 from fmu_observer.observers.exhibits.pitch_residuals import BLOCKS
 from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
-from plant_models.hybrid import matrix, memory, parameter, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, matrix, memory, parameter, vector
 
 WINDOW = 5  # samples of the observer of the torsion
 

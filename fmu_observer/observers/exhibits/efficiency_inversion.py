@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.formulas.diagnosis.window_inversion import grid_around, invert, smoothed
-from plant_models.hybrid import memory, parameter
+from plant_models.hybrid import Array, memory, parameter, vector
 from plant_models.hybrid.scan import Arrays, enclosed, scan_table
-from plant_models.hybrid.system import Array, vector
 
 BLOCKS = 30  # of the window
 VALUES = 5  # of the grid, N_e

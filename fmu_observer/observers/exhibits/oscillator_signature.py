@@ -12,9 +12,8 @@ from fmu_observer.formulas.signatures.pencil import NextScaling
 from fmu_observer.observers.generic.signature.signature_observer import TABLE_ERROR, InvertedWindow, SignatureObserver
 from fmu_observer.observers.parameter_values import Value
 from plant_models.exhibits.braked_oscillator import BrakedOscillator, Variant
-from plant_models.hybrid import parameter
+from plant_models.hybrid import Array, parameter
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.hybrid.system import Array
 
 ORDER, POINTS = 2, 1  # printed N; N_O = 3
 SET = (1.0, 3.0)  # printed: |x1|, |x2| at most

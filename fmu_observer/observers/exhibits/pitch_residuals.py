@@ -13,8 +13,7 @@ from fmu_observer.formulas.diagnosis.actuator_residual import centred, second_or
 from fmu_observer.formulas.diagnosis.redundancy import disagreement
 from fmu_observer.formulas.diagnosis.residual_filters import residual_filter
 from fmu_observer.formulas.diagnosis.windowed_residual import windowed_square
-from plant_models.hybrid import matrix, memory, parameter, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, matrix, memory, parameter, vector
 
 BLADES, SENSORS = 3, 6
 BLOCKS = 10  # of the long window

@@ -19,10 +19,9 @@ from fmu_observer.formulas.signatures.pencil import NextScaling
 from fmu_observer.observers.generic.signature.signature_observer import TABLE_ERROR, InvertedWindow, SignatureObserver
 from fmu_observer.observers.parameter_values import Value
 from plant_models.exhibits.gas_phase_reaction import GasPhaseReaction
-from plant_models.hybrid import discrete_output, memory, parameter, vector
+from plant_models.hybrid import Array, discrete_output, memory, parameter, vector
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed, scan
-from plant_models.hybrid.system import Array
 
 ORDER, POINTS = 2, 9  # printed N; N_O = 11
 LARGEST = 3.0  # printed set [0, 3]^2

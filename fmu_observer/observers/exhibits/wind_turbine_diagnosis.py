@@ -43,6 +43,7 @@ from fmu_observer.observers.exhibits.wind_turbine_limits import (
 )
 from plant_models.exhibits.wind_turbine.rotor import Rotor
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
@@ -53,7 +54,6 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 
 class _Group(NamedTuple):

@@ -10,8 +10,7 @@ import numpy as np
 
 from fmu_observer.observers.exhibits.drive_train_residuals import GAINS, GAINS_PERIOD, WINDOW
 from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS
-from plant_models.hybrid import OutputWarning, discrete_output
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, OutputWarning, discrete_output
 
 _OUTSIDE_UPDATES = 12.0
 """Updates in a row without a bracket that are too many: the default grid moves from 0.97 to 0.05 in eleven."""

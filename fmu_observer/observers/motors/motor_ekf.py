@@ -10,9 +10,8 @@ import numpy as np
 from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_preset
 from fmu_observer.observers.motors.motor_filter_presets import ROWS, preset_of
 from fmu_observer.observers.motors.motor_jacobians import printed_jacobian, rotor_jacobian
-from plant_models.hybrid import matrix, vector
+from plant_models.hybrid import Array, matrix, vector
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, Frame, euler_step, rotor_voltages
 from plant_models.railway.traction.transforms import to_rotor
 

@@ -7,9 +7,8 @@ from typing import Any, ClassVar, Literal
 
 from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_preset
 from fmu_observer.observers.motors.motor_jacobians import rotor_jacobian
-from plant_models.hybrid import matrix, vector
+from plant_models.hybrid import Array, matrix, vector
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import euler_step
 from plant_models.railway.traction.transforms import to_rotor, to_stator
 

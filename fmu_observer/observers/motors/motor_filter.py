@@ -20,10 +20,18 @@ from fmu_observer.observers.generic.discrete.covariance_requirements import posi
 from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from fmu_observer.observers.model_signals import LOG_LIKELIHOOD, sampling_event
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import HybridSystem, Signal, discrete_output, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    Signal,
+    discrete_output,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+)
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, MOTOR_PARAMETERS, TRACTION_200_KW
 
 STATES = (

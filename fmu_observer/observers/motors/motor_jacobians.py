@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def rotor_jacobian(current_d: Array, current_q: Array, speed: Array, period: Array, p: Any) -> list[list[Array]]:

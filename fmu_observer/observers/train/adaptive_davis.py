@@ -47,8 +47,7 @@ from fmu_observer.observers.train.train_signals import (
     SPEED,
     SPEED_OUTPUT,
 )
-from plant_models.hybrid import Signal, input_signal, matrix, output_signal, parameter, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, input_signal, matrix, output_signal, parameter, vector
 
 _BALISE_WEIGHT = 0.1  # [1/m] [ours]: a metre of a balise counts as 0.1 m/s of the odometer
 C = np.array([[_BALISE_WEIGHT, 0.0], [0.0, 1.0]])

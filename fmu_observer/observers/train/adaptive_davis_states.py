@@ -9,8 +9,7 @@ import numpy as np
 from fmu_observer.formulas.adaptation.adaptation_at_samples import AtSample, Since, first_covariance
 from fmu_observer.formulas.adaptation.adaptive_law import Sizes
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
-from plant_models.hybrid import matrix, memory, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, matrix, memory, state, vector
 
 SIZES = Sizes(2, 3, 2, sampled=True)
 SCALE = 30.0  # [m/s]: constants are what each term of the resistance is at this speed [m/s2]

@@ -18,9 +18,8 @@ from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainT
 from fmu_observer.observers.train.train_observer import TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, WheelStage
-from plant_models.hybrid import Signal, memory, output_signal, parameter
+from plant_models.hybrid import Array, Signal, memory, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 _FirstStage = Literal["effort", "differentiator", "multirate"]
 _SpeedSource = Literal["odometer", "estimated"]

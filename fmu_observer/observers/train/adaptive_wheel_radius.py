@@ -32,8 +32,7 @@ from fmu_observer.observers.train.train_signals import (
     POSITION,
     POSITION_OUTPUT,
 )
-from plant_models.hybrid import Signal, input_signal, matrix, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, input_signal, matrix, output_signal, parameter, state
 
 SIZES = Sizes(1, 1, 1, sampled=True)
 C = np.ones((1, 1))

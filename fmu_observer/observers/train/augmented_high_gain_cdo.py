@@ -13,9 +13,8 @@ from fmu_observer.observers.train.augmented_observer import ORDER, WAYS_OF_FIXES
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES, MultirateStage
-from plant_models.hybrid import parameter
+from plant_models.hybrid import Array, parameter
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 _FirstStage = Literal["multirate", "differentiator"]
 

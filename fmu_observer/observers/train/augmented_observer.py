@@ -21,6 +21,7 @@ from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import POSITION, SPEED
 from plant_models.hybrid import (
+    Array,
     PeriodicEvent,
     Signal,
     TriggeredEvent,
@@ -31,7 +32,6 @@ from plant_models.hybrid import (
     state,
 )
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4  # position, speed, unknown acceleration, its rate

@@ -11,8 +11,7 @@ import numpy as np
 
 from fmu_observer.design.augmented_gains import augmented_matrix
 from fmu_observer.observers.train.augmented_observer import ORDER, WAYS_OF_FIXES, AugmentedTrainObserver, Fixes
-from plant_models.hybrid import parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, parameter
 
 NONE = (0.0,) * ORDER
 # design_for_gap(0.5), and position_gains of UNIT_POLES times 1.5 and 0.7, rounded to six digits; a test recomputes

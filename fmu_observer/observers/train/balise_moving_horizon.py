@@ -39,9 +39,8 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     transition,
 )
 from fmu_observer.observers.train.train_signals import BALISE
-from plant_models.hybrid import OutputWarning, discrete_output, memory, parameter, vector
+from plant_models.hybrid import Array, OutputWarning, discrete_output, memory, parameter, vector
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
 LAYOUT = RowLayout(inputs=ORDER + 5, measurements=1)

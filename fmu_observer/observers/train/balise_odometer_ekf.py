@@ -37,8 +37,17 @@ from fmu_observer.observers.train.train_signals import (
     SPEED_OUTPUT,
     TRAIN_PARAMETERS,
 )
-from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import (
+    Array,
+    Signal,
+    discrete_output,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4

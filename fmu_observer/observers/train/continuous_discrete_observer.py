@@ -6,7 +6,7 @@ from typing import Any
 
 from fmu_observer.observers.train.held_odometer_error import gain_level, gain_norm
 from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class ContinuousDiscreteObserver(HeldOdometerObserver):

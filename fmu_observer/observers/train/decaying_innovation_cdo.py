@@ -20,8 +20,7 @@ from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range
 from fmu_observer.observers.train.train_signals import POSITION, SPEED
-from plant_models.hybrid import Signal, memory, scalar_names
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory, scalar_names
 
 _TRIAL_SPEED, _TRIAL_ERROR = 20.0, 5.0  # [m/s], [m] of the start; a tenth of it in m/s
 _LONGEST_HOLE = 100.0  # [s]

@@ -14,8 +14,7 @@ from fmu_observer.observers.generic.delayed.delayed_state_observer import (
     Between,
     DelayedStateObserver,
 )
-from plant_models.hybrid import TriggeredEvent, input_signal, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, TriggeredEvent, input_signal, vector
 
 
 class DelayedTrainObserver(DelayedStateObserver):

@@ -13,8 +13,7 @@ from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION
-from plant_models.hybrid import parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, parameter, state
 
 # Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes
 # them.

@@ -7,8 +7,7 @@ from typing import Any
 
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from fmu_observer.observers.train.train_signals import BALISE_INNOVATION
-from plant_models.hybrid import Signal, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, output_signal, parameter, state
 
 START, LIMIT, RATE = 20.0, 8.0, 1.0 / 12.0  # [1/s], [1/s], [1] [ours], as `dynamic_high_gain`
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fmu_observer.certificates.bounds.carried import decay_proven, level_squared
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def first_gain(z: Array, p: Any) -> Array:

@@ -33,10 +33,9 @@ from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
-from plant_models.hybrid import input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid import Array, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 _BOUND_NUMBERS = {  # of `ErrorBounds`: by which parameter
     "period": "odometer_period",

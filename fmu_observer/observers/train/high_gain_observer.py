@@ -20,8 +20,7 @@ from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
 from fmu_observer.observers.train.wheel_stage import WheelStage
-from plant_models.hybrid import Signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, parameter
 
 TOP_SPEED = 50.0  # [m/s], the range of speeds over which stability is certified
 

@@ -7,8 +7,7 @@ from typing import Any
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import WARN
 from fmu_observer.observers.train.train_signals import BALISE, INNOVATION_OUTPUT, LAST_INNOVATION, ODOMETER, POSITION
-from plant_models.hybrid import output_signal
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, output_signal
 
 
 class OdometerReset(GatedObserver):

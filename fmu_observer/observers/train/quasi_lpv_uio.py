@@ -38,9 +38,8 @@ from fmu_observer.observers.train.train_signals import (
     POSITION_OUTPUT,
     SPEED_OUTPUT,
 )
-from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import Array, Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 SPEEDS = 21  # between the vertices, for the certificate
 HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for

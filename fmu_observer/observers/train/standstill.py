@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid import output_signal
-from plant_models.hybrid.output_warning import OutputWarning
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, OutputWarning, output_signal
 
 _ROLL_BACK = 0.3  # [m/s] [ours]: what a wheel must turn backwards for to be no noise: six deviations of 0.05 m/s
 _FADING = 1.0  # [1/s] [ours]: of a disturbance's rate at standstill, where an observer has no rate of its own for it

@@ -34,6 +34,8 @@ from fmu_observer.observers.train.train_signals import (
     SPEED_OUTPUT,
 )
 from plant_models.hybrid import (
+    Array,
+    OutputWarning,
     PeriodicEvent,
     Signal,
     discrete_output,
@@ -43,8 +45,6 @@ from plant_models.hybrid import (
     parameter,
     state,
 )
-from plant_models.hybrid.output_warning import OutputWarning
-from plant_models.hybrid.system import Array
 
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
 _PRINTED_START = {"estimated_speed": 30.0, "disturbance_estimate": -0.91, "disturbance_rate": 0.13}

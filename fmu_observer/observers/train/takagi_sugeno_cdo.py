@@ -14,9 +14,8 @@ from fmu_observer.design.certified_gains import balise_family, certified_gains
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
-from plant_models.hybrid import memory, parameter
+from plant_models.hybrid import Array, memory, parameter
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Premise = Literal["frozen", "live", "estimated"]
 

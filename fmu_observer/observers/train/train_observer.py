@@ -25,8 +25,16 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back
 from fmu_observer.observers.train.train_signals import BALISE, POSITION_OUTPUT, SPEED_OUTPUT, TRAIN_PARAMETERS
-from plant_models.hybrid import PeriodicEvent, Signal, TriggeredEvent, input_signal, output_signal, parameter, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import (
+    Array,
+    PeriodicEvent,
+    Signal,
+    TriggeredEvent,
+    input_signal,
+    output_signal,
+    parameter,
+    vector,
+)
 
 
 class Estimate(NamedTuple):

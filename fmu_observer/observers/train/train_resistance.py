@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def rolling_drag(speed: Array, p: Any) -> Array:

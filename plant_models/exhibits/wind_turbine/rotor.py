@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 HEIER_LARGEST = 0.48
 """Largest power coefficient of Heier's formula, at a tip speed ratio of 8.1 and zero pitch [1]."""

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 
 
 class Wind(HybridSystem):

@@ -13,6 +13,7 @@ import numpy as np
 from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
 from plant_models.exhibits.wind_turbine.rotor import Rotor
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
@@ -24,7 +25,6 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 BLADES = 3
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 LEAST_SPEED = 1.0  # [rad/s]; a generator that stands would be asked for an infinite torque
 

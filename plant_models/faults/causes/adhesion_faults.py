@@ -16,7 +16,7 @@ from plant_models.faults.fault_cause import (
     FaultCause,
     one_where,
 )
-from plant_models.hybrid.arrays import Array
+from plant_models.hybrid import Array
 from plant_models.hybrid.signal import parameter, state
 
 ROLLING = 1e-12

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.faults.fault_cause import BRAKE_RELEASED, EFFORT, RELEASE_TIME, Fault, FaultCause, one_where
-from plant_models.hybrid.arrays import Array
+from plant_models.hybrid import Array
 from plant_models.hybrid.event import PeriodicEvent
 from plant_models.hybrid.signal import input_signal, memory, parameter, state
 

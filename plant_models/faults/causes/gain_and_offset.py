@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.faults.fault_cause import Carrier, Fault, TimedFaults
-from plant_models.hybrid.arrays import Array
+from plant_models.hybrid import Array
 from plant_models.hybrid.signal import parameter
 
 

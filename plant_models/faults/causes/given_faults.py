@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.faults.fault_cause import BRAKE_RELEASED, RELEASE_TIME, Carrier, Fault, TimedFaults, one_where
-from plant_models.hybrid.arrays import Array, vector
+from plant_models.hybrid import Array, vector
 from plant_models.hybrid.signal import parameter, state
 
 

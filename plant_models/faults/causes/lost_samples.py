@@ -9,7 +9,7 @@ import numpy as np
 
 from plant_models.faults.causes.gain_and_offset import GainAndOffset
 from plant_models.faults.fault_cause import Carrier, one_where
-from plant_models.hybrid.arrays import Array, vector
+from plant_models.hybrid import Array, vector
 from plant_models.hybrid.event import PeriodicEvent
 from plant_models.hybrid.signal import input_signal, memory, parameter
 

@@ -5,7 +5,7 @@ Numbers and one formula; knows nothing of slip, vehicles or track.
 
 from __future__ import annotations
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 STANDING_ADHESION = {
     "sncf_multi_motor_bogie": 0.33,

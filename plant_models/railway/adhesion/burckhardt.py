@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from plant_models.hybrid.signal import Signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, parameter
 from plant_models.railway.adhesion.burckhardt import BURCKHARDT_DEGRADED, BURCKHARDT_NOMINAL, BurckhardtCurve
 from plant_models.railway.adhesion.polach import CREEP_STIFFNESS, POLACH_DRY, POLACH_WET, PolachCurve
 

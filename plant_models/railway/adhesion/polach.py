@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 KMH = 3.6  # km/h in one m/s
 CREEP_STIFFNESS = 25.0

@@ -10,9 +10,8 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.control.brake_blending import air_brake_demand, building_up, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit

@@ -9,8 +9,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
 from plant_models.railway.control.logic import either, every, holds, some
 
 AXLES = 4

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 from plant_models.railway.control.logic import either, some
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def air_brake_demand(force: Array, capacity: Array, full_brake_force: Array) -> Array:

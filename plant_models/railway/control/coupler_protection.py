@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def coupler_headroom(load: Array, soft_limit: Array, limit: Array) -> Array:

@@ -10,9 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
 PROFILE_POINTS = 8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def traction_limit(speed: Array, effort_limit: Array, power_limit: Array) -> Array:

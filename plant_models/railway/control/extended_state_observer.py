@@ -4,7 +4,7 @@ functions.
 
 from __future__ import annotations
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def observer_derivative(

@@ -6,7 +6,7 @@ from functools import reduce
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 def holds(condition: Array) -> Array:

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.railway.control.available_adhesion import next_available_effort
 from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
 from plant_models.railway.control.coupler_protection import effort_steps

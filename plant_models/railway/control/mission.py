@@ -10,9 +10,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.control.logic import either, every, holds
 from plant_models.railway.control.trapezoid import Trapezoid, braking_curve
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 from plant_models.railway.control.logic import either, every, holds, some
 
 TRACTION, ELECTRIC, INDIRECT, COMBINED = 1.0, 2.0, 3.0, 4.0

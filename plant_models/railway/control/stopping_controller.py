@@ -11,9 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.hybrid.output_warning import OutputWarning
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    OutputWarning,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+)
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.stopping_planner import (
     NEVER,

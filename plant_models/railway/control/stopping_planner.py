@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 NEWTON_STEPS = 7  # an eighth changes nothing but the last bit, for c from 1e-6 to 1 - 1e-9
 SERIES_BELOW = 0.3

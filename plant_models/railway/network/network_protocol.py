@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     Signal,
@@ -23,7 +24,6 @@ from plant_models.hybrid import (
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.network.loss import loss_threshold
 from plant_models.railway.network.protocols import quadratic_costs, smallest, try_once_discard
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import (
+    Array,
     CommunicationEvent,
     HybridSystem,
     Resource,
@@ -21,7 +22,6 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.hermite_cubic import HermiteCubic
 from plant_models.railway.track.balise_layout import BaliseLayout, Positions, Spacing
 

@@ -10,15 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    HybridSystem,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, HybridSystem, input_signal, memory, output_signal, parameter, state
 from plant_models.railway.sensors.sampling import sampling_event
 
 BAR = 1e5  # [Pa]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 HALVINGS = 6  # bring the bracket to 1/64 of the step
 PARABOLAS = 5  # each triples the digits

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     PeriodicEvent,
     input_signal,
@@ -22,7 +23,6 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 
 CountFrom = Literal["wheel_speed", "wheel_distance"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 BOUND = 4.0  # standard deviations of noise that count as its bound
 

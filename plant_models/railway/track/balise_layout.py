@@ -12,9 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from plant_models.hybrid import Array, Signal, parameter
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.signal import Signal, parameter
-from plant_models.hybrid.system import Array
 
 UNUSED = 1e30  # [m]; a balise that is not laid lies beyond the end of any track
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _SMALLEST_WIDTH = 1e-9  # equal abscissae make a jump, not a division by zero
 

@@ -10,9 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from plant_models.hybrid import Array, Signal, parameter
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.hybrid.signal import Signal, parameter
-from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_constant, piecewise_linear
 
 ZoneAxis = Literal["time", "position"]

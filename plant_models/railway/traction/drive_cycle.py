@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, output_signal, parameter
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 RPM_1000 = 1000.0 * 2.0 * float(np.pi) / 60.0
 RPM_100 = 0.1 * RPM_1000

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 
 class DriveShaft(HybridSystem):

@@ -7,10 +7,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
 from plant_models.railway.traction.transforms import to_rotor, to_stator
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.traction.transforms import clarke, inverse_clarke
 
 

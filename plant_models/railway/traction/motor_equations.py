@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from plant_models.hybrid import Signal, input_signal, output_signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, input_signal, output_signal, parameter
 from plant_models.railway.traction.transforms import to_rotor
 
 Frame = Literal["rotor", "stator"]

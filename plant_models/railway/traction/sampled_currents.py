@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, PeriodicEvent, Signal, input_signal, memory, parameter
 from plant_models.railway.traction.motor_equations import AXES
 from plant_models.railway.traction.transforms import to_stator
 

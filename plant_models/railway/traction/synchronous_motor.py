@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from plant_models.hybrid import HybridSystem, Signal, state
+from plant_models.hybrid import Array, HybridSystem, Signal, state
 from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import (
     AXES,
     FRAMES,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
-from plant_models.hybrid import Signal, memory
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory
 from plant_models.railway.traction.motor_equations import FRAMES, Frame, euler_step, rotor_voltages
 from plant_models.railway.traction.sampled_currents import PUBLISHED_NOISE, sampling_event
 from plant_models.railway.traction.synchronous_motor import SynchronousMotor

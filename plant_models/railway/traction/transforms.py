@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 ROOT_3 = float(np.sqrt(3.0))
 TO_CONCORDIA = float(np.sqrt(1.5))

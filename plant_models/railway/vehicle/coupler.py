@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.signal import Signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, parameter
 
 COUPLER_PARAMETERS: tuple[Signal, ...] = (
     parameter("coupler_stiffness", "N/m", 2.5e6, "Stiffness of a coupler K", min=0.0),

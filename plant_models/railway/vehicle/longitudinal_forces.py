@@ -10,10 +10,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, OutputWarning, input_signal, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, OutputWarning, Signal, input_signal, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.signal import Signal
-from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
 from plant_models.railway.vehicle.davis_sets import ADHESION_LEVELS, DAVIS_SETS, DavisSet

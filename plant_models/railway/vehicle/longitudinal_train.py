@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from plant_models.hybrid import state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, state, vector
 from plant_models.railway.track.track import GradientShape, ZoneAxis
 from plant_models.railway.vehicle.longitudinal_forces import TRAIN_PRESETS, LongitudinalForces
 

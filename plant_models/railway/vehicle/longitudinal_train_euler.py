@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import PeriodicEvent, memory, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, PeriodicEvent, memory, parameter
 from plant_models.railway.vehicle.longitudinal_forces import TRAIN_PRESETS, LongitudinalForces
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid.arrays import Array, vector
+from plant_models.hybrid import Array, vector
 from plant_models.hybrid.event import PeriodicEvent
 from plant_models.hybrid.signal import Signal, memory, parameter, state
 

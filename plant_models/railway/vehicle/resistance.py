@@ -11,7 +11,7 @@ from math import sqrt
 
 import numpy as np
 
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 GRAVITY = 9.81  # [m/s2], the value of Bouchama 2024, ch. 4
 

@@ -12,9 +12,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, vector
+from plant_models.hybrid import Array, HybridSystem, vector
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion.law import ADHESION_LAWS
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
 from plant_models.railway.vehicle.coupler import coupler_force

@@ -36,12 +36,12 @@ from plant_models.hybrid import (
     PeriodicEvent,
     Runtime,
     input_signal,
+    memory,
     output_signal,
     parameter,
     scalar_names,
     state,
 )
-from plant_models.hybrid.signal import memory
 
 ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
 

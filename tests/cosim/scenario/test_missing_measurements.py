@@ -18,9 +18,8 @@ from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmus import cached_fmu
 from fmus.check.run import check_fmu
 from fmus.fmi.description import read_description
-from plant_models.hybrid import HybridSystem, Runtime, output_signal, state
+from plant_models.hybrid import HybridSystem, Runtime, Signal, output_signal, state
 from plant_models.hybrid.missing import MISSED_SAMPLES
-from plant_models.hybrid.signal import Signal
 
 TIMES = np.arange(0, 31) / 10.0
 GONE = np.isin(np.arange(31), (4, 5, 11, 12, 13, 14, 15, 22))

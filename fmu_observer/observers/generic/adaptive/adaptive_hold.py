@@ -8,8 +8,7 @@ from typing import Any
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
 from fmu_observer.observers.generic.adaptive.adaptive_presets import ADAPTIVE_PRESETS
-from plant_models.hybrid import Signal, memory
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory
 
 
 class AdaptiveHold(AdaptiveObserver):

@@ -49,8 +49,7 @@ from fmu_observer.observers.generic.adaptive.adaptive_trials import adaptive_tri
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import arrival_event, estimate_outputs, estimate_states
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, output_signal, parameter, scalar_names
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, output_signal, parameter, scalar_names
 
 _LATER, _EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
 _LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for

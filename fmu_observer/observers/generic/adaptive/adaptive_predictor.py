@@ -8,9 +8,8 @@ from typing import Any, ClassVar, Literal
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
 from fmu_observer.observers.generic.adaptive.adaptive_presets import ADAPTIVE_PRESETS
-from plant_models.hybrid import Signal, state
+from plant_models.hybrid import Array, Signal, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Sensitivity = Literal["continuous", "sampled"]
 _SENSITIVITIES: tuple[Sensitivity, ...] = ("continuous", "sampled")

@@ -15,8 +15,7 @@ from fmu_observer.models.suitability import linear_part, with_unknown_inputs
 from fmu_observer.observers.generic.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
-from plant_models.hybrid import Signal, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, state
 
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, -1.5 SPEED, ... [ours]
 

@@ -19,8 +19,7 @@ from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_triangular_chain
 from fmu_observer.observers.model_observer import ModelObserver
-from plant_models.hybrid import parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, parameter
 
 
 class HighGain(ModelObserver):

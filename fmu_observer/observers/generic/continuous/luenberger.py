@@ -12,7 +12,7 @@ from fmu_observer.models.known_models import find_model
 from fmu_observer.models.linear_models import linear_part
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, -1.5 SPEED, ... [ours]
 

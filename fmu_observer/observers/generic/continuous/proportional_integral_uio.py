@@ -18,8 +18,7 @@ from fmu_observer.models.suitability import linear_part, with_unknown_inputs
 from fmu_observer.observers.generic.continuous.decay_of_errors import NUMBERS, errors_decay
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from fmu_observer.observers.residual_outputs import residual_gain, residual_outputs, residuals
-from plant_models.hybrid import output_signal, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, output_signal, state
 
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, -1.5 SPEED, ... [ours]
 _PUBLISHED_GAIN = (101.4, 2650.0, 3750.0)  # poles -50, -50 and -1.5 1/s

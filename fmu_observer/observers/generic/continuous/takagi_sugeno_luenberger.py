@@ -15,9 +15,8 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, matrix_parameter, measured_inputs
-from plant_models.hybrid import output_signal, state
+from plant_models.hybrid import Array, output_signal, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Premise = Literal["measured", "estimated"]
 PREMISES: tuple[Premise, ...] = ("measured", "estimated")

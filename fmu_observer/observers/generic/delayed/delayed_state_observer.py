@@ -24,6 +24,7 @@ from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSam
 from fmu_observer.observers.generic.sampled.sampled_observer import per_measurement
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
+    Array,
     PeriodicEvent,
     Signal,
     TriggeredEvent,
@@ -36,7 +37,6 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.hybrid.system import Array
 
 Between = Literal["predicted", "held"]
 BETWEEN: tuple[Between, ...] = ("predicted", "held")

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
+from plant_models.hybrid import Array
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.system import Array
 
 
 class FilteringDifferentiator(SignalDifferentiator):

@@ -9,10 +9,9 @@ from fmu_observer.formulas.differentiation.implicit_recursion import implicit_st
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
 from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
-from plant_models.hybrid import PeriodicEvent, memory, parameter
+from plant_models.hybrid import Array, PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.system import Array
 
 
 class ImplicitDifferentiator(SignalDifferentiator):

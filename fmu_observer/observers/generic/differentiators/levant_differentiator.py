@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from fmu_observer.formulas.differentiation.differentiator import differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class LevantDifferentiator(SignalDifferentiator):

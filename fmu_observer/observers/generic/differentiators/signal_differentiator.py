@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.observers.judged_observer import JudgedObserver
-from plant_models.hybrid import Signal, discrete_output, input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid import Array, Signal, discrete_output, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.system import Array
 
 LARGEST = len(LEVANT_GAINS) - 1
 

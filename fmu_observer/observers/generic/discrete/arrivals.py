@@ -10,8 +10,7 @@ from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.models.observer_model import stacked_of
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from fmu_observer.observers.model_signals import arrival_event, measured_inputs, sampling_event
-from plant_models.hybrid import Event, Signal
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Event, Signal
 
 PERIODIC = "periodic"
 SAMPLING = "sampling"

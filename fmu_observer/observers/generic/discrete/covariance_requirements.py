@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 ROUNDING = 1e-9  # share of the product of two deviations that is taken for zero
 _CARRIED_ROUNDING = 1e-6  # likewise, of a covariance that went through many steps

@@ -8,8 +8,7 @@ import numpy as np
 
 from fmu_observer.formulas.filtering.ensemble import correct_members, inflated, mean_of, variances_of
 from fmu_observer.observers.generic.discrete.member_filter import CorrectedMembers, MemberFilter, Sample
-from plant_models.hybrid import parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, parameter
 
 
 class EnsembleKalmanFilter(MemberFilter):

@@ -17,9 +17,8 @@ from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_
 from fmu_observer.observability import MeasuredSystem, UnobservableError, require_observable
 from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
-from plant_models.hybrid import Signal, memory
+from plant_models.hybrid import Array, Signal, memory
 from plant_models.hybrid.missing import or_else
-from plant_models.hybrid.system import Array
 
 SPEED = 2.0  # [1/s] of the default poles: exp(-SPEED T) [ours]
 

@@ -11,7 +11,7 @@ from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.design.riccati import steady_filter
 from fmu_observer.formulas.filtering.kalman import through
 from fmu_observer.models.filter_models import FilterModel, Known
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 DOUBTED, WRONG = 1e-4, 1e-2  # differences at half the step: told, and too much for a filter to rest on [ours]
 _INACCURATE = (

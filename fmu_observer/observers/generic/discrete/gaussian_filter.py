@@ -30,11 +30,10 @@ from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import matrix_parameter
-from plant_models.hybrid import Signal, parameter, vector
+from plant_models.hybrid import Array, Signal, parameter, vector
 from plant_models.hybrid.missing import is_there
 from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 Form = Literal["joseph", "short", "square_root"]
 

@@ -33,11 +33,10 @@ from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import Signal, parameter, vector
+from plant_models.hybrid import Array, Signal, parameter, vector
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
 _UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values

@@ -9,8 +9,7 @@ import numpy as np
 from fmu_observer.formulas.filtering.particles import effective_size, innovation_square, moments, resampled, reweighted
 from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observers.generic.discrete.member_filter import DEFAULT, CorrectedMembers, MemberFilter, Sample
-from plant_models.hybrid import discrete_output, memory, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, discrete_output, memory, parameter
 
 
 class ParticleFilter(MemberFilter):

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Signal, memory
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory
 
 Update = Callable[[Any], dict[str, Array]]  # named tuple of the memory -> what of it changes, by name
 

@@ -15,9 +15,8 @@ from fmu_observer.models.filter_models import Known
 from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import Form, GaussianFilter
-from plant_models.hybrid import parameter
+from plant_models.hybrid import Array, parameter
 from plant_models.hybrid.missing import is_there, or_else
-from plant_models.hybrid.system import Array
 
 _ALPHA, BETA, _KAPPA = 1e-3, 2.0, 0.0  # Allaoui 2024, section II.6
 

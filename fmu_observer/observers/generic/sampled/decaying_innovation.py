@@ -15,8 +15,7 @@ from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_par
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.held_innovation import HeldInnovation
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import Signal
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal
 
 _DECAY_RATE, _DECAY_EXPONENT = 10.0, 0.5  # [1/s], [1]; Hann 2014, section 3.4.3
 _PUBLISHED_THETA, _PUBLISHED_K = 10.0, (1.0, 2.0)

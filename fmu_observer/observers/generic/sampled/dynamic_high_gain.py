@@ -12,8 +12,7 @@ from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import Dynamic
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.output_predictor import OutputPredictor
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import Signal, output_signal, parameter, state
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, output_signal, parameter, state
 
 _THETA_LIMIT, _THETA_RATE, _THETA_START = (
     5.0,

@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class ExponentialGain(HighGainSampled):

@@ -14,8 +14,7 @@ from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.sampled_observer import SampledObserver, check_chain, per_measurement
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import Signal, parameter, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, parameter, vector
 
 THETA = 2.0  # [1/s] [ours]; two states: gaps up to 4 / theta = 2 s
 

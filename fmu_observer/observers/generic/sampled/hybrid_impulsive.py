@@ -14,7 +14,7 @@ from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.high_gain_sampled import THETA, chain_gain
 from fmu_observer.observers.generic.sampled.sampled_observer import SampledObserver, check_chain, per_measurement
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 _JUMP_SHARE = 0.5  # of the correction of a sample that is given at once [ours]
 

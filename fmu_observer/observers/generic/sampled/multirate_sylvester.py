@@ -20,9 +20,8 @@ from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import estimate_outputs, matrix_parameter, measured_inputs
-from plant_models.hybrid import Signal, TriggeredEvent, state
+from plant_models.hybrid import Array, Signal, TriggeredEvent, state
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.system import Array
 
 _MULTIRATE_MODELS: dict[str, Callable[[], ObserverModel]] = {"inverted_pendulum_cart": inverted_pendulum_cart}
 

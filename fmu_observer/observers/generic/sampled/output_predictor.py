@@ -10,7 +10,7 @@ from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.generic.sampled.sampled_observer import per_measurement
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array
 
 
 class OutputPredictor(HighGainSampled):

@@ -17,9 +17,8 @@ from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observability import MeasuredSystem, require_observable
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.model_observer import ModelObserver
-from plant_models.hybrid import parameter, state, vector
+from plant_models.hybrid import Array, parameter, state, vector
 from plant_models.hybrid.missing import is_there
-from plant_models.hybrid.system import Array
 
 THETA = 1.5  # [1/s] [ours]
 _OUTPUT_WEIGHT = 0.2  # r [ours]

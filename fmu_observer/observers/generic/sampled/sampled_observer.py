@@ -22,8 +22,7 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver
 from fmu_observer.observers.model_trial import model_trial
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, scalar_names, state, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, scalar_names, state, vector
 
 
 class SampledObserver(ModelObserver, GatedObserver, GapCertified):

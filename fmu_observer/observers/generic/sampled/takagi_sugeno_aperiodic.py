@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.observers.generic.sampled.takagi_sugeno_held import TakagiSugenoHeld
-from plant_models.hybrid import Signal, memory, vector
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory, vector
 
 
 class TakagiSugenoAperiodic(TakagiSugenoHeld):

@@ -23,9 +23,18 @@ from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import GAINS, Ta
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, measured_inputs
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, TriggeredEvent, discrete_output, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    Array,
+    Signal,
+    TriggeredEvent,
+    discrete_output,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.system import Array
 
 Premise = Literal["estimated", "live", "frozen"]
 PREMISES: tuple[Premise, ...] = ("estimated", "live", "frozen")

@@ -34,8 +34,7 @@ from fmu_observer.observers.model_signals import (
     measured_inputs,
     sampling_event,
 )
-from plant_models.hybrid import Signal, memory
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, memory
 
 SPEED, _SPEED_GAP = 2.0, 0.4  # default poles from -min(SPEED [1/s], _SPEED_GAP / longest gap) on [ours]
 SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certified

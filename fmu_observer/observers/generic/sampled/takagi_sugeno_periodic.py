@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fmu_observer.observers.generic.sampled.takagi_sugeno_held import TakagiSugenoHeld
-from plant_models.hybrid import Signal, parameter
-from plant_models.hybrid.system import Array
+from plant_models.hybrid import Array, Signal, parameter
 
 
 class TakagiSugenoPeriodic(TakagiSugenoHeld):

@@ -17,6 +17,7 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.exhibits.noisy_plant import NoisyPlant
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
@@ -30,7 +31,6 @@ from plant_models.hybrid import (
 from plant_models.hybrid.integration import rk4_step
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.scan import enclosed, scan
-from plant_models.hybrid.system import Array
 
 _OUTSIDE_CELLS = 0.5
 """Cells beyond its table from which a window counts as outside: less comes of rounding and of mild noise."""

@@ -13,6 +13,7 @@ from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from fmu_observer.formulas.signatures.printed_recursion import PRINTED_MEMORY, next_printed
 from fmu_observer.formulas.signatures.tip_recursion import CYCLES, TIP_MEMORY, next_tips
 from plant_models.hybrid import (
+    Array,
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
@@ -24,7 +25,6 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.hybrid.system import Array
 
 Reading = Literal["repaired", "as_published"]
 LONG, SHORT = 100, 50  # orders of the properties that ship
