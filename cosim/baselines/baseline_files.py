@@ -20,7 +20,7 @@ from cosim.baselines.recipe import Recipe
 from cosim.comparison.tolerance import Tolerances
 from cosim.errors import BaselineError, OutputError, nearest
 from cosim.results.result import Result
-from cosim.results.summary_file import jsonable
+from fmus.tables.plain_data import jsonable
 
 Change = Literal["new", "changed", "unchanged"]
 MARKERS = ("<<<<<<< ", "=======", ">>>>>>> ")

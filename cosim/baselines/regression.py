@@ -17,8 +17,8 @@ from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import Result
-from cosim.results.summary_file import jsonable
 from cosim.run.outcome import Outcome
+from fmus.tables.plain_data import jsonable
 
 MODELS = ("FMU", "block")
 """Components that are models; a recording that is played back is not."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.calibration.runs import Runs
 from cosim.errors import nearest
-from cosim.evaluation.numbers import number
 from fmu_observer.identification.least_squares import Fit, fit, unseen_directions
+from fmus.tables.numbers import number
 from fmus.text_table import text_table
 
 Array = NDArray[np.float64]

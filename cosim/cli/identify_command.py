@@ -14,7 +14,6 @@ from cosim.cli.output import print_json, save_figure, write_text
 from cosim.cli.scenarios import parse_setting
 from cosim.components.recording_data import column_courses, interval_ends
 from cosim.errors import CosimError, ScenarioError, nearest
-from cosim.evaluation.numbers import number
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.simulation.scenario import Scenario
@@ -26,6 +25,7 @@ from fmu_observer.identification.davis import (
 )
 from fmu_observer.identification.davis_estimate import DavisEstimate, IdentificationError
 from fmus.cli.commands import Action, Actions, argument
+from fmus.tables.numbers import number
 from fmus.text_table import text_table
 
 DONE, NOT_IDENTIFIED = 0, 1

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from cosim.errors import OutputError
-from cosim.results.summary_file import jsonable
 from fmus.plain import plain
+from fmus.tables.plain_data import jsonable
 
 
 def print_json(data: Any) -> None:

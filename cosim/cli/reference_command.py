@@ -11,7 +11,6 @@ import numpy as np
 from cosim.balises.recorded import read_layout
 from cosim.cli.output import print_json
 from cosim.errors import CosimError, ScenarioError, nearest
-from cosim.evaluation.numbers import number
 from cosim.evaluation.reference_trajectory import (
     GATE,
     JERK,
@@ -26,6 +25,7 @@ from cosim.results.load_result import load_result
 from cosim.results.result import Result, SignalInfo
 from cosim.results.save import save_result
 from fmus.cli.commands import argument
+from fmus.tables.numbers import number
 
 DONE = 0
 BALISE = 0.5  # standard deviation of a balise's position where no accuracy was told [m]

@@ -11,11 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.evaluation.metrics import FEWEST_INSTANTS
-from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 from fmu_observer.formulas.filtering.covariance_consistency import Consistency, judge, normalised_squares
+from fmus.tables.numbers import number
 
 Kind = Literal["NIS", "NEES", "error"]
 STD = "_std"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cosim.evaluation.consistency import MEANING, FilterConsistency
-from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from fmus.tables.numbers import number
 from fmus.text_table import text_table
 
 HEADINGS = ("Judged by", "Expected", "Mean", "Band of the mean, 99 %", "Samples inside 95 % band [%]", "Verdict")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.evaluation.numbers import DASH
 from cosim.evaluation.summary_entries import list_entry, number_entry
 from cosim.results.result import Result
+from fmus.tables.numbers import DASH
 from fmus.text_table import text_table
 
 KINDS = {

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from fmus.tables.numbers import error_number, number
 from fmus.text_table import text_table
 
 

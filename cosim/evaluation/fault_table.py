@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from statistics import fmean
 
 from cosim.evaluation.fault_detection import FaultDetection, Interval
-from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from fmus.tables.numbers import DASH, error_number, number
 from fmus.text_table import text_table
 
 HEADINGS = (

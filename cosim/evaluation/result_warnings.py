@@ -11,11 +11,11 @@ import numpy as np
 
 from cosim.evaluation.consistency import consistency_warnings
 from cosim.evaluation.metrics import FEWEST_INSTANTS, instants, judged_size, within
-from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import estimation_error, label, phases, recorded
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.evaluation.summary_entries import list_entry
 from cosim.results.result import Result
+from fmus.tables.numbers import number
 
 _STANDSTILL = 0.01
 """A train that is never faster than this [m/s] stands."""

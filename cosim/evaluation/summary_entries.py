@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from cosim.evaluation.numbers import number
 from cosim.results.result import Result
+from fmus.tables.numbers import number
 
 
 def mapping_entry(result: Result, key: str) -> Mapping[str, Any]:

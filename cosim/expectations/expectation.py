@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun
-from cosim.table import Table
+from cosim.toml_table import TomlTable
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
@@ -18,7 +18,7 @@ Limit = Annotated[float, Field(ge=0.0)]
 Count = Annotated[int, Field(ge=0)]
 
 
-class Expectation(Table):
+class Expectation(TomlTable):
     """An expectation. Its fields are the keys in a scenario file; ``check: Literal["..."]`` says its name there.
 
     Args:

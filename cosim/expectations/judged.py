@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from math import isfinite, nan
 from typing import Any
 
-from cosim.evaluation.numbers import number
+from fmus.tables.numbers import number
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from cosim.table import OwnSeed, Table
+from cosim.toml_table import OwnSeed, TomlTable
 from plant_models.hybrid.noise import FROM_NAME
 
 Kind = Literal["ekf", "ukf", "ensemble", "particle"]
@@ -14,7 +14,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-class FilterTable(Table):
+class FilterTable(TomlTable):
     """A filter over the FMU of its component.
 
     Each key of a mapping is a name of the FMU; standard deviations are in the unit of that variable.

@@ -15,10 +15,10 @@ import scipy
 from numpy.typing import NDArray
 
 from cosim.errors import OutputError, nearest
-from cosim.evaluation.numbers import number
 from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import Mode, unobservable_modes
+from fmus.tables.numbers import number
 from fmus.text_table import text_table
 
 Array = NDArray[np.float64]

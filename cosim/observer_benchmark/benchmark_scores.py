@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.evaluation.error_table import error_text
-from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.observer_scores import ObserverScore
 from cosim.observer_benchmark.observer_table import aligned, main_row
 from cosim.run.outcome import Outcome
+from fmus.tables.numbers import cell
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
 from cosim.evaluation.roles import Quantity, estimate, estimation_error
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
-from cosim.results.summary_file import jsonable
+from fmus.tables.plain_data import jsonable
 
 WHOLE = "whole run"
 

@@ -9,8 +9,8 @@ from math import inf
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.evaluation.numbers import number
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore
+from fmus.tables.numbers import number
 from fmus.text_table import text_table
 
 

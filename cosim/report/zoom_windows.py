@@ -14,12 +14,12 @@ from cosim.evaluation.corrections import corrections
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants
-from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import number_entry
 from cosim.report.figures.scales import error_scale
 from cosim.results.result import BaliseRecord, Result
+from fmus.tables.numbers import number
 
 _FEWEST_ROWS = 3  # below these there is nothing to enlarge
 MOST = 6  # windows; more would hide what matters

@@ -17,11 +17,11 @@ import tomli_w
 
 from cosim.errors import OutputError
 from cosim.results.results_folder import check_writable
-from cosim.results.summary_file import jsonable
 from cosim.run.results_manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
 from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
 from cosim.scenario.saving import plain
+from fmus.tables.plain_data import jsonable
 from fmus.versions import versions
 from plant_models.hybrid.noise import RUN_SEED
 from plant_models.user_file import names_code

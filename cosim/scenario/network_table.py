@@ -11,14 +11,14 @@ from pydantic import Field, model_validator
 
 from cosim.errors import ScenarioError, nearest
 from cosim.network.settings import PRESETS, NetworkSettings, Node
-from cosim.table import Name, OwnSeed, Table
+from cosim.toml_table import Name, OwnSeed, TomlTable
 from plant_models.hybrid.noise import FROM_NAME
 from plant_models.railway.network.protocols import silent_nodes, try_once_discard
 
 CYCLE, PERIOD = "cycle", "period"
 
 
-class NetworkTable(Table):
+class NetworkTable(TomlTable):
     """The network over which measurements travel: its nodes, when they send, and what happens to the packets."""
 
     preset: str | None = None

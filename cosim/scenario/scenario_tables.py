@@ -12,7 +12,7 @@ from cosim.errors import nearest
 from cosim.fmu_filter.settings import FilterTable
 from cosim.results.formats.known_formats import FORMATS
 from cosim.scenario.model_name import Model
-from cosim.table import Name, OwnSeed, Table
+from cosim.toml_table import Name, OwnSeed, TomlTable
 from fmu_observer.event_protocol import LatePolicy
 from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED
 
@@ -81,7 +81,7 @@ def _starts(given: Any) -> Any:
     return {**given, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else given
 
 
-class ComponentTable(Table):
+class ComponentTable(TomlTable):
     """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
 
     fmu: str | None = None
@@ -128,14 +128,14 @@ class ComponentTable(Table):
         return self
 
 
-class FalseTelegramTable(Table):
+class FalseTelegramTable(TomlTable):
     """A telegram without a balise."""
 
     time: float
     offset: float
 
 
-class BalisesTable(Table):
+class BalisesTable(TomlTable):
     """Balises: where they are, how the crossings are found, what happens to the telegrams."""
 
     position: str | None = None
@@ -192,7 +192,7 @@ class BalisesTable(Table):
         return self
 
 
-class IterationTable(Table):
+class IterationTable(TomlTable):
     """How loops are iterated within a communication step."""
 
     method: Literal["fixed-point", "aitken", "newton"] = "newton"
@@ -202,7 +202,7 @@ class IterationTable(Table):
     relaxation: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
 
 
-class MasterTable(Table):
+class MasterTable(TomlTable):
     """How the components are stepped."""
 
     algorithm: Literal["auto", "gauss-seidel", "jacobi", "iterate"] = "auto"
@@ -220,7 +220,7 @@ class MasterTable(Table):
     record_memory: Annotated[float, Field(gt=0.0)] = 256.0
 
 
-class ConnectionTable(Table):
+class ConnectionTable(TomlTable):
     """A connection that does something to the number on its way."""
 
     source: str = Field(alias="from")
@@ -258,7 +258,7 @@ def _format(name: str) -> str:
     return name
 
 
-class PhaseTable(Table):
+class PhaseTable(TomlTable):
     """A part of the run to be judged on its own."""
 
     name: str
@@ -266,7 +266,7 @@ class PhaseTable(Table):
     end: float
 
 
-class MeasureTable(Table):
+class MeasureTable(TomlTable):
     """A column of the printed table of a sweep."""
 
     measure: str
@@ -280,7 +280,7 @@ MeasureItem = Annotated[
 ]
 
 
-class ReportTable(Table):
+class ReportTable(TomlTable):
     """Roles of signals in the report, and the numbers to print beside the measured ones."""
 
     true_position: str | None = None

@@ -29,7 +29,7 @@ from cosim.scenario.scenario_tables import (
     ReportTable,
     Tolerance,
 )
-from cosim.table import Name, Seed, Table
+from cosim.toml_table import Name, Seed, TomlTable
 from fmus.fmi.standard import TIME_TOLERANCE
 from plant_models.hybrid.noise import RUN_SEED
 
@@ -55,7 +55,7 @@ def _adapter(kind: type[Expectation]) -> TypeAdapter[dict[str, Expectation]]:
 ExpectationItem = Annotated[SerializeAsAny[Expectation], PlainValidator(_expectation)]
 
 
-class ScenarioTable(Table):
+class ScenarioTable(TomlTable):
     """A whole scenario."""
 
     title: str = "Co-simulation"
@@ -211,8 +211,8 @@ def _is_form(place: str) -> bool:
 
 
 def _known_keys(location: tuple[Any, ...]) -> list[str]:
-    table: type[Table] = ScenarioTable
-    tables: dict[str, type[Table]] = {
+    table: type[TomlTable] = ScenarioTable
+    tables: dict[str, type[TomlTable]] = {
         "components": ComponentTable,
         "connections": ConnectionTable,
         "balises": BalisesTable,

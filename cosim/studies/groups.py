@@ -16,9 +16,9 @@ import scipy
 
 from cosim.errors import OutputError
 from cosim.evaluation.fault_detection import HOUR, clopper_pearson, garwood
-from cosim.evaluation.numbers import DASH
-from cosim.evaluation.numbers import number as number_text
 from cosim.studies.measures import RATES, SHARES, setting_text
+from fmus.tables.numbers import DASH
+from fmus.tables.numbers import number as number_text
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import numpy as np
 
 from cosim.errors import RunError
 from cosim.evaluation.metrics import phase_metrics
-from cosim.evaluation.numbers import error_number
 from cosim.evaluation.spec import ReportSpec
+from fmus.tables.numbers import error_number
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import OutputError
-from cosim.results.summary_file import jsonable
+from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns

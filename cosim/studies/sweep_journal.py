@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from cosim.errors import OutputError
-from cosim.results.summary_file import jsonable, restored
+from cosim.results.summary_file import restored
 from cosim.scenario.saving import scenario_text
 from cosim.studies.runnable import RunnableScenario
 from cosim.studies.sampling_plans import Variation
 from cosim.studies.sweep_runs import SweepRun
+from fmus.tables.plain_data import jsonable
 from plant_models.user_file import option_files
 
 JOURNAL = "runs.jsonl"

@@ -12,8 +12,8 @@ import tomli_w
 
 from cosim.drawing.style import OBSERVER_LINES, axes_or_new, png, styled
 from cosim.errors import OutputError
-from cosim.results.summary_file import jsonable
 from cosim.scenario.override import override
+from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.evaluation.numbers import number
 from cosim.studies.groups import Spread, mean_of
+from fmus.tables.numbers import number
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from turned_faults import turned
 
 from cosim import Outcome, Scenario
 from cosim.evaluation.balise_gaps import GapErrors, gap_errors, largest, root_mean_square
-from cosim.evaluation.numbers import error_number, number
 from fmu_observer.design.augmented_gains import design_for_gap
+from fmus.tables.numbers import error_number, number
 
 SCENARIO = "amsterdam_utrecht"
 PAGE = Path(__file__).parents[1] / "amsterdam_utrecht.md"

@@ -38,9 +38,9 @@ from jam_runs import (
 
 from cosim.drawing.style import RC
 from cosim.evaluation.fault_detection import clopper_pearson, garwood
-from cosim.evaluation.numbers import number
 from fmu_observer.detection.jam_rules import certain_fault, doubt_limit
 from fmu_observer.observers.train import QuasiLpvUio
+from fmus.tables.numbers import number
 from plant_models.railway.sensors.pulses import reading_bound
 
 LENGTHS = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 2.0, 3.0, 5.0)  # [s]

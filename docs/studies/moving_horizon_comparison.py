@@ -18,7 +18,6 @@ from moving_horizon_solvers import write_table
 
 from cosim import Outcome, Scenario
 from cosim.evaluation.balise_gaps import gap_errors, largest, root_mean_square
-from cosim.evaluation.numbers import error_number, number
 from cosim.observer_benchmark.benchmark import benchmark_observers
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, WINDOW_OUTPUTS, Iterated
@@ -28,6 +27,7 @@ from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, _moved, _seen
 from fmu_observer.observers.train.balise_odometer_ekf import ORDER, TUNABLE
+from fmus.tables.numbers import error_number, number
 from plant_models.hybrid import input_signal, state, vector
 
 try:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from cosim import Scenario
-from cosim.evaluation.numbers import number
 from cosim.studies.groups import Spread, grouped
+from fmus.tables.numbers import number
 
 PAGE = Path(__file__).parents[1] / "validation_campaign.md"
 PART = r"(<!-- study: {name} -->\n)(.*?)(<!-- end -->)"

@@ -16,8 +16,8 @@ from validation_campaign import OBSERVER, PUBLISHED, SEEDS, write
 
 from cosim import Result, Scenario
 from cosim.evaluation.fault_detection import GRACE, intervals
-from cosim.evaluation.numbers import number
 from fmu_observer.certificates.bounds import cdo_bound, dmo_bound, improved_dmo_bound
+from fmus.tables.numbers import number
 
 JAM_CASES = tuple(name for name in PUBLISHED if "micro" not in name)
 PERIOD, STEP = 0.2, 0.05  # [s] of the odometer's readings, of the rows

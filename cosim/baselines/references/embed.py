@@ -36,8 +36,8 @@ from cosim.baselines.references.reference_tables import in_units_of, prefix
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, OutputError
-from cosim.results.summary_file import jsonable
 from cosim.ssp.elements_of_data import add_parameter, child, root_of, text_of
+from fmus.tables.plain_data import jsonable
 
 STAMP = (1980, 1, 1, 0, 0, 0)
 """Of the files added: the earliest a zip file can hold, so that the same content gives the same bytes."""

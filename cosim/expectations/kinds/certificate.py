@@ -10,7 +10,7 @@ from cosim.evaluation.summary_entries import certified_gap, mapping_entry, numbe
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, NotRecordedError
-from cosim.table import Name
+from cosim.toml_table import Name
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before

@@ -9,7 +9,7 @@ from cosim.expectations.expectation import LimitedExpectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, NotRecordedError, span
 from cosim.expectations.sizes import difference, judge_sizes
-from cosim.table import Name
+from cosim.toml_table import Name
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before

@@ -13,7 +13,7 @@ from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.time_window import TimeWindow
 from cosim.results.result_data import BaliseRecord
-from cosim.table import Name
+from cosim.toml_table import Name
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before

@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 
 from cosim.comparison.verdict import ComparisonFinding, Curves, SignalComparison
 from cosim.drawing.style import ALARM, AMBER, BLACK, BLUE, GRID, MARK, TIME, axes_or_new, headline, new_figure, styled
-from cosim.evaluation.numbers import number
 from cosim.report.figures.drawing import curve, legend_above, thin
 from cosim.report.figures.scales import bounded, value_limits
+from fmus.tables.numbers import number
 
 WIDTH, HEIGHT = 7.2, 6.6  # inches, of the whole picture
 REFERENCE = {"color": BLACK, "linestyle": "-", "linewidth": 1.0}

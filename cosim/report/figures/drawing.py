@@ -12,10 +12,10 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from cosim.drawing.style import ALARM, BLACK, MARK, TIME, ZONE
 from cosim.evaluation.event_counts import accepted_stamps
-from cosim.evaluation.numbers import number
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import curve_size
 from cosim.results.result import Result
+from fmus.tables.numbers import number
 
 _BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes
 _MARGINS = 1.0  # width of a figure beside its axes [inch]

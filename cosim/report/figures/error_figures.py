@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 
 from cosim.drawing.style import MARK, WILD_LINE, axes_or_new, observer_line, styled
 from cosim.evaluation.metrics import error_size
-from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import (
@@ -26,6 +25,7 @@ from cosim.report.figures.drawing import (
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum, window_length
 from cosim.results.result import Result
+from fmus.tables.numbers import error_number, number
 
 SPIKE = 3.0  # a curve that leaves the scale by this factor is named
 FAR = 1e3  # sizes are cut this many times beyond a logarithmic axis

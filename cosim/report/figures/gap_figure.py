@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, envelope, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
-from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import certified_gap, mapping_entry
@@ -21,6 +20,7 @@ from cosim.report.figures.drawing import legend_above, logarithmic, shade_zones,
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import bounded
 from cosim.results.result import Result
+from fmus.tables.numbers import number
 
 SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
 MARKERS = "os^Dv<>p"

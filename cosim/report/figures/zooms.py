@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cosim.drawing.style import png
-from cosim.evaluation.numbers import number
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.zoom_figure import zoom_figure
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
 from cosim.results.result import Result
+from fmus.tables.numbers import number
 
 ZOOM_KEYS = tuple(f"zoom_{i}" for i in range(1, MOST + 1))
 """Stems of the file names, in order of time."""

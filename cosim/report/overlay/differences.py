@@ -7,11 +7,11 @@ from hashlib import sha256
 from typing import Any
 
 from cosim.evaluation.event_counts import count_events
-from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import phases
 from cosim.evaluation.summary_entries import list_entry, mapping_entry
 from cosim.report.overlay.overlaid_runs import OverlayRun
 from cosim.results.result import BaliseRecord, Result
+from fmus.tables.numbers import DASH, number
 
 _COMPONENT_ENTRIES = {
     "kind": "kind",

@@ -8,11 +8,11 @@ from math import isfinite, isnan
 
 from cosim.evaluation.error_table import MEASURED
 from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
-from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.roles import label, phases
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
 from cosim.report.page.phases import COLUMNS
+from fmus.tables.numbers import DASH, error_number, number
 
 Values = tuple[float | None, ...]
 

@@ -14,13 +14,13 @@ from pathlib import Path
 
 from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
 from cosim.drawing.style import png
-from cosim.evaluation.numbers import DASH, number
 from cosim.report.figures.comparison_figure import comparison_picture
 from cosim.report.page.page_files import explained, page_bytes, write_file
 from cosim.report.page.page_table import PageTable, simple_table
 from cosim.report.page.render import render
 from cosim.report.page.run_statements import Statement
-from cosim.results.summary_file import jsonable
+from fmus.tables.numbers import DASH, number
+from fmus.tables.plain_data import jsonable
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
 _MOST_PICTURES = 12  # on a page: the worst signals tell the story

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cosim.evaluation.balise_gaps import GapErrors, largest
-from cosim.evaluation.numbers import error_number, number
 from cosim.report.page.page_table import PageTable, simple_table
+from fmus.tables.numbers import error_number, number
 
 KMH = 3.6
 

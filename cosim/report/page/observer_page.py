@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim.drawing.style import png
-from cosim.evaluation.numbers import DASH, cell, number
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
 from cosim.report.page.page_files import explained, write_files
@@ -19,7 +18,8 @@ from cosim.report.page.phases import errors_table
 from cosim.report.page.render import render
 from cosim.report.page.run_tables import HOLDS, telegrams_table
 from cosim.results.result import Result
-from cosim.results.summary_file import jsonable
+from fmus.tables.numbers import DASH, cell, number
+from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:
     from cosim.observer_benchmark.benchmark_scores import BenchmarkScores

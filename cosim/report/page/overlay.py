@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
-from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import number_entry
 from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
@@ -28,6 +27,7 @@ from cosim.report.page.page_table import PageTable, grouped_table, simple_table
 from cosim.report.page.render import render
 from cosim.report.page.run_statements import Statement
 from cosim.results.result import Result
+from fmus.tables.numbers import DASH, error_number, number
 
 PAGE, FIGURES = "overlay.html", "figures"
 SIGNALS_SHOWN = 8  # where no signal has a role

@@ -7,11 +7,11 @@ from itertools import groupby
 
 from cosim.evaluation.error_table import cells, columns
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.evaluation.numbers import DASH, error_number
 from cosim.evaluation.phase_details import PhaseDetails
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.page_table import PageTable, grouped_table
+from fmus.tables.numbers import DASH, error_number
 
 COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to that unit
     "slip": ("Slip error, rms [%]", 100.0),

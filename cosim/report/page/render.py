@@ -9,7 +9,7 @@ from typing import Any
 
 from jinja2 import Environment
 
-from cosim.evaluation.numbers import number
+from fmus.tables.numbers import number
 from fmus.templates import environment
 
 _SENTENCE_END = re.compile(r"(?<=[.]) (?=[A-Z])|(?<=;) ")

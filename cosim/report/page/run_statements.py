@@ -8,12 +8,12 @@ import numpy as np
 
 from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.metrics import judged_size
-from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.result_warnings import all_warnings, result_warnings
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.results.result import Result
+from fmus.tables.numbers import DASH, error_number, number
 
 Statement = tuple[str, str, str, str]
 """Name, value, remark, mood."""

@@ -14,13 +14,13 @@ from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.fault_table import HEADINGS, cells, columns
 from cosim.evaluation.indicators import indicator_statistics
-from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.expectations.judged import Judged
 from cosim.report.page.page_table import PageTable, simple_table
 from cosim.results.result import Result
+from fmus.tables.numbers import DASH, number
 
 LIMITS = ("aperiodic_limit", "constant_limit")
 _CERTIFICATE_COLUMNS = {

@@ -11,8 +11,9 @@ import numpy as np
 
 from cosim.results.events_file import NUMBERS, record_from_row, record_row
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
-from cosim.results.summary_file import jsonable, restored
+from cosim.results.summary_file import restored
 from cosim.results.table_layout import column_names
+from fmus.tables.plain_data import jsonable
 
 BLOCK = 1 << 25  # bytes of a table that are turned over at a time: it may be larger than the memory
 _FROM_JSON = {None: math.nan, "inf": math.inf, "-inf": -math.inf}

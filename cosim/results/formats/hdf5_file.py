@@ -24,8 +24,9 @@ from cosim.results.formats.format import Format
 from cosim.results.formats.guarded_file import GuardedFile
 from cosim.results.optional import optional_module
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
-from cosim.results.summary_file import jsonable, restored
+from cosim.results.summary_file import restored
 from cosim.results.table_layout import table_dtype
+from fmus.tables.plain_data import jsonable
 
 LAYOUT = "fmu-observer result 1"
 TIME, EVENTS = "time", "events"

@@ -15,7 +15,7 @@ from test_fmus.typed import typed_fmu
 
 from cosim import Scenario
 from cosim.errors import CouplingError, FmuLoadError
-from cosim.results.summary_file import jsonable
+from fmus.tables.plain_data import jsonable
 
 DIRECT: Any = {"A": [[-1.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.5]], "inputs": ["u"], "outputs": ["y"]}
 HOLDING: Any = DIRECT | {"D": [[0.0]]}

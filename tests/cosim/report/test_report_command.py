@@ -16,7 +16,7 @@ from cosim.cli.report_command import _labels as default_labels
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import spec_of
 from cosim.results.load_result import load_result
-from cosim.results.summary_file import jsonable
+from fmus.tables.plain_data import jsonable
 
 
 def plain(spec: ReportSpec) -> Any:

@@ -12,11 +12,11 @@ from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 from cosim.evaluation.event_counts import accepted_stamps, count_events
 from cosim.evaluation.indicators import indicator_statistics, on_intervals
 from cosim.evaluation.metrics import error_size, phase_metrics
-from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.scales import error_scale, running_maximum, value_limits
 from cosim.report.page.run_tables import indicators_table
 from cosim.results.result import BaliseRecord, Result
+from fmus.tables.numbers import error_number, number
 
 EXACT = 1e-12  # closed forms, up to the rounding of some thousand sums
 

@@ -16,7 +16,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.results.result import Result
 from cosim.results.results_folder import read_results, write_results
-from cosim.results.summary_file import jsonable
+from fmus.tables.plain_data import jsonable
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.text(max_size=3),

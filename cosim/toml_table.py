@@ -30,7 +30,7 @@ OwnSeed = Annotated[int, PlainValidator(_own_seed)]
 """Seed of something that draws; -1: it follows from the seed of the run and the name."""
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A table of a scenario file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
