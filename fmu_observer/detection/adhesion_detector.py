@@ -91,7 +91,6 @@ class AdhesionDetector(HybridSystem):
         super().__init__(slip_definition=slip_definition)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the filtered slip."""
         return {"filtered_slip": (self._magnitude(u.slip) - x.filtered_slip) / p.slip_filter_time}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -103,7 +102,6 @@ class AdhesionDetector(HybridSystem):
         return {"judged_condition": changed, "contrary_time": np.where(changed != x.judged_condition, 0.0, time)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Verdicts, the two optima and the adhesion limit."""
         nominal, degraded = self._at_speed(u, p, p.nominal_slip_map, p.degraded_slip_map)
         high, low = self._at_speed(u, p, p.nominal_peak_map, p.degraded_peak_map)
         return {

@@ -78,7 +78,6 @@ class CouplerRisk(HybridSystem):
     default_preset = "category_1_mn"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the filtered tension."""
         return {"filtered_tension": self._rate(x, u, p)}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -100,7 +99,6 @@ class CouplerRisk(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Level, utilisation, rate and held peak."""
         return {
             "risk": x.held_level,
             "utilisation": _tension(u) / p.break_force,

@@ -86,7 +86,6 @@ class ExcessiveSlip(HybridSystem):
     default_preset = "experiment"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the filtered slip."""
         slip = odometer_slip(u.odometer, u.speed, p.slip_floor)
         return {"filtered_slip": slip_filter_derivative(x.filtered_slip, slip, p.slip_filter_time)}
 
@@ -105,7 +104,6 @@ class ExcessiveSlip(HybridSystem):
         return {"exceeding_time": time, "quiet_time": quiet, "held_level": level, "held_exceedance": peak}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Slip, indicator and exceedances."""
         return {
             "slip": odometer_slip(u.odometer, u.speed, p.slip_floor),
             "slip_indicator": x.held_level,

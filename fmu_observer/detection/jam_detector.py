@@ -126,10 +126,8 @@ class JamDetector(HybridSystem):
         return noise_warnings(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """A sample is judged."""
         reading = Reading(u.odometer, u.estimated_speed, u.residual, u.effort)
         return self.rules.at_sample(x, reading, p).memory
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Verdict, recovery, and how long the residual has been small."""
         return {**verdict(self.rules, x, p), "settled_time": self.rules.settled_time(x, p)}

@@ -77,12 +77,10 @@ class SlipIndicator(HybridSystem):
     default_preset = "simulation"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the filtered slip."""
         slip = odometer_slip(u.odometer, u.speed, p.slip_floor)
         return {"filtered_slip": slip_filter_derivative(x.filtered_slip, slip, p.slip_filter_time)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Slip and indicator."""
         return {
             "slip": odometer_slip(u.odometer, u.speed, p.slip_floor),
             "slip_indicator": indicator_level(x.filtered_slip, u.odometer, u.speed, p.slip_threshold, p.slip_min_speed),

@@ -139,11 +139,9 @@ class ThresholdDetector(HybridSystem):
         return super().requirements(p) | threshold_requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Judge the residual."""
         return judge(x, u.residual, p.sample_period, p)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The verdict."""
         return {
             "odometer_fault": x.judged_fault,
             "recovering": x.judged_fault * x.armed,

@@ -116,7 +116,6 @@ class TrainDiagnosis(HybridSystem):
         return super().requirements(p) | within_bounds(self.parameters, p)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of dead reckoning, of the ways, and of the modelled pressure."""
         pipe = p.pipe_pressure_released - limited(u.brake_demand) * p.pipe_depression_full
         return {
             "estimated_position": x.voted_speed,
@@ -129,7 +128,6 @@ class TrainDiagnosis(HybridSystem):
         return self._at_balise(x, u, p) if event == "balise" else self._at_sample(t, x, u, p)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The declared outputs."""
         read, codes = readings(u), dict(zip(FAULTS, x.code, strict=True))
         enough = read.fitted[0] * read.fitted[1] * read.fitted[2] * read.has_pressure
         faults = {f"{fault}_fault": code for fault, code in codes.items()}

@@ -74,7 +74,6 @@ class WheelSignature(HybridSystem):
         return super().requirements(p) | within_bounds(self.parameters, p) | {trained: kept}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """A reading is judged."""
         taken, kind = x.readings, x.told_kind
         change = np.where(taken > 0.5, u.odometer - x.last_reading, 0.0)
         record = [*x.changes[1:], change]
@@ -94,7 +93,6 @@ class WheelSignature(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Verdict, kind, class of the newest record, and how long the fault has been told."""
         newest = {"kind": x.told_kind, "change": x.told_change, "fault_time": x.held_time}
         return {"odometer_fault": np.abs(x.told_kind)} | newest
 

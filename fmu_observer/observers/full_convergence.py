@@ -91,7 +91,6 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
         return _iterated_fully(problem, self.effort, *arrays)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """What the observer tells, and how the last search ended."""
         return super().output(t, x, u, p) | _ended(x)
 
     def _declare(self) -> None:
@@ -134,7 +133,6 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
         self.options |= _effort_options(self.effort)
 
     def own_states(self) -> tuple[Any, ...]:
-        """States of the observer, then how the last search ended."""
         return (*super().own_states(), _LAST_SEARCH)
 
     def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
@@ -142,7 +140,6 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
         return _iterated_fully(problem, self.effort, *arrays)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """What the observer tells, and how the last search ended."""
         return super().output(t, x, u, p) | _ended(x)
 
 

@@ -120,7 +120,6 @@ class ModelObserver(JudgedObserver):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates."""
         return named_as(self.model.states, self.estimates(x))
 
     # -- internals --------------------------------------------------------------------------------------------------

@@ -64,17 +64,14 @@ class BrakedOscillator(NoisyPlant):
         super().__init__(variant=variant)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of both states."""
         first, second = x.state_1, x.state_2
         driven = np.sqrt(np.abs(second)) if self.variant == "root" else second
         braked = p.braking * (1.0 - BRAKING[self.variant] * first * first) * driven
         return {"state_1": p.rate_factor * second, "state_2": -STIFFNESS * first + braked}
 
     def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
-        """The output of the variant."""
         mixed = 0.2 * np.sin(x.state_1) + x.state_2
         return ({"mixed": mixed, "speed": x.state_2, "root": x.state_1}[self.variant],)
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """States and output."""
         return {"x1": x.state_1, "x2": x.state_2, "y": self.measured(x, p)[0]}

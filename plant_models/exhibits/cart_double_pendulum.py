@@ -108,7 +108,6 @@ class CartDoublePendulum(NoisyPlant):
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the six states."""
         acceleration, lower, upper = accelerations(*_turning(x), u.force, p)
         return {
             "cart_position": x.cart_speed,
@@ -124,7 +123,6 @@ class CartDoublePendulum(NoisyPlant):
         return x.cart_position, x.lower_angle, x.upper_angle
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """The states and the energy, as the mass matrix in use has it."""
         (first, second), (first_rate, second_rate) = _turning(x)
         a11, a12, a13, a22, a23, a33 = mass_matrix((first, second), p)
         speed = x.cart_speed

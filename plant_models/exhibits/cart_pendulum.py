@@ -89,7 +89,6 @@ class CartPendulum(NoisyPlant):
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the four states."""
         acceleration, angular = accelerations(x.cart_speed, x.pendulum_angle, x.pendulum_rate, u.force, p)
         return {
             "cart_position": x.cart_speed,
@@ -103,7 +102,6 @@ class CartPendulum(NoisyPlant):
         return x.cart_position, x.pendulum_angle
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """The states and the energy."""
         speed, angle, rate, lever = x.cart_speed, x.pendulum_angle, x.pendulum_rate, p.bob_mass * p.length
         kinetic = 0.5 * (
             (p.cart_mass + p.bob_mass) * speed**2

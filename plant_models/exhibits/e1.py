@@ -33,7 +33,6 @@ class TriangularisablePlant(HybridSystem):
     )
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the four states."""
         x1, x2, x3, x4 = x
         damping = p.damping_gain * (np.sin(x1) + x2 * x2)
         return {
@@ -44,7 +43,6 @@ class TriangularisablePlant(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The states and the drive."""
         return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
 
     @staticmethod

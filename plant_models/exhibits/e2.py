@@ -30,7 +30,6 @@ class NonTriangularisablePlant(HybridSystem):
     parameters = (parameter("drive_gain", "1", 1.0, "Size of the printed drive"),)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the five states."""
         x1, x2, x3, x4, x5 = x
         a = 1.0 / (1.0 + x4 * x4)
         drive = self._drive(t, u, p)
@@ -43,7 +42,6 @@ class NonTriangularisablePlant(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The states and the drive."""
         return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
 
     @staticmethod

@@ -84,7 +84,6 @@ class EcoliCulture(NoisyPlant):
         super().__init__(glycerol=glycerol)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the three states."""
         X, P = x.biomass_state, x.enzyme_state
         mu, fed = self._growth(x.glycerol_state, p)
         decay = np.where(P > 0.0, p.decay_rate * np.exp(-p.decay_threshold / np.where(P > 0.0, P, 1.0)), 0.0)
@@ -101,7 +100,6 @@ class EcoliCulture(NoisyPlant):
         return X, p.light_yield * growing * _induction(p) * X * x.enzyme_state
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """States and light."""
         biomass, light = self.measured(x, p)
         return {"biomass": biomass, "glycerol": x.glycerol_state, "enzyme": x.enzyme_state, "light": light}
 

@@ -63,7 +63,6 @@ class FlexibleJointArm(HybridSystem):
         super().__init__(gravity=gravity)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the four states."""
         twist = x.motor_angle - x.link_angle
         return {
             "motor_angle": x.motor_speed,
@@ -73,7 +72,6 @@ class FlexibleJointArm(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The states and the drive."""
         names = [s.name for s in self.outputs[:4]]
         return dict(zip(names, x, strict=True)) | {"total_drive": self._drive(t, u, p)}
 

@@ -49,14 +49,11 @@ class GasPhaseReaction(NoisyPlant):
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of both states."""
         reaction = p.rate * x.state_1 * x.state_1
         return {"state_1": -2.0 * reaction, "state_2": reaction}
 
     def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
-        """The total pressure."""
         return (x.state_1 + x.state_2,)
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """States and output."""
         return {"x1": x.state_1, "x2": x.state_2, "y": x.state_1 + x.state_2}

@@ -101,7 +101,6 @@ class NoisyPlant(HybridSystem):
         return moved | held
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The plain outputs and the held measurements."""
         held = {s.name: getattr(x, f"held_{s.name}") for s in self.outputs[len(self.plain_outputs) :]}
         return self.plain(x, p) | held
 

@@ -47,7 +47,6 @@ class Pendulum(HybridSystem):
     default_preset = "swinging"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of angle and rate."""
         turning = -p.stiffness * np.sin(x.pendulum_angle) - p.damping * x.pendulum_rate + u.torque
         return {"pendulum_angle": x.pendulum_rate, "pendulum_rate": turning}
 

@@ -99,12 +99,10 @@ class StateFeedback(HybridSystem):
         super().__init__(plant=plant)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The new force."""
         told = [getattr(u, s.name) for s in self.inputs]
         wanted = -sum(p.gain[i] * value for i, value in enumerate(told))
         limited = np.minimum(np.maximum(wanted, -p.force_limit), p.force_limit)
         return {"held_force": np.where(p.force_limit > 0.0, limited, wanted)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The held force."""
         return {"force": x.held_force}

@@ -44,12 +44,10 @@ class TanhSystem(HybridSystem):
         super().__init__(reading=reading)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of both states."""
         braked = p.tanh_gain * tanh_term(x.first, x.second, self.reading)
         return {"first": x.second, "second": -p.stiffness * x.first + braked}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Both states."""
         return {"x1": x.first, "x2": x.second}
 
 

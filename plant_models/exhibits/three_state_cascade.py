@@ -48,15 +48,12 @@ class ThreeStateCascade(NoisyPlant):
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the three states."""
         e, second, third = p.nonlinearity, x.state_2, x.state_3
         first = second - e * x.state_1 * np.abs(second) ** (1.0 / 3.0)
         return {"state_1": first, "state_2": third + e * second * third, "state_3": p.ramp}
 
     def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
-        """The first state."""
         return (x.state_1,)
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """The states."""
         return {"x1": x.state_1, "x2": x.state_2, "x3": x.state_3}

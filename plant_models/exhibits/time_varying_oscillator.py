@@ -45,11 +45,9 @@ class TimeVaryingOscillator(HybridSystem):
     default_preset = "as_published"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of both states."""
         first, second = np.sin(p.pulsation * t), np.cos(p.pulsation * t + p.phase) / (1.0 + p.fading * t * t)
         driven = (2.0 + np.tanh(t)) * (DRIVE * np.sin(t) + u.drive)
         return {"state_1": x.state_2 + first * p.rho1, "state_2": -x.state_1 + second * p.rho2 + driven}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The states."""
         return {"x1": x.state_1, "x2": x.state_2}

@@ -55,12 +55,10 @@ class VanDerPol(HybridSystem):
     default_preset = "nominal"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of both states."""
         p1, p2 = np.clip(p.p1 + u.p1_change, 0.0, LARGEST), np.clip(p.p2 + u.p2_change, 0.0, LARGEST)
         shifted = x.oscillation + np.clip(p.p3 + u.p3_change, -LARGEST_SHIFT, LARGEST_SHIFT)
         damped = p2 * (1.0 - shifted * shifted) * x.oscillation_rate
         return {"oscillation": p1 * x.oscillation_rate, "oscillation_rate": -p.stiffness * x.oscillation + damped}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Both states."""
         return {"measured": x.oscillation, "x2": x.oscillation_rate}

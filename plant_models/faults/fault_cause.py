@@ -144,7 +144,6 @@ class TimedFaults(FaultCause):
         return sum(one_where(self.lasting(i, p) > 0.0) * (1.0 - self.over(i, passed)) for i in range(self.count))
 
     def switching(self, t: Array, x: Any, u: Any, p: Any) -> Sequence[Array]:
-        """Onsets and ends."""
         faults = range(self.count)
         begun = [t - p.fault_onset[i] for i in faults]
         return [*begun, *(t - (p.fault_onset[i] + self.lasting(i, p)) for i in faults)]

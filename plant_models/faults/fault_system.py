@@ -63,11 +63,9 @@ class FaultSystem(HybridSystem):
         return values, fault if fault.added else fault._replace(added=[0.0] * len(values))
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the states of the cause."""
         return self.cause.rates(t, x, u, p, self.switches(t, x, u, p))
 
     def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
-        """Switching functions of the cause."""
         edges = self.cause.switching(t, x, u, p)
         return vector(*edges) if edges else np.zeros(0)
 

@@ -80,7 +80,6 @@ class SignalFault(FaultSystem):
         return [u.healthy] if self.channels == 1 else [u.healthy[channel] for channel in range(self.channels)]
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The signals with their faults, whether one acts, and how many are not over."""
         values, fault = self.faulty(t, x, u, p)
         readings = [v * (1.0 + fault.depth) + a for v, a in zip(values, fault.added, strict=True)]
         return {

@@ -79,14 +79,12 @@ class WheelFault(FaultSystem):
         return (u.speed,)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the distance and of the states of the cause."""
         (speed,), fault = self.faulty(t, x, u, p)
         turning = 1.0 if self.distance_from == "speed" else 0.0  # else only what the fault adds is integrated here
         rate = speed * (turning + fault.depth) + fault.added[0] + (1.0 - turning) * (speed - u.speed)
         return {"rim_distance": rate, **super().flow(t, x, u, p)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The declared outputs."""
         (speed,), fault = self.faulty(t, x, u, p)
         jammed, skidding = np.maximum(-fault.depth, 0.0), np.maximum(fault.depth, 0.0)
         return {

@@ -89,17 +89,17 @@ class NumpyKernel(_Arrays):
         """See `Trial`."""
         self.x[:] = self._x_next
 
-    def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
+    def step(self, t: float, h: float) -> None:
         divided_step(self, t, h)
 
-    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
+    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:
         for i in range(count):
             self.step(t0 + (k + i) * h, h)
 
-    def output(self, t: float) -> None:  # noqa: D102 - see Kernel
+    def output(self, t: float) -> None:
         self.y[:] = self.system.output_vector(t, self.x, self.u, self.p)
 
-    def jump(self, event: str, t: float) -> None:  # noqa: D102 - see Kernel
+    def jump(self, event: str, t: float) -> None:
         self.x[:] = self.system.jump_vector(event, t, self.x, self.u, self.p)
 
     def _jacobian(self, t: float, _continuous: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,10 +141,10 @@ class TracedKernel(_Arrays):
         """See `Trial`."""
         self.x[:] = self._x_next
 
-    def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
+    def step(self, t: float, h: float) -> None:
         self.grid_steps(t, 0, 1, h)
 
-    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
+    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:
         if not self._flows:
             return
         while count >= BATCH_OF_STEPS:
@@ -165,11 +165,11 @@ class TracedKernel(_Arrays):
             else:
                 self.x[:] = self._x_next
 
-    def output(self, t: float) -> None:  # noqa: D102 - see Kernel
+    def output(self, t: float) -> None:
         self._t[0] = t
         self._output()
 
-    def jump(self, event: str, t: float) -> None:  # noqa: D102 - see Kernel
+    def jump(self, event: str, t: float) -> None:
         self._t[0] = t
         self._jumps[event]()
         self.x[:] = self._x_next

@@ -88,7 +88,6 @@ class ControlSystem(HybridSystem):
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of a continuous system."""
         return {} if self._sampled or not self.states else self._moved("flow()", t, x, u, p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -170,7 +170,6 @@ class SweptProgram(WindowProgram):
     """One that sweeps over the rows where no bound counts, which is quicker; the solver has the rest."""
 
     def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
-        """See `WindowProgram.solve_free`."""
         found = free_sweep(self.count, self.order).solve(A, b, F, G, c)
         return Step(
             *found, _SOLVED if all(np.isfinite(part).all() for part in found) else "numbers that are not finite"

@@ -262,7 +262,6 @@ class WindTurbineDiagnosis(HybridSystem):
         return new | {"undecided_pairs": pairs, "undecided_alarm": vector(*found)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Alarms, when they changed, and what they rest on."""
         found: dict[str, Array] = {}
         at = 0
         for group in _GROUPS:

@@ -134,7 +134,6 @@ class MotorFilter(HybridSystem):
         return at_sample(x, advance, by_measurement)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates, their standard deviations, innovations and NIS."""
         names, P = [s.name for s in self.outputs[: self.order]], x.estimate_covariance
         return {
             **{name: getattr(x, f"estimated_{name}") for name in names},
@@ -145,7 +144,6 @@ class MotorFilter(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
     def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:

@@ -137,7 +137,6 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     )
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Position, speed, their sensitivities and gain, and what happens since the last sample."""
         known, since = parts_of(x)
         now = constants_now(known, since)
         sensitivity, inverse_s, speed = x.sensitivity, x.inverse_s, x.estimated_speed
@@ -207,7 +206,6 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         return u.odometer + p.reading_age * self._acceleration(x, now, u, p), p.odometer_deviation, 1.0
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Position, speed and coefficients with their uncertainty."""
         known, since = parts_of(x)
         now = constants_now(known, since)
         covariance = self._covariance(x, known, since, now)

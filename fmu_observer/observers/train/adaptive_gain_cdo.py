@@ -102,7 +102,6 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         super().__init__(**chosen)
 
     def gain_parameters(self) -> tuple[Signal, ...]:
-        """The rule of the gain, and what its certificate assumes."""
         error = "Largest relative error"
         return (
             parameter("ratio", "1", 2.5, "Gain times the expected gap", min=0.0),
@@ -120,7 +119,6 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         return x.theta
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimate with slip and indicator, and the gain in force."""
         return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

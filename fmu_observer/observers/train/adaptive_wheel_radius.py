@@ -128,7 +128,6 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         super().__init__()
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Position, scale, adaptation and predicted position."""
         adaptation = adaptation_of(x, C, SIZES)
         reading, scale = _without_creep(u, p), 1.0 + x.estimated_scale
         speed = reading * scale
@@ -173,7 +172,6 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Position, speed and wheel radius with their uncertainty."""
         V, scale, reading = x.error_covariance, 1.0 + x.estimated_scale, _without_creep(u, p)
         return {
             "position": x.estimated_position + p.reading_age * reading * scale,

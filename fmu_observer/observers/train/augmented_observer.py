@@ -147,7 +147,6 @@ class AugmentedTrainObserver(TrainObserver):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the four augmented states, the innovation, and what the subclass adds."""
         gains, decay = self._in_force(x, p)
         traction = np.maximum(self.traction(x, u, p), 0.0)  # a negative one is a brake: see friction
         acceleration = (traction - self.drag(x, u, p)) / p.mass + x.unknown_acceleration
@@ -163,11 +162,9 @@ class AugmentedTrainObserver(TrainObserver):
         )
 
     def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
-        """Position, speed, adhesion force and innovation."""
         return Estimate(x.estimated_position, x.estimated_speed, self.traction(x, u, p), x.position_innovation)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimate, with the coupler force and the unknown acceleration."""
         force = -p.mass * (x.unknown_acceleration + GRAVITY * u.gradient)
         return super().output(t, x, u, p) | {"coupler_force": force, "disturbance": x.unknown_acceleration}
 

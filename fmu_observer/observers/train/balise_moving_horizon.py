@@ -150,7 +150,6 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         self.options = {"window": window, "passes": passes, "loss": loss}
 
     def own_states(self) -> tuple[Any, ...]:
-        """States of the filter, then what is remembered of the window."""
         covariance = np.diag(np.square(FIRST_DEVIATIONS))
         remembered = window_memory(np.zeros(ORDER), covariance, LAYOUT.width, self.window)
         return (*super().own_states(), *_REFUSALS, *remembered)
@@ -194,7 +193,6 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         return filtered | estimates(now) | covariance | refusals | found.remembered
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates now within their bounds, their deviations, how the last measurement fits, and the window."""
         shared = vector(*(getattr(p, name) for name in Shared._fields))
         inside = self.problem.clipped(estimate_of(x), shared)
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}

@@ -199,7 +199,6 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         return positive_matrix("estimate_covariance", x.estimate_covariance, VARIANCES)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of position, speed, disturbance and creep."""
         return {
             "estimated_position": x.estimated_speed,
             "estimated_speed": _free_acceleration(x, u, p),
@@ -261,7 +260,6 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         return u.odometer + p.reading_age * np.where(x.estimated_speed > 0.0, rate, 0.0)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates, their deviations now, and how the last measurement fits."""
         now = self.covariance_now(t, x, u, p)
         return {
             "position": x.estimated_position,

@@ -54,7 +54,6 @@ class DecayingInnovationCdo(HighGainTrainObserver):
     default_preset = "dense_balises"
 
     def gain_parameters(self) -> tuple[Signal, ...]:
-        """Theta, the shape of the gain, rate and exponent of the decay."""
         return (*super().gain_parameters(), *decay_parameters(10.0, 0.5))
 
     def acting_innovation(self, x: Any, p: Any) -> Array:

@@ -41,7 +41,6 @@ class DynamicGainCdo(HighGainTrainObserver):
     default_preset = "dense_balises"
 
     def gain_parameters(self) -> tuple[Signal, ...]:
-        """The law of theta, and the shape of the gain."""
         _, shape = super().gain_parameters()
         return (
             parameter("theta_limit", "1/s", LIMIT, "High gain that theta tends to, at most 4 / longest gap", min=0.0),
@@ -54,10 +53,8 @@ class DynamicGainCdo(HighGainTrainObserver):
         return x.theta
 
     def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the estimate, and of the gain, which settles."""
         settles = p.theta_rate * x.theta * (p.theta_limit - x.theta)
         return super().estimator_flow(t, x, u, p) | {"theta": settles}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimate, and the gain in force."""
         return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}

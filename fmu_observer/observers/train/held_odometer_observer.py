@@ -196,7 +196,6 @@ class HeldOdometerObserver(TrainObserver):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the estimates, of the carried level, and of the position bound."""
         speed, rate, predicting = x.estimated_speed, x.estimated_disturbance_rate, x.predicting > 0.0
         residual = np.where(predicting, 0.0, x.held_speed - speed)
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
@@ -230,7 +229,6 @@ class HeldOdometerObserver(TrainObserver):
         return super().friction(t, x, u, p) + self._braking(x)
 
     def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
-        """Position, speed, the effort in place of the adhesion force, and the innovation of the last balise."""
         return Estimate(x.estimated_position, x.estimated_speed, u.effort, x.last_innovation)
 
     def own_bound(self, x: Any, p: Any) -> Array:

@@ -79,7 +79,6 @@ class HighGainTrainObserver(TrainObserver):
         return tuple(self.vertex_error([[0.0, 1.0], [0.0, -s]], p) for s in drag_slope_range(p, 0.0, TOP_SPEED))
 
     def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of position, speed, innovation and first stage."""
         theta, speed = self.theta_in_force(x, p), x.estimated_speed
         on_position, on_speed = correction(theta, p.high_gain, self.acting_innovation(x, p))
         traction = np.maximum(self.stage.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
@@ -91,7 +90,6 @@ class HighGainTrainObserver(TrainObserver):
         } | self.stage.flow(x, u, p)
 
     def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
-        """Position, speed, adhesion force and innovation."""
         adhesion, innovation = self.stage.adhesion(x, u, p), self.acting_innovation(x, p)
         return Estimate(x.estimated_position, x.estimated_speed, adhesion, innovation)
 

@@ -34,7 +34,6 @@ class OdometerReset(GatedObserver):
     events = (BALISE,)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The odometer's speed."""
         return {POSITION.name: u.odometer}
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -43,5 +42,4 @@ class OdometerReset(GatedObserver):
         return {POSITION.name: reported, "last_innovation": x.estimated_position - reported}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Position, speed and innovation."""
         return {"position": x.estimated_position, "speed": u.odometer, "innovation": x.last_innovation}

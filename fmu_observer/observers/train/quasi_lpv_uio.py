@@ -181,7 +181,6 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     # -- equations --------------------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of position, speed, disturbance, its rate and the odometer's way."""
         lies = self.rules.discarded(x)
         z = self._scheduling(x)
         h = np.clip((p.schedule_max - z) / (p.schedule_max - p.schedule_min), 0.0, 1.0)
@@ -209,7 +208,6 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         return self._at_balise(t, x, u, p) if event == BALISE.name else self._at_sample(x, u, p)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimate, the residual and the verdict."""
         return {
             "position": x.estimated_position,
             "speed": x.estimated_speed,

@@ -152,7 +152,6 @@ class StoppingUio(GatedObserver, GapCertified):
         return super().requirements(p) | threshold_requirements(p)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of position, speed, disturbance and its rate."""
         innovation = x.held_innovation
         effort = u.effort * (1.0 - x.judged_fault * p.switches_effort)
         acceleration = (p.brake_coefficient * effort - p.davis_b * x.estimated_speed) / p.mass + x.disturbance_estimate
@@ -186,7 +185,6 @@ class StoppingUio(GatedObserver, GapCertified):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimate, the residual and the verdict."""
         return {
             "position": x.estimated_position,
             "speed": x.estimated_speed,

@@ -110,7 +110,6 @@ class TakagiSugenoCdo(TrainObserver):
         return self._weight_at(u.odometer if self.premise == "live" else x.estimated_speed, p)
 
     def estimator_flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of position, speed and innovation."""
         speed, innovation = x.estimated_speed, x.balise_innovation
         h = self.vertex_weight(x, u, p)
         vertex_speed = _blend(h, (p.premise_min, p.premise_max))
@@ -128,7 +127,6 @@ class TakagiSugenoCdo(TrainObserver):
         }
 
     def estimate(self, x: Any, u: Any, p: Any) -> Estimate:
-        """Position, speed, the effort in place of the adhesion force, and innovation."""
         return Estimate(x.estimated_position, x.estimated_speed, u.effort, x.balise_innovation)
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -113,7 +113,6 @@ class TrainObserver(GatedObserver, GapCertified):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the estimator states and of the filtered slip."""
         slip = odometer_slip(u.odometer, self.estimate(x, u, p).speed, p.slip_floor)
         filtered = slip_filter_derivative(x.filtered_slip, slip, p.slip_filter_time)
         return self.estimator_flow(t, x, u, p) | {FILTERED_SLIP.name: filtered}

@@ -64,7 +64,6 @@ class Wind(HybridSystem):
         return {"turbulence": turbulence, "gusts": x.gusts + 1.0}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The speed of the wind."""
         mean = p.mean_from + (p.mean_to - p.mean_from) * np.clip(t / p.mean_time, 0.0, 1.0)
         swinging = mean + p.sine_amplitude * np.sin(p.sine_frequency * t)
         return {"wind_speed": np.maximum(swinging + x.turbulence, 0.0)}

@@ -163,7 +163,6 @@ class WindTurbine(HybridSystem):
     default_preset = "repaired"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the continuous states."""
         turning = (x.rotor_turning, x.generator_turning, x.shaft_torsion)
         rotor_torque = _rotor(p).torque(u.wind_speed, x.rotor_turning, x.blade_pitch)
         turned = _drive_train(u, p).rates(turning, rotor_torque, x.converter_torque + u.torque_offset)
@@ -194,7 +193,6 @@ class WindTurbine(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """What the turbine does, and the readings, held."""
         torque = x.converter_torque + u.torque_offset
         stable = [np.where(value > 0.0, 1.0, 0.0) for value in _drive_train(u, p).hurwitz()]
         return {
@@ -210,7 +208,6 @@ class WindTurbine(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
 

@@ -69,7 +69,6 @@ class WindTurbineController(HybridSystem):
     events = (PeriodicEvent("sampling", "sample_period", description="References are computed"),)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Zone, references and error."""
         error = u.generator_speed - p.rated_speed
         rated = np.where(u.generator_power >= p.rated_power, 1.0, np.where(error >= 0.0, 1.0, 0.0))
         strong = np.where(x.strong_wind > 0.0, np.where(error < -p.speed_margin, 0.0, 1.0), rated)
@@ -82,7 +81,6 @@ class WindTurbineController(HybridSystem):
         return {"strong_wind": strong, "held_pitch": pitch, "held_torque": torque, "last_error": error}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The references, held."""
         return {"torque_reference": x.held_torque, "pitch_reference": x.held_pitch, "zone": 2.0 + x.strong_wind}
 
     def requirements(self, p: Any) -> dict[str, Array]:

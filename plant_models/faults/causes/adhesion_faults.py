@@ -50,18 +50,15 @@ class AdhesionFaults(FaultCause):
     switchings = ("locking", "half_locked", "locked", "spinning", "half_spun", "spun")
 
     def fault(self, t: Array, x: Any, u: Any, p: Any, passed: Array, values: Sequence[Array]) -> Fault:
-        """A share of a full lock or skid."""
         lock, spin = (np.where(share > 2.0 * ROLLING, np.minimum(share, 1.0), 0.0) for share in (x.lock, x.spin))
         return Fault(p.spin_depth * spin - lock)
 
     def rates(self, t: Array, x: Any, u: Any, p: Any, passed: Array) -> dict[str, Array]:
-        """Lock and spin grow and go back."""
         brake = np.maximum(-u.effort, 0.0) * (1.0 - one_where(u.brake_released > 0.5))
         traction = np.maximum(u.effort, 0.0)
         return {"lock": _rate(brake, passed[:3], u, p), "spin": _rate(traction, passed[3:], u, p)}
 
     def switching(self, t: Array, x: Any, u: Any, p: Any) -> Sequence[Array]:
-        """Where a lock and a skid begin, are half-way and full."""
         return [share - bound for share in (x.lock, x.spin) for bound in (ROLLING, 0.5, 1.0)]
 
     def requirements(self, p: Any) -> dict[str, Array]:

@@ -47,11 +47,9 @@ class LostSamples(GainAndOffset):
         self.states = (memory("held", carrier.unit, 0.0, "Last sample that was not lost", size=size),)
 
     def carried(self, x: Any, values: Sequence[Array]) -> Sequence[Array]:
-        """The samples that are held."""
         return [x.held] if self.carrier.channels == 1 else [x.held[channel] for channel in range(len(values))]
 
     def jump(self, t: Array, x: Any, u: Any, p: Any, values: Sequence[Array]) -> dict[str, Array]:
-        """A sample is taken, or lost."""
         a, b = u.chance_normal[0], u.chance_normal[1]
         share = np.exp(-0.5 * (a * a + b * b))  # of the uniform distribution: the same in Python and in C
         taken = []

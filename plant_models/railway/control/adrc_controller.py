@@ -116,7 +116,6 @@ class AdrcController(HybridSystem):
         super().__init__(drive=drive)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of both estimates, of the air brake's force and of a ramped drive's effort."""
         command = self._command(x, u, p)
         observed, estimated, built_up = x.observed_speed, x.disturbance_acceleration, x.built_up_brake
         applied = (self._effort(x, command) - built_up) / p.mass
@@ -131,7 +130,6 @@ class AdrcController(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Effort, demand to the air brake, disturbance."""
         command = self._command(x, u, p)
         resisting = -p.mass * x.disturbance_acceleration
         applied = {"effort": self._effort(x, command), "brake_demand": command.brake_demand}

@@ -129,7 +129,6 @@ class AntiSlipDevice(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The effort let through, and what the device knows."""
         return {
             "effort": x.held_effort,
             "effort_share": x.share,

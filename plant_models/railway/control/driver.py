@@ -134,7 +134,6 @@ class Driver(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Developed effort and speed reference."""
         return {"effort": x.developed_effort, "speed_reference": self._reference(t, p)}
 
     @staticmethod

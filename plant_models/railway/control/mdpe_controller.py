@@ -229,7 +229,6 @@ class MdpeController(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """What was decided at the last control instant."""
         return {
             "effort": x.held_effort,
             "brake_demand": x.held_demand,

@@ -82,7 +82,6 @@ class Mission(HybridSystem):
         super().__init__(braking=braking)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """References and phase."""
         elapsed = t - p.departure_time
         journey = Trapezoid(p.target_speed, p.acceleration, p.deceleration, p.distance)
         values = (

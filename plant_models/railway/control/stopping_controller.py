@@ -216,7 +216,6 @@ class StoppingController(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """What was decided at the last control instant, and the reference now."""
         speed, position = reference_motion(
             t - x.plan_start, x.plan_speed, x.plan_position, _plan(x), p.davis_b / p.mass
         )

@@ -139,7 +139,6 @@ class NetworkProtocol(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """What is held, by whom it was sent and when it was measured."""
         return {"received": x.held_value, "error": x.last_error, "sender": x.last_sender, "stamp": x.held_stamp}
 
     def requirements(self, p: Any) -> dict[str, Array]:

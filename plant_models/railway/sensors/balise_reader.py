@@ -145,7 +145,6 @@ class BaliseReader(HybridSystem):
         return {"last_communication": t, **sample, "primed": 1.0, **announced}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The last announcement and the number of all, and of the lost."""
         passed = {"balise_time": x.announced_time, "balise_position": x.announced_position}
         return {"balise_count": x.announced, **passed, "lost_count": x.lost}
 

@@ -59,16 +59,13 @@ class BrakePressureSensor(HybridSystem):
     default_preset = "class_0_5"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the lagged pressure."""
         return {"lagged_pressure": (u.pressure - x.lagged_pressure) / p.response_time}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Take a reading."""
         pressure = (1.0 + p.scale_error) * x.lagged_pressure + p.offset + p.noise_std * u.reading_noise
         seen = np.clip(pressure, 0.0, p.span)
         step = np.where(p.resolution > 0.0, p.resolution, 1.0)
         return {"held_reading": np.where(p.resolution > 0.0, np.floor(seen / step + 0.5) * step, seen)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The held reading."""
         return {"reading": x.held_reading}

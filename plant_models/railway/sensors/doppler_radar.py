@@ -62,15 +62,12 @@ class DopplerRadar(HybridSystem):
     default_preset = "measured"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the averaged speed."""
         return {"averaged_speed": (u.speed - x.averaged_speed) / p.averaging_time}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Take a reading."""
         speed = x.averaged_speed
         noise = (p.noise_share * np.abs(speed) + p.noise_std) * u.reading_noise
         return {"held_reading": np.where(np.abs(speed) < p.lowest_speed, 0.0, speed * (1.0 + p.scale_error) + noise)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The held reading."""
         return {"reading": x.held_reading}

@@ -90,6 +90,5 @@ class Gps(HybridSystem):
         return {"fix_count": x.fix_count + 1.0, "fix_time": t, "fix_position": position, "fix_drift": drift}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The last fix, held, and as an announcement."""
         announced = {"gps_count": x.fix_count, "gps_time": x.fix_time, "gps_position": x.fix_position}
         return {"reading": x.fix_position, "drift": x.fix_drift, **announced}

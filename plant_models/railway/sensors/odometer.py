@@ -65,7 +65,6 @@ class Odometer(HybridSystem):
     default_preset = "ideal"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the wheel's distance."""
         return {"wheel_distance": u.wheel_speed}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -88,7 +87,6 @@ class Odometer(HybridSystem):
         return np.where(output == "reading", bound, 0.0)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The held reading and the counted distance."""
         pulse, distance = pulse_length(p.teeth, p.wheel_radius), x.wheel_distance
         counted = np.where(p.teeth > 0.0, counted_pulses(distance, pulse) * pulse, distance)
         return {"reading": x.held_reading, "distance": counted}

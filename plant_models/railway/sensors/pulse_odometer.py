@@ -128,7 +128,6 @@ class PulseOdometer(HybridSystem):
         return np.where(output == "distance", 0.0, reading_bound(p.noise_std, p.teeth, p.wheel_radius, period))
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The held readings and the counted distance."""
         distance = x.counted_pulses * pulse_length(p.teeth, p.wheel_radius)
         return {"reading": x.held_reading, "sampled_reading": x.held_sample, "distance": distance}
 

@@ -50,7 +50,6 @@ class DriveCycle(HybridSystem):
     default_preset = "load_step"
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Reference and load now."""
         turns = p.reversal_period > 0.0
         # An instant that is on the edge but for rounding is on the edge.
         passed = np.floor(t / np.where(turns, p.reversal_period, 1.0) + 1e-9)
@@ -62,5 +61,4 @@ class DriveCycle(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)

@@ -56,11 +56,9 @@ class DriveShaft(HybridSystem):
     default_preset = "locomotive"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivative of the twist."""
         return {"twist": _slip(u, p)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Torque, effort and the speed of the rims."""
         torque = p.stiffness * x.twist + p.damping * _slip(u, p)
         return {
             "load_torque": torque,
@@ -70,7 +68,6 @@ class DriveShaft(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
 

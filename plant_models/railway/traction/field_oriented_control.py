@@ -136,7 +136,6 @@ class FieldOrientedControl(HybridSystem):
         return reference, x.speed_integral + p.control_period * p.speed_bandwidth / 5.0 * (push + cut)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The voltages of this period in both frames, and the current asked for."""
         alpha, beta = to_stator(x.held_voltage_d, x.held_voltage_q, x.held_angle)
         return {
             "voltage_d": x.held_voltage_d,
@@ -147,7 +146,6 @@ class FieldOrientedControl(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
 

@@ -45,7 +45,6 @@ class Inverter(HybridSystem):
     default_preset = "drive_100w"
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Voltages, duties and direct current for the voltages asked for now."""
         a, b, c = inverse_clarke(u.wanted_voltage_alpha, u.wanted_voltage_beta)
         middle = 0.5 * (np.maximum(np.maximum(a, b), c) + np.minimum(np.minimum(a, b), c))
         duties = [np.minimum(np.maximum(0.5 + (v - middle) / p.direct_voltage, 0.0), 1.0) for v in (a, b, c)]
@@ -59,5 +58,4 @@ class Inverter(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)

@@ -81,7 +81,6 @@ class SynchronousMotor(HybridSystem):
         super().__init__(**{option: value for option, value in chosen.items() if option in self.option_choices})
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of currents, speed and angle."""
         voltages = rotor_voltages(self.frame, u, x.electrical_angle)
         return dict(zip(MOVING, motor_rates(self._moving(x), *voltages, u.load_torque, p), strict=True))
 
@@ -99,7 +98,6 @@ class SynchronousMotor(HybridSystem):
         return dict(zip(names, (*after, *measured_currents(self.frame, after, u, p), 1.0), strict=True))
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """State, torque and the measured currents."""
         current_d, current_q, speed, angle = self._moving(x)
         now = (current_d, current_q) if self.frame == "rotor" else to_stator(current_d, current_q, angle)
         held = [getattr(x, f"held_current_{axis}") for axis in AXES[self.frame]] if self.sampled else now
@@ -118,5 +116,4 @@ class SynchronousMotor(HybridSystem):
         return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)

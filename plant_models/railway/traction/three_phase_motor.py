@@ -58,7 +58,6 @@ class ThreePhaseMotor(HybridSystem):
     default_preset = "annex_c"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of two phase currents, speed and angle."""
         currents = _currents(x)
         slopes = _flux_slopes(x.electrical_angle, p)
         electrical = p.pole_pairs * x.shaft_speed
@@ -76,7 +75,6 @@ class ThreePhaseMotor(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Currents in phases and in the rotor frame, speed, angle and torque."""
         currents = _currents(x)
         current_d, current_q = park(*currents, x.electrical_angle)
         return {
@@ -89,7 +87,6 @@ class ThreePhaseMotor(HybridSystem):
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
 
 

@@ -161,11 +161,9 @@ class Locomotive(HybridSystem):
         }
 
     def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
-        """How far beyond the edges of the zones."""
         return vector(*self._track.beyond_edges(t, x.train_position, p))
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Zones have a length and do not overlap."""
         return self._track.requirements(p)
 
     # -- forces -----------------------------------------------------------------------------------------------------

@@ -89,12 +89,10 @@ class LongitudinalTrain(LongitudinalForces):
         return vector((p.davis_a + self._forces(t, x.train_position, x.train_speed, u, p).brake) / p.mass)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The declared outputs."""
         degraded = self._track.degraded(self.switches(t, x, u, p))
         return self._outputs(
             x.train_position, x.train_speed, self._forces(t, x.train_position, x.train_speed, u, p), degraded, p
         )
 
     def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
-        """How far beyond the edges of the zones."""
         return vector(*self._track.beyond_edges(t, x.train_position, p))

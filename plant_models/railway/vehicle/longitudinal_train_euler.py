@@ -65,7 +65,6 @@ class LongitudinalTrainEuler(LongitudinalForces):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The declared outputs."""
         position, speed = x.train_position, x.train_speed
         passed = [np.where(beyond >= 0.0, 1.0, 0.0) for beyond in self._track.beyond_edges(t, position, p)]
         return self._outputs(position, speed, self._forces(t, position, speed, u, p), self._track.degraded(passed), p)

@@ -192,7 +192,6 @@ class Train(HybridSystem):
         return vector(*(distance for place in places for distance in self._track.beyond_edges(t, place, p)))
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Zones have a length and do not overlap."""
         return self._track.requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -155,7 +155,6 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         return seen | {"error_covariance": V} | self.kept_after(x, y)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates, constants with their uncertainty, excitation and innovation."""
         n, m = self.sizes[:2]
         estimate, rho, adaptation = self._parts(x)
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, m)

@@ -65,14 +65,12 @@ class DecouplingUio(ModelObserver):
         super().__init__(chosen, **numbers)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Filter state z."""
         K = as_matrix(p.gain, self.model.order, len(self.model.measurements))
         estimate = self._estimate(x, u)
         error = self.measured(u) - self.model.measured(estimate)
         return self.named_estimates(self._decoupling.P @ self.model.flow(estimate, self.known(u)) + K @ error)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates and the residuals."""
         estimate = self._estimate(x, u)
         error = self.measured(u) - self.model.measured(estimate)
         return named_as(self.model.states, estimate) | residuals(self.model, error, p)

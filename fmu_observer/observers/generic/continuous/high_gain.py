@@ -47,7 +47,6 @@ class HighGain(ModelObserver):
         super().__init__(chosen)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model and correction."""
         predicted, error = self.model.flow(self.estimates(x), self.known(u)), self.innovation(x, u)[0]
         corrections = (p.theta ** (i + 1) * p.high_gain[i] * error for i in range(self.model.order))
         return self.named_estimates(rate - less for rate, less in zip(predicted, corrections, strict=True))

@@ -46,7 +46,6 @@ class Luenberger(ModelObserver):
         return observer_gain(linear_part(model), model.C, poles, tuple(s.name for s in model.states), model.name)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model and correction."""
         predicted = self.model.flow(self.estimates(x), self.known(u))
         return self.named_estimates(predicted - self.gain_matrix(p) @ self.innovation(x, u))
 

@@ -109,7 +109,6 @@ class ProportionalIntegralUio(ModelObserver):
         return extended_gain(linear_part(model).A, np.asarray(model.H), model.C, rho, poles, states, model.name)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates and disturbances."""
         extended, n = stacked_of(x, self.states), self.model.order
         moved = self.A_e @ extended + self._gain(p) @ (self.measured(u) - self.C_e @ extended)
         driven = self.model.B @ self.known(u) if self.model.inputs else np.zeros(self.model.order)
@@ -118,7 +117,6 @@ class ProportionalIntegralUio(ModelObserver):
         return named_as(self.states, [*(a + b for a, b in zip(moved[:n], driven, strict=True)), *moved[n:]])
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates, the disturbances and the residuals."""
         found = super().output(t, x, u, p) | {name: getattr(x, f"estimated_{name}") for name in self._disturbances}
         return found | residuals(self.model, self.measured(u) - self.C_e @ stacked_of(x, self.states), p)
 

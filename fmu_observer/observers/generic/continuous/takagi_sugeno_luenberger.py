@@ -77,7 +77,6 @@ class TakagiSugenoLuenberger(JudgedObserver):
         super().__init__(model=chosen.name, premise=premise)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates and time outside the bounds."""
         model = self.model
         estimate, known = stacked_of(x, model.states, "estimated_"), stacked_of(u, model.inputs)
         y = stacked_of(u, model.measurements, "measured_")
@@ -91,7 +90,6 @@ class TakagiSugenoLuenberger(JudgedObserver):
         return named_as(model.states, moved, "estimated_") | {"time_outside": model.outside(values)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates, and how long premises were outside their bounds."""
         estimate = stacked_of(x, self.model.states, "estimated_")
         return named_as(self.model.states, estimate) | {"premise_outside_time": x.time_outside}
 

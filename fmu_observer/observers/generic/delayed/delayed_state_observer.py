@@ -142,7 +142,6 @@ class DelayedStateObserver(HighGainSampled):
         return max(self.predictors, 1) * self.memory_places
 
     def theta_parameters(self) -> tuple[Signal, ...]:
-        """Theta, the delay, and how the past is remembered."""
         return (
             *super().theta_parameters(),
             parameter("delay", "s", DELAY, "Delay of every measurement when it arrives", min=0.0),
@@ -150,7 +149,6 @@ class DelayedStateObserver(HighGainSampled):
         )
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
-        """The output a delay ago, and the inputs integrated since the last reading."""
         integral = state("input_integral", "1", 0.0, "Inputs integrated since the last reading", size=len(model.inputs))
         self.extra_states = (
             per_measurement(model, "predicted_output", "Measurement a delay ago, as known now"),
@@ -173,7 +171,6 @@ class DelayedStateObserver(HighGainSampled):
     # -- equations --------------------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Delayed state, its output, and the integral of the inputs."""
         model, z, now = self.model, self.estimates(x), self.known(u)
         acting = np.where(p.delay < p.memory_period, now, x.delayed_input) if model.inputs else now
         moved = model.flow(z, acting)

@@ -44,7 +44,6 @@ class FilteringDifferentiator(SignalDifferentiator):
         super().__init__(order, filtering_order, unit)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of filter states and estimates."""
         w, z = stacked_of(x, self.filters), stacked_of(x, self.estimates)
         dw, dz = filtering_differentiator_flow(w, z, u.signal, p.bound)
         return named_as((*self.filters, *self.estimates), (*dw, *dz))

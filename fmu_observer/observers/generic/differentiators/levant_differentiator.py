@@ -36,7 +36,6 @@ class LevantDifferentiator(SignalDifferentiator):
         super().__init__(order, 0, unit)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the estimates."""
         return named_as(self.estimates, differentiator_flow(stacked_of(x, self.estimates), u.signal, p.bound))
 
     def interval(self, p: Any) -> float:

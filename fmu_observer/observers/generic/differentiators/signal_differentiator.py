@@ -76,7 +76,6 @@ class SignalDifferentiator(JudgedObserver):
         """Time between two evaluations [s]: the internal step, or the sampling period."""
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The signal and its derivatives, as estimated."""
         return {s.name: getattr(x, f"estimated_{s.name}") for s in self.outputs}
 
     def condition_of(self, p: Any) -> Condition:

@@ -270,7 +270,6 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         return [spread[i] @ spread[i] if self.rooted else spread[i, i] for i in range(n)]
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates, their standard deviations, and what is known of the last innovation."""
         n, q, states = self.model.order, len(self.model.measurements), self.model.states
         P = self.covariance_of(self.belief(x).spread)
         values = {s.name: getattr(x, f"estimated_{s.name}") for s in states}

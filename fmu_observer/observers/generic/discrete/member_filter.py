@@ -195,7 +195,6 @@ class MemberFilter(JudgedObserver):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates, their standard deviations and NIS."""
         names = [s.name for s in self.model.states]
         values = {name: getattr(x, f"estimated_{name}") for name in names}
         values |= {f"{name}_std": x.deviations[i] for i, name in enumerate(names)}

@@ -132,7 +132,6 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         return filtered | self._remembered(belief) | found.remembered
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates within their bounds, what is known of the last innovation, and what the window looks like."""
         inside = self.problem.clipped(self.belief(x).estimate, stacked_of(p, self.parameter_signals))
         values = super().output(t, x, u, p)
         if self.robust:

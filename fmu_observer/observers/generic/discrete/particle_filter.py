@@ -67,5 +67,4 @@ class ParticleFilter(MemberFilter):
         )
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates, their standard deviations, NIS and the effective sample size."""
         return super().output(t, x, u, p) | {"effective_members": x.effective}

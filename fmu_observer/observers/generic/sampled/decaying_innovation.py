@@ -51,11 +51,9 @@ class DecayingInnovation(HeldInnovation):
             self.default_preset = "repaired"
 
     def theta_parameters(self) -> tuple[Signal, ...]:
-        """Theta, rate and exponent of the decay."""
         return (*super().theta_parameters(), *decay_parameters(_DECAY_RATE, _DECAY_EXPONENT))
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
-        """The innovation, in memory, and the time since it was set."""
         super().declare_sampled_part(model)
         self.extra_states = (ELAPSED,)
 
@@ -64,7 +62,6 @@ class DecayingInnovation(HeldInnovation):
         return innovation_left(x.elapsed, p.decay_rate, p.decay_exponent) * self.sampled_part(x)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model and correction, and time goes on."""
         return super().flow(t, x, u, p) | {"elapsed": 1.0}
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -56,14 +56,12 @@ class DynamicHighGain(OutputPredictor):
             }
 
     def theta_parameters(self) -> tuple[Signal, ...]:
-        """The law of theta."""
         return (
             parameter("theta_limit", "1/s", _THETA_LIMIT, "High gain that theta tends to", min=0.0),
             parameter("theta_rate", "1", _THETA_RATE, "Rate of theta over its distance from the limit", min=0.0),
         )
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
-        """The predicted output and theta."""
         super().declare_sampled_part(model)
         self.extra_states = (*self.extra_states, state("theta", "1/s", _THETA_START, "High gain in force"))
 
@@ -76,11 +74,9 @@ class DynamicHighGain(OutputPredictor):
         return float(p.theta_limit)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model with correction, its uncorrected output, and theta."""
         return super().flow(t, x, u, p) | {"theta": p.theta_rate * x.theta * (p.theta_limit - x.theta)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates and the gain in force."""
         return super().output(t, x, u, p) | {"gain": x.theta}
 
     def remark(self) -> str:

@@ -26,7 +26,6 @@ class ExponentialGain(HighGainSampled):
     source = "Bouchama 2024, (1.47)-(1.52)"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model, correction and decay of the innovation."""
         eta = self.sampled_part(x)
         predicted = self.model.flow(self.estimates(x), self.known(u))
         return self.named_estimates(predicted - self.correction(x, eta, p)) | self.named_part(-self.decay(eta, p))

@@ -32,11 +32,9 @@ class HeldInnovation(HighGainSampled):
     theta_start = 1.0
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
-        """The innovation, in memory."""
         self.extra_memory = (per_measurement(model, "innovation", "Error at the last sample, held", memory),)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model and correction."""
         predicted = self.model.flow(self.estimates(x), self.known(u))
         return self.named_estimates(predicted - self.correction(x, self.acting(x, p), p))
 

@@ -54,7 +54,6 @@ class HybridImpulsive(SampledObserver):
         super().__init__(chosen)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model, correction and decay of z."""
         L, H, _ = self._gains(p)
         z = self.sampled_part(x)
         moved = self.model.flow(self.estimates(x), self.known(u)) + L @ z

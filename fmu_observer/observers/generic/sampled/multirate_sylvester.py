@@ -92,7 +92,6 @@ class MultirateSylvester(GapCertified, JudgedObserver):
         super().__init__(model=self.model.name, continuous=continuous)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the filter and of the predicted samples."""
         r, A, B, T = self._matrices(p)
         known, estimate = stacked_of(u, self.model.inputs), self.estimate(x, u, p)
         driven = T @ (self.model.B @ known) if len(self.model.inputs) else 0.0

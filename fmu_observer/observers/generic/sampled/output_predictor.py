@@ -28,11 +28,9 @@ class OutputPredictor(HighGainSampled):
     sampled_state = "predicted_output"
 
     def declare_sampled_part(self, model: ObserverModel) -> None:
-        """The predicted output."""
         self.extra_states = (per_measurement(model, "predicted_output", "Output predicted since the last sample"),)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Model with correction, and its uncorrected output."""
         predicted = self.model.flow(self.estimates(x), self.known(u))
         error = self.model.measured(self.estimates(x)) - self.sampled_part(x)
         follows = self.named_part(self.model.measured(predicted))

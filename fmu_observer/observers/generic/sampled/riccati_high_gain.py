@@ -64,7 +64,6 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         super().__init__(chosen)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The model, and the Riccati-like equation."""
         estimate, known, S = self.estimates(x), self.known(u), x.information
         F = self.model.jacobian(estimate, known)
         noise = self._noise(p)

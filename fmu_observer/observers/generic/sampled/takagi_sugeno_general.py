@@ -116,7 +116,6 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
     # -- equations ----------------------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates, decaying innovation and time outside the bounds."""
         model = self.model
         estimate, innovation = self._estimate(x), stacked_of(x, model.sampled, "innovation_")
         values = self._premises_in_use(x, u)
@@ -145,7 +144,6 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates, and how often and how long premises were outside their bounds."""
         counts = {"premise_violations": x.violations_counted, "premise_outside_time": x.time_outside}
         return named_as(self.model.states, self._estimate(x)) | counts
 

@@ -101,7 +101,6 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Blended model and held correction."""
         weights, eta = self.weights(x, u), stacked_of(x, self.model.measurements, "innovation_")
         total = self.model.blend(weights, self.estimates(x), self.known(u))
         for weight, L in zip(weights, self.gains(p), strict=True):
@@ -115,7 +114,6 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
         return named_as(self.model.measurements, innovation, "innovation_") | self.held_weights(estimate, u)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The estimates."""
         return named_as(self.model.states, self.estimates(x))
 
     def estimates(self, x: Any) -> Array:

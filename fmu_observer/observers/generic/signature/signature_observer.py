@@ -235,7 +235,6 @@ class SignatureObserver(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Estimates, what the signature alone gives, and how often it lay beyond the table."""
         windows, outsides = x.windows_inverted, x.windows_outside
         return {
             **{s.name: getattr(x, f"estimated_{s.name}") for s in self._named},

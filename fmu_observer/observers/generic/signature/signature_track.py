@@ -163,7 +163,6 @@ class SignatureTrack(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Properties and verdict."""
         ready = np.where(x.tips > CYCLES - 0.5, 1.0, 0.0)
         past = x.samples
         third = past[3:] - 3.0 * past[2:-1] + 3.0 * past[1:-2] - past[:-3]  # white noise: 20 times its variance
