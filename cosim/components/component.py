@@ -15,12 +15,12 @@ import numpy as np
 from fmpy.model_description import ModelDescription
 
 from cosim.components.derivatives import DifferentiableComponent
-from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
+from cosim.components.start_values import StartValue
 from cosim.components.surroundings import Surroundings
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
-from cosim.errors import CouplingError, RunError
+from cosim.errors import RunError
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.fmi.capabilities import tool_warning
@@ -93,17 +93,6 @@ class Component(DifferentiableComponent):
 
     # -- life -------------------------------------------------------------------------------------------------------
 
-    def configure(self, starts: Mapping[str, StartValue]) -> None:
-        """Take the structural parameters among start values: the shapes of arrays follow from them. Before
-        `instantiate`.
-
-        Args:
-            starts: start values by name; other variables than structural parameters are left out.
-
-        Raises:
-            CouplingError: a value is no dimension.
-        """
-
     def instantiate(self) -> None:
         """Create the instance.
 
@@ -125,19 +114,15 @@ class Component(DifferentiableComponent):
 
         Args:
             name: variable, or element of an array.
-            value: of the variable's type; an item's name for an enumeration, a hexadecimal text for bytes, a nested or
-                flat list or one value for all elements of an array.
+            value: of the variable's type, from `start_values`; of an array all values, row by row.
 
         Raises:
-            CouplingError: the variable does not exist or cannot be set, or the value is not of its type.
+            CouplingError: the variable does not exist.
             RunError: the slave refuses the value.
         """
-        variable = self.settable(name)
-        try:
-            element = None if name in self.variables else self.variables.element(name)
-            values = typed_values(variable, value) if element is None else [typed_value(variable, value)]
-        except ValueError as error:
-            raise CouplingError(refusal(f"{self.name}.{name} cannot be set", error)) from error
+        variable = self.variable(name)
+        element = None if name in self.variables else self.variables.element(name)
+        values = value if isinstance(value, list) else [value]
         self.guard(f"setting {name} = {value!r}", lambda: write_start(self, variable, element, values))
         self.starts[name] = value
 

@@ -4,8 +4,9 @@ slave.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 from fmpy.model_description import ModelVariable
 
@@ -30,6 +31,16 @@ class DescribedComponent(fmi.Described):
 
     declared_missing: frozenset[str] = frozenset()
     """Signals of which the scenario says that they can be missing."""
+
+    def configure(self, structure: Mapping[str, Any]) -> None:
+        """Take the structural parameters, from which the shapes of arrays follow. Before `Component.instantiate`.
+
+        Args:
+            structure: values by name, from `cosim.components.start_values.start_values`.
+
+        Raises:
+            CouplingError: an array would become too large.
+        """
 
     def declare_missing(self, names: Sequence[str], where: str) -> None:
         """Say of outputs that NaN stands for a missing value, of inputs that the component leaves NaN out.

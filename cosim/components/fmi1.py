@@ -7,7 +7,6 @@ from typing import Any
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
-from cosim.components.start_values import typed_value
 from cosim.errors import CouplingError
 from fmus.fmi.fmi1 import FMI1Slave
 
@@ -47,4 +46,4 @@ class FMI1Component(Component, FMI1Slave):
 
     def set_start(self, name: str, value: Any) -> None:  # noqa: D102 - see Component
         super().set_start(name, value)
-        self._hold(name, typed_value(self.variables[name], value))
+        self._hold(name, value)

@@ -9,7 +9,7 @@ from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
 from cosim.components.start_values import StartValue
-from cosim.components.structure import STRUCTURAL, resize, structural_value
+from cosim.components.structure import STRUCTURAL, resize
 from fmus.fmi.exact_ports import make_exact_writer
 from fmus.fmi.fmi3 import FMI3Slave
 from fmus.fmi.ports import is_native
@@ -28,6 +28,7 @@ class FMI3Component(Component, FMI3Slave):
     def __init__(self, name: str, slave: Any, description: ModelDescription, **more: Any) -> None:
         super().__init__(name, slave, description, **more)
         self._structure: dict[str, int] = {}
+        self._configured: dict[str, int] = {}  # what the slave has of it
 
     def request_intermediate_updates(self, names: Sequence[str]) -> None:
         """Ask, before `instantiate`, to be called back within steps to set inputs; see `follow_within_step`.
@@ -63,19 +64,16 @@ class FMI3Component(Component, FMI3Slave):
 
     # -- structural parameters --------------------------------------------------------------------------------------
 
-    def configure(self, starts: Mapping[str, StartValue]) -> None:  # noqa: D102 - see Component
-        for name, value in starts.items():
-            if name in self.variables and self.variables[name].causality == STRUCTURAL:
-                self._structure[name] = structural_value(self.name, self.variables[name], value)
+    def configure(self, structure: Mapping[str, Any]) -> None:  # noqa: D102 - see DescribedComponent
+        self._structure |= structure
         resize(self.description, self._structure)
 
     def set_start(self, name: str, value: StartValue) -> None:  # noqa: D102 - see Component
         if self.variable(name).causality != STRUCTURAL:
             super().set_start(name, value)
             return
-        given = self._structure.get(name)
         self.configure({name: value})
-        if given != self._structure[name]:
+        if self._structure != self._configured:
             self._configure_slave()
         self.starts[name] = value
 
@@ -92,6 +90,7 @@ class FMI3Component(Component, FMI3Slave):
         if self._structure:
             given = ", ".join(f"{name} = {value}" for name, value in self._structure.items())
             self.guard(f"setting {given} in Configuration Mode", self._set_structure)
+            self._configured = dict(self._structure)
 
     def _set_structure(self) -> None:
         self.slave.enterConfigurationMode()

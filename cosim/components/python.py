@@ -6,7 +6,7 @@ event ``balise`` is a triggered input clock with the fields of a telegram that t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,6 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.python_model import UNKNOWN_UNIT, NamedInputs, PythonModel, slices
-from cosim.components.start_values import StartValue
 from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from plant_models.hybrid.signal import Signal
 
@@ -255,13 +254,6 @@ class PythonComponent(FMI3Component):
     def __init__(self, name: str, model: PythonModel, source: str) -> None:
         slave, self._model = PythonSlave(model), model
         super().__init__(name, slave, slave.model_description, source=source, kind="block")
-
-    def configure(self, starts: Mapping[str, StartValue]) -> None:
-        """Nothing: shapes are declared.
-
-        Args:
-            starts: values by name.
-        """
 
     def declare_missing(self, names: Sequence[str], where: str) -> None:
         """As for `Described`; the object may give NaN for these outputs.

@@ -5,36 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription
 
-from cosim.components.start_values import refusal, typed_value
 from cosim.errors import CouplingError
 from fmus.fmi.sense import shape_fault
 
 STRUCTURAL = "structuralParameter"
-
-
-def structural_value(component: str, variable: ModelVariable, value: Any) -> int:
-    """The value of a structural parameter.
-
-    Args:
-        component: its name, for messages.
-        variable: in the model description.
-
-    Raises:
-        CouplingError: it is no whole number, or outside of what the FMU declares.
-    """
-    try:
-        number = int(typed_value(variable, value))
-    except ValueError as error:
-        raise CouplingError(refusal(f"{component}.{variable.name} cannot be set", error)) from error
-    low = 0 if variable.min is None else int(variable.min)
-    if number < low or (variable.max is not None and number > int(variable.max)):
-        high = "any" if variable.max is None else variable.max
-        raise CouplingError(
-            f"{component}.{variable.name} = {number} is outside of what the component declares: {low} to {high}."
-        )
-    return number
 
 
 def resize(description: ModelDescription, structure: Mapping[str, int]) -> None:

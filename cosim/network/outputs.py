@@ -11,7 +11,6 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
-from cosim.components.start_values import StartValue
 from cosim.coupling.connection import split_name
 from cosim.errors import ScenarioError
 from cosim.network.settings import NetworkSettings
@@ -69,13 +68,6 @@ class NetworkOutputs(FMI3Component):
         self.sources = [_source(name, node.name, components) for node in settings.nodes for name in node.signals]
         description = _description(settings, self.sources, components, self.readers)
         super().__init__(NAME, None, description, source="the network of the scenario", kind=KIND)
-
-    def configure(self, starts: Mapping[str, StartValue]) -> None:
-        """Nothing: shapes are declared.
-
-        Args:
-            starts: values by name.
-        """
 
 
 def error_name(signal: str) -> str:

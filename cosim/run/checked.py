@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from cosim.components.start_values import StartValue
 from cosim.run.balise_service import BaliseRoles, balise_roles
 from cosim.run.checked_observers import Certificates, check_observers
 from cosim.run.checked_tables import Stated, complete_tables, parse_tables
@@ -14,7 +13,6 @@ from cosim.run.coupled import Coupled, couple
 from cosim.run.loaded_components import LoadedComponents, load_components
 from cosim.run.network_remarks import network_warnings
 from cosim.run.remarks import Remarks
-from cosim.run.starts import all_start_values
 from cosim.run.step_schedule import StepSchedule, make_schedule
 from cosim.run.task import RunTask
 
@@ -26,7 +24,7 @@ class Checked:
     Args:
         task: with all roles and thresholds. stated: layout and connections. loaded: the components.
         coupled: what hangs together. balises: who has to do with them. schedule: algorithm and order.
-        starts: values by component and name. certificates: by component.
+        certificates: by component.
     """
 
     task: RunTask
@@ -35,7 +33,6 @@ class Checked:
     coupled: Coupled
     balises: BaliseRoles
     schedule: StepSchedule
-    starts: Mapping[str, Mapping[str, StartValue]]
     certificates: Certificates
 
 
@@ -58,6 +55,5 @@ def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks,
     balises = balise_roles(task.table.balises, loaded.components, task.where)
     task = complete_tables(task, coupled, balises, remarks)
     schedule = make_schedule(task.table, coupled, balises)
-    starts = all_start_values(task.table, loaded.components)
     certificates = check_observers(task, coupled, stated, balises.receivers, remarks)
-    return Checked(task, stated, loaded, coupled, balises, schedule, starts, certificates)
+    return Checked(task, stated, loaded, coupled, balises, schedule, certificates)

@@ -9,7 +9,7 @@ from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
 from cosim.coupling.graph import undeclared
 from cosim.run.component_models import make_system, values_in_use
-from cosim.run.starts import given_values
+from cosim.run.starts import names_with_starts
 from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from cosim.scenario.schema import ScenarioTable
 
@@ -33,7 +33,7 @@ def coupling_warnings(
     Returns:
         Texts that warn, and texts that only explain.
     """
-    free = unconnected_inputs(connections, components.values(), given_values(table))
+    free = unconnected_inputs(connections, components.values(), names_with_starts(table))
     doubts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
     deaf = [
         name for name, of in table.components.items() if of.tolerance is not None and components[name].fmi_version == 1

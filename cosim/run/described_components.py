@@ -8,6 +8,7 @@ from typing import Any
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu, describe_system
 from cosim.components.recording import RecordingComponent
+from cosim.components.start_values import start_values
 from cosim.run.backends import intended
 from cosim.run.component_models import filter_component, make_system, open_recording, python_component
 from cosim.scenario.scenario_tables import ComponentTable
@@ -23,7 +24,7 @@ def describe_component(
         span: start and stop of the run [s], which a recording must cover; None where it does not matter.
 
     Raises:
-        ScenarioError, FmuLoadError: the component cannot be made.
+        ScenarioError, FmuLoadError: the component cannot be made. CouplingError: its parameters do not fit it.
     """
     system = make_system(table, where)
     component: Component
@@ -41,6 +42,7 @@ def describe_component(
         # the exported FMU carries the same description
         component = describe_system(system, name, version, table.preset)
         component.kind = "block" if backend.startswith("block") else "FMU"
-    component.configure(table.parameters)
+    if table.filter is None:
+        start_values(component, table.parameters)
     component.declare_missing(table.can_be_missing, where)
     return component

@@ -19,6 +19,7 @@ from cosim.run.component_models import component_factories
 from cosim.run.coupled import Coupled
 from cosim.run.once_per_process import check_instances
 from cosim.run.remarks import Remarks
+from cosim.run.starts import component_starts
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from fmus.fmi.capabilities import tool_warning
@@ -30,10 +31,12 @@ class LoadedComponents:
     """The components of a run.
 
     Args:
-        components: by name. factories: make a fresh one each, to be probed.
+        components: by name. starts: their start values, by component and name.
+        factories: make a fresh one each, to be probed.
     """
 
     components: Mapping[str, Component]
+    starts: Mapping[str, Mapping[str, StartValue]]
     factories: Mapping[str, Callable[[], Component]]
 
 
@@ -47,7 +50,7 @@ def load_components(
         resources: closed when the run ends, which frees the components.
 
     Raises:
-        CosimError: a component cannot be had.
+        CosimError: a component cannot be had, or its table sets what it cannot take.
     """
     table, folder = task.table, task.folder
     span = table.start, table.stop
@@ -56,12 +59,13 @@ def load_components(
     files = {name: (folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
     check_instances(files, task.where)
     components: dict[str, Component] = {}
+    starts: dict[str, dict[str, StartValue]] = {}
     resources.callback(_free, components)
     for name, factory in factories.items():
         components[name] = factory()
-        components[name].configure(table.components[name].parameters)
+        starts[name] = component_starts(table.components[name], components[name], table.seed)
         _remark(components[name], remarks)
-    return LoadedComponents(components, factories)
+    return LoadedComponents(components, starts, factories)
 
 
 def _remark(component: Component, remarks: Remarks) -> None:

@@ -68,7 +68,7 @@ def make_ready(
         CosimError: a component cannot be instantiated, or cannot do what is asked for.
     """
     table = checked.task.table
-    instantiate_components(table, checked.coupled, checked.starts, call_log)
+    instantiate_components(table, checked.coupled, checked.loaded.starts, call_log)
     plan = plan_run(table, checked.coupled, checked.schedule.order)
     resources.callback(close, plan)
     _remark_coupling(checked, plan, remarks)

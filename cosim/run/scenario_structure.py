@@ -16,7 +16,7 @@ from cosim.run.coupled import Coupled, couple
 from cosim.run.described_components import describe_component
 from cosim.run.movement import movement_chains
 from cosim.run.network import Network
-from cosim.run.starts import given_values
+from cosim.run.starts import names_with_starts
 from cosim.run.step_schedule import stepping_groups
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
@@ -101,7 +101,7 @@ def _network(network: Network) -> Packets:
 
 
 def _warnings(table: ScenarioTable, components: Mapping[str, Component], connections: list[Connection]) -> list[str]:
-    free = unconnected_inputs(connections, components.values(), given_values(table))
+    free = unconnected_inputs(connections, components.values(), names_with_starts(table))
     silent = undeclared(components.values())
     texts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
     return texts + (

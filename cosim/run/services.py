@@ -49,7 +49,7 @@ def make_services(checked: Checked, plan: Plan, remarks: Remarks) -> Services:
 def _choose(table: BalisesTable, checked: Checked, remarks: Remarks) -> Choice:
     """How crossings are found, with what speaks against it."""
     plant, loaded, axis = checked.balises.plant, checked.loaded, checked.task.axis
-    make, starts = loaded.factories[plant], checked.starts[plant]
+    make, starts = loaded.factories[plant], loaded.starts[plant]
     choice = choose_method(table, loaded.components[plant], make, starts, axis.start, axis.step)
     remarks.warn(*choice.warnings)
     remarks.note(f"Balises localised by '{choice.method}': {choice.reason}.")

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from cosim.components.component import Component
+from cosim.components.start_values import StartValue
 from cosim.coupling.plan import Plan
 from cosim.diagnostics.call_statistics import call_statistics_table
 from cosim.evaluation.balise_gaps import gap_errors
@@ -87,7 +88,7 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "guid": component.description.guid,
         "preset": table.preset,
         "options": table.options,
-        "parameters": component.starts,
+        "parameters": {name: _shown(value) for name, value in component.starts.items()},
         "tolerance": component.tolerance,
         "source": component.source,
         "calls": component.calls,
@@ -97,6 +98,13 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "message_counts": dict(component.messages.counts),
         "events": None if outcomes is None and not missed else {**(outcomes or {}), **missed},
     }
+
+
+def _shown(value: StartValue) -> Any:
+    """A start value as JSON takes it: bytes in hexadecimal."""
+    if isinstance(value, list):
+        return [_shown(entry) for entry in value]
+    return value.hex() if isinstance(value, bytes) else value
 
 
 def judged_summary(result: Result, spec: ReportSpec) -> dict[str, Any]:

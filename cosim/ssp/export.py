@@ -15,13 +15,13 @@ from fmpy.model_description import ModelDescription
 
 from cosim.balises.layout import TrackLayout
 from cosim.components.loading import describe_fmu
+from cosim.components.start_values import start_values
 from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, nearest
 from cosim.run.backends import NATIVE
 from cosim.run.component_models import LATE_PARAMETERS, OWN_PACKAGES, make_system, native_fmu
 from cosim.run.connections import parse_connections
 from cosim.run.layouts import make_layout
 from cosim.run.run_seeds import component_seed, with_seeds
-from cosim.run.starts import start_values
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from cosim.ssp.annotation import DIGEST, digest, write_extras
@@ -203,7 +203,6 @@ class _Exporter:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
         try:
             component = describe_fmu(fmu, name)
-            component.configure(table.parameters)
             seed = component_seed(component, table.parameters, self.table.seed)
             start_values(component, table.parameters | seed)
             self.seeds[name] = {} if self.table.seed == RUN_SEED else seed  # else the FMU finds the same by its name

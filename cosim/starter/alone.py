@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 from fmpy.model_description import DefaultExperiment, ModelVariable
 
+from cosim.components.start_values import declared_start, start_values
 from cosim.errors import CosimError
-from cosim.run.starts import start_values
 from cosim.scenario.schema import step_count
 from cosim.starter.look import Look, number
 from cosim.starter.toml_lines import LISTED, entry, one_line
-from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES
+from fmus.fmi.types import NUMERIC_TYPES
 
 STOP, STEP, STEPS = 10.0, 0.01, 1000
 _COLUMNS_NAMED = 6
@@ -68,7 +67,7 @@ def _input(look: Look, variable: ModelVariable) -> str:
     """An input's start value, as a comment where it has none or the master would not take it."""
     unit, said = look.component.unit_name(variable.name) or "-", one_line(variable.description or "")
     remark = f"  # [{one_line(unit)}] {said}".rstrip()
-    value = _start(variable)
+    value = declared_start(variable)
     if value is None:
         kind = f"{variable.type} array" if variable.shape else str(variable.type)
         return f"# {entry(variable.name, 0.0).rpartition(' = ')[0]} = ...{remark} ({kind})"
@@ -80,16 +79,3 @@ def _input(look: Look, variable: ModelVariable) -> str:
             f"{one_line(str(error), 200)}"
         )
     return entry(variable.name, value) + remark
-
-
-def _start(variable: ModelVariable) -> Any:
-    if variable.shape or variable.start is None or variable.type in ("Clock", "Binary"):
-        return None
-    if variable.type == "String":
-        return str(variable.start)
-    if variable.type == "Boolean":
-        return str(variable.start).strip().lower() in ("true", "1")
-    if str(variable.type) not in FLOATING_TYPES:
-        return int(variable.start) if str(variable.start).strip().lstrip("+-").isdecimal() else None
-    value = number(variable.start)
-    return value if value is not None and isfinite(value) else None

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from cosim.errors import CosimError, ScenarioError
 from cosim.run.described_components import describe_component
 from cosim.run.outcome import INTERRUPTED, Outcome
-from cosim.run.starts import start_values
 from cosim.scenario.override import CASE
 from cosim.studies.measures import Measure, error_measures, own_measures
 from cosim.studies.runnable import RunnableScenario
@@ -195,8 +194,7 @@ def _check_parameters(scenario: RunnableScenario, names: Iterable[str]) -> None:
     for name in dict.fromkeys(n.partition(".")[0] for n in names if n.partition(".")[0] in tables):
         table = tables[name]
         if table.recording is None:
-            component = describe_component(name, table, scenario.folder, f"{scenario.where}: components.{name}")
-            start_values(component, table.parameters)
+            describe_component(name, table, scenario.folder, f"{scenario.where}: components.{name}")
 
 
 def _run(job: _Job) -> Outcome | str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from mock_slaves import set_start
 
 from cosim.balises.delivery import Receiver
 from cosim.balises.layout import Layout, by_positions
@@ -183,7 +184,7 @@ def prepare(
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():
-            component.set_start(name, value)
+            set_start(component, name, value)
     plan = make_plan(by_name, pairs, order, extra)
     if inputs != "hold":
         attach_interpolators(plan, inputs)

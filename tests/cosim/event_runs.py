@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from coupled_runs import Balises, _service
+from mock_slaves import set_start
 
 from cosim.components.component import Component
 from cosim.components.loading import load_fmu
@@ -66,7 +67,7 @@ def prepare(
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():
-            component.set_start(name, value)
+            set_start(component, name, value)
     plan = make_plan(by_name, connected, order, None, clocks)
     service = None if balises is None else _service(plan, balises)
     return Master(plan, TimeAxis(start, h, count), service, algorithm=algorithm, control=control, events=events)

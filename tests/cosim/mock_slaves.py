@@ -17,6 +17,7 @@ from fmpy.model_description import BaseUnit, CoSimulation, ModelDescription, Mod
 from cosim.components.component import Component
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
+from cosim.components.start_values import start_values
 
 DISCARD, ERROR, FATAL = 2, 3, 4
 
@@ -302,6 +303,12 @@ def started(slave: Mock, name: str = "mock", t0: float = 0.0) -> Component:
     made.enter_initialization(t0, 1e6)
     made.exit_initialization()
     return made
+
+
+def set_start(made: Component, name: str, value: Any) -> None:
+    """As a scenario writes it."""
+    for typed, start in start_values(made, {name: value}).items():
+        made.set_start(typed, start)
 
 
 def read(made: Component, names: Sequence[str]) -> list[float]:

@@ -286,8 +286,8 @@ def test_a_setting_without_effect_is_told(key: str, value: float, needed: str) -
 @pytest.mark.parametrize(
     ("setting", "value", "message"),
     [
-        ("locomotive.mass", -5.0, r"locomotive.mass = -5 lies outside what the component declares: 1.0 to inf kg"),
-        ("observer.mass", 0.0, r"observer.mass = 0 lies outside"),
+        ("locomotive.mass", -5.0, r"locomotive.mass: -5 lies outside what the component declares: 1.0 to inf kg"),
+        ("observer.mass", 0.0, r"observer.mass: 0 lies outside"),
         ("report.true_speed", "locomotive.sped", r"no variable 'sped'.*'speed'"),
         ("report.true_speed", "locomotive.position", r"report.true_speed: locomotive.position is not in m/s"),
         ("report.observers", ["nobody"], r"report.observers: no component 'nobody'"),
@@ -319,7 +319,7 @@ def test_a_late_policy_for_an_fmu_that_has_none_is_refused() -> None:
     ("value", "message"),
     [
         ("forget", r"observer\.late_policy: no item 'forget'; "),
-        (4, r"observer\.late_policy = 4 is no item of the enumeration: replay \(1\), reject \(2\), late \(3\)"),
+        (4, r"observer\.late_policy: 4 is no item of the enumeration: replay \(1\), reject \(2\), late \(3\)"),
     ],
 )
 def test_an_enumeration_takes_its_items_only(value: Any, message: str) -> None:

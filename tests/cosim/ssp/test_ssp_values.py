@@ -76,7 +76,7 @@ def test_arrays_are_written_with_the_shapes_that_structural_parameters_give(tmp_
 REFUSED = {
     "text for a number": ({"u_float64": "soon"}, "a.u_float64: expected a number"),
     "truth": ({"u_boolean": "yes"}, "a.u_boolean: expected true or false"),
-    "item": ({"u_enumeration": 9}, "a.u_enumeration = 9 is no item"),
+    "item": ({"u_enumeration": 9}, "a.u_enumeration: 9 is no item"),
     "rows": ({"u_matrix": [[1.0, 2.0], [3.0]]}, "rows of equal length"),
     "shape": ({"u_matrix": [1.0, 2.0]}, r"expected 6 values for a Float64 array of shape \(2, 3\)"),
     "output": ({"y_float64": 1.0}, "a.y_float64 cannot be set: it has causality 'output'"),

@@ -174,7 +174,7 @@ def test_points_of_a_hypercube_are_no_line_and_words_are_categories() -> None:
     [
         ({"trian.mass": [1.0]}, r"run 0 \(trian\.mass = 1\.0\): .*no component 'trian'; did you mean 'train'"),
         ({"train.mas": [1.0]}, r"run 0 .*no variable 'mas'; did you mean 'mass'"),
-        ({"train.mass": [-1.0]}, r"run 0 .*train\.mass = -1 lies outside"),
+        ({"train.mass": [-1.0]}, r"run 0 .*train\.mass: -1 lies outside"),
         ({"stop": [0.2, 0.205]}, r"run 1 \(stop = 0\.205\): .*does not divide"),
         ({"master.steper": ["python"]}, r"master\.steper: unknown key"),
     ],
