@@ -20,7 +20,7 @@ from pydantic.fields import FieldInfo
 
 import fmu_observer
 from cosim import Outcome, Scenario
-from cosim.evaluation.error_table import error_text
+from cosim.evaluation.error_table import error_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.fmu_filter.settings import FilterTable
@@ -96,7 +96,7 @@ def write_picture() -> None:
 def printed_table() -> str:
     """The table of the default run, two phases and the whole of it, as ``cosim run`` prints it."""
     outcome = default_run()
-    head, rule, *rows = error_text(phase_metrics(outcome.result, outcome.spec), outcome.spec).splitlines()
+    head, rule, *rows = error_table(phase_metrics(outcome.result, outcome.spec), outcome.spec).text().splitlines()
     chosen = [row for row in rows if any(f"  {phase}  " in row for phase in SHORTENED)]
     return "\n".join(["```text", head, rule, *chosen, "```", ""])
 

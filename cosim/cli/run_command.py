@@ -17,11 +17,11 @@ from cosim.cli.output import ignore, print_json, print_notice, print_paths, prin
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
 from cosim.evaluation.consistency import filter_consistency
-from cosim.evaluation.consistency_table import consistency_text
-from cosim.evaluation.cost import cost_text
-from cosim.evaluation.error_table import error_text
+from cosim.evaluation.consistency_table import consistency_table
+from cosim.evaluation.cost import cost_table
+from cosim.evaluation.error_table import error_table
 from cosim.evaluation.fault_detection import fault_detection
-from cosim.evaluation.fault_table import fault_text
+from cosim.evaluation.fault_table import fault_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.process.last_call import LAST_CALL
 from cosim.results.results_folder import check_writable
@@ -191,7 +191,7 @@ def _print(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpar
     print(_headline(summary))
     if outcome.result.table.size:
         _print_tables(outcome)
-    print(cost_text(outcome.result), end="\n\n")
+    print(cost_table(outcome.result).text(), end="\n\n")
     if study is not None:
         print(study.text())
     if outcome.expectations:
@@ -205,13 +205,13 @@ def _print_tables(outcome: Outcome) -> None:
     """Errors, detected faults and consistency of filters, as far as there are any."""
     metrics = [m for m in phase_metrics(outcome.result, outcome.spec) if m.speed or m.position]
     if metrics:
-        print(error_text(metrics, outcome.spec))
-    faults = fault_text(fault_detection(outcome.result, outcome.spec), outcome.spec)
-    if faults:
-        print("\n" + faults)
-    filters = consistency_text(filter_consistency(outcome.result, outcome.spec), outcome.spec)
-    if filters:
-        print("\n" + filters)
+        print(error_table(metrics, outcome.spec).text())
+    for table in (
+        fault_table(fault_detection(outcome.result, outcome.spec), outcome.spec),
+        consistency_table(filter_consistency(outcome.result, outcome.spec), outcome.spec),
+    ):
+        if table:
+            print("\n" + table.text())
 
 
 def _headline(summary: Any) -> str:

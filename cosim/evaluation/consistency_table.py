@@ -1,50 +1,37 @@
-"""The table of filter consistency, as rows of text for a page and for a terminal. Standard library only."""
+"""The table of filter consistency. Standard library only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cosim.evaluation.consistency import MEANING, FilterConsistency
+from cosim.evaluation.consistency import ADVICE, MEANING, FilterConsistency
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from fmus.tables.numbers import number
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Table, name_column, text_column
 
-HEADINGS = ("Judged by", "Expected", "Mean", "Band of the mean, 99 %", "Samples inside 95 % band [%]", "Verdict")
-SHORT = ("judged by", "expected", "mean", "band, 99 %", "inside [%]", "verdict")
-
+_COLUMNS = (
+    name_column("observer", "Observer", short="filter consistency"),
+    name_column("quantity", "Judged by", "What is squared and normalised", short="judged by"),
+    Column("degrees", "Expected", "", "Degrees of freedom: the mean of a consistent filter", short="expected"),
+    Column("mean", "Mean", "", "Of the normalised squares", short="mean"),
+    Column("band", "Band of the mean, 99 %", "", "The mean of a consistent filter lies in it", short="band, 99 %"),
+    Column("inside", "Samples inside 95 % band", "%", "Of a consistent filter 95 %", factor=100.0, short="inside"),
+    text_column("verdict", "Verdict", "; ".join(f"{word}: {text}" for word, text in ADVICE.items()), short="verdict"),
+)
 VERDICTS = "overconfident: errors are larger than told; underconfident: smaller; docs/consistency.md says what to do."
 
 
-def cells(entry: FilterConsistency) -> list[str]:
-    """The numbers of one judgement, in the order of `HEADINGS`.
-
-    Args:
-        entry: from `filter_consistency`.
-    """
-    found = entry.found
-    return [
-        entry.name,
-        number(found.degrees),
-        number(found.mean),
-        f"{number(found.band.low)} to {number(found.band.high)}",
-        number(100.0 * found.inside),
-        found.verdict,
-    ]
-
-
-def consistency_text(entries: Sequence[FilterConsistency], spec: ReportSpec) -> str:
-    """The table for a terminal; empty where nothing was judged.
+def consistency_table(entries: Sequence[FilterConsistency], spec: ReportSpec) -> Table:
+    """Filters whose covariances can be judged, and whether they fit; the meaning of the words below.
 
     Args:
         entries: from `filter_consistency`. spec: labels.
-
-    Returns:
-        Lines, the meaning of the words below them; ends without a line break.
     """
-    if not entries:
-        return ""
-    rows = [["filter consistency", *SHORT], *([label(spec, e.observer), *cells(e)] for e in entries)]
+    rows = [
+        [label(spec, e.observer), e.name, f.degrees, f.mean, (f.band.low, f.band.high), f.inside, f.verdict]
+        for e in entries
+        for f in [e.found]
+    ]
     kinds = dict.fromkeys(entry.kind for entry in entries)
     meanings = [f"{'NEES of one quantity' if kind == 'error' else kind}: {MEANING[kind]}." for kind in kinds]
-    return "\n".join([*text_table(rows, (0, 1, 6), heading=True), *meanings, VERDICTS])
+    return Table("consistency", _COLUMNS, rows, notes=(*meanings, VERDICTS), bad=set(ADVICE))

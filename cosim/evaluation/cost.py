@@ -8,7 +8,7 @@ from typing import Any
 from cosim.evaluation.summary_entries import list_entry, number_entry
 from cosim.results.result import Result
 from fmus.tables.numbers import DASH
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Table, name_column
 
 KINDS = {
     "doStep": ("doStep",),
@@ -22,26 +22,20 @@ _NOT_TIMED_IN_C = ("get", "set")
 """Columns that the compiled stepper counts and does not time."""
 
 
-def cost_rows(result: Result) -> list[list[str]]:
-    """One row for each component: name, then calls and milliseconds of each column of `KINDS`, then messages logged.
+def cost_table(result: Result) -> Table:
+    """Calls of each component and the time they took, and the messages it logged.
 
     Args:
         result: the run.
     """
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping) and "cost" in entry]
-    return [_row(entry, was_compiled(result)) for entry in entries]
-
-
-def cost_text(result: Result) -> str:
-    """The same as a table for a terminal; empty where the result does not say; ends without a line break.
-
-    Args:
-        result: the run.
-    """
-    rows = cost_rows(result)
-    if not rows:
-        return ""
-    return "\n".join(text_table([["calls / estimated ms", *KINDS, "messages"], *rows], heading=True))
+    columns = [name_column("component", "Component", short="calls / estimated ms")]
+    columns += [
+        Column(column, column, meaning=f"Calls ({', '.join(kinds)}) and the milliseconds they took", write=_written)
+        for column, kinds in KINDS.items()
+    ]
+    messages = Column("messages", "Messages", meaning="How many messages it logged", short="messages")
+    return Table("calls", [*columns, messages], [_row(entry, was_compiled(result)) for entry in entries])
 
 
 def was_compiled(result: Result) -> bool:
@@ -55,16 +49,24 @@ def was_compiled(result: Result) -> bool:
     return isinstance(stepper, Mapping) and bool(stepper.get("steps_compiled"))
 
 
-def _row(entry: Mapping[str, Any], compiled: bool) -> list[str]:
+def _row(entry: Mapping[str, Any], compiled: bool) -> list[Any]:
     cost = entry["cost"] if isinstance(entry["cost"], Mapping) else {}
     counts = entry.get("message_counts")
     messages = sum(counts.values()) if isinstance(counts, Mapping) else 0
-    cells = [_cell(cost, kinds, not (compiled and column in _NOT_TIMED_IN_C)) for column, kinds in KINDS.items()]
-    return [str(entry.get("name")), *cells, str(messages)]
+    timed = [not (compiled and column in _NOT_TIMED_IN_C) for column in KINDS]
+    return [str(entry.get("name")), *map(_spent, [cost] * len(KINDS), KINDS.values(), timed), messages]
 
 
-def _cell(cost: Mapping[str, Any], kinds: Sequence[str], timed: bool) -> str:
+def _spent(cost: Mapping[str, Any], kinds: Sequence[str], timed: bool) -> dict[str, Any]:
+    """Number of the calls, and their time [s], None where it was not taken."""
     found = [cost[kind] for kind in kinds if isinstance(cost.get(kind), Mapping)]
     calls = sum(int(number_entry(entry, "calls") or 0) for entry in found)
     seconds = sum(number_entry(entry, "seconds") or 0.0 for entry in found)
-    return f"{calls} / {f'{1000 * seconds:.3g}' if timed and seconds else DASH}" if calls else DASH
+    return {"calls": calls, "seconds": seconds if timed and seconds else None}
+
+
+def _written(spent: Mapping[str, Any]) -> str:
+    if not spent["calls"]:
+        return DASH
+    milliseconds = DASH if spent["seconds"] is None else f"{1000 * spent['seconds']:.3g}"
+    return f"{spent['calls']} / {milliseconds}"

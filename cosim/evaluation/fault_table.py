@@ -1,109 +1,80 @@
-"""The table of fault detection, as rows of text for a page and for a terminal. Standard library only."""
+"""The table of fault detection. Standard library only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan
 from statistics import fmean
+from typing import Any
 
-from cosim.evaluation.fault_detection import FaultDetection, Interval
+from cosim.evaluation.fault_detection import FaultDetection
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from fmus.tables.numbers import DASH, error_number, number
-from fmus.text_table import text_table
+from fmus.tables.numbers import number
+from fmus.tables.table import Column, Table, error_column, name_column
 
-HEADINGS = (
-    "Faults",
-    "Missed",
-    "95 % of missed [%]",
-    "False",
-    "False per hour, 95 % [1/h]",
-    "Delay at start [s]",
-    "Delay at end [s]",
-    "On without fault [s]",
-    "Position before balises, mean [m]",
-    "max [m]",
+_BEFORE = "Absolute position error at the last row before each balise"
+_COLUMNS = (
+    Column("faults", "Faults", "", "Faults that there were", short="faults"),
+    Column("missed", "Missed", "", "Faults that it did not find", short="missed"),
+    Column("missed_interval", "95 % of missed", "%", "Interval of the share missed", factor=100.0, short="95 %"),
+    Column("false", "False", "", "Detections of no fault", short="false"),
+    Column("false_interval", "False per hour, 95 %", "1/h", "Interval of false detections", short="per hour, 95 %"),
+    Column("start_delay", "Delay at start", "s", "Mean time from the begin of a fault to its detection", short="start"),
+    Column("end_delay", "Delay at end", "s", "Mean time from the end of a fault to that of its detection", short="end"),
+    Column("time_outside", "On without fault", "s", "How long a fault was indicated where none was", short="outside"),
+    error_column("mean_position_error", "Position before balises, mean", "m", _BEFORE, short="mean |p|"),
+    error_column("max_position_error", "max", "m", _BEFORE, short="max |p|"),
 )
-SHORT = (
-    "faults",
-    "missed",
-    "95 % [%]",
-    "false",
-    "per hour, 95 %",
-    "start [s]",
-    "end [s]",
-    "outside [s]",
-    "mean |p| [m]",
-    "max |p| [m]",
-)
-
-POSITIONS = 2
-"""How many columns at the end are of positions."""
+_COUNTS = [column.key for column in _COLUMNS[:-2]]
 
 
-def columns(found: Sequence[FaultDetection]) -> int:
-    """How many of `HEADINGS` are shown: those of positions only where an observer has any before a balise.
+def fault_table(found: Sequence[FaultDetection], spec: ReportSpec) -> Table:
+    """Faults: which were found, how late, and what was no fault; positions only where there are any before a balise.
 
     Args:
-        found: of all observers.
+        found: from `fault_detection`. spec: labels, and the longest delay allowed.
     """
-    return len(HEADINGS) - (0 if any(one.position_errors for one in found) else POSITIONS)
+    heading = spec.detection.replace("_", " ") + "s" if spec.detection == ReportSpec.detection else spec.detection
+    columns = [_with_limit(c, spec.delay_limit) for c in _COLUMNS]
+    rows = [[label(spec, one.observer), *_values(one, spec.delay_limit)] for one in found]
+    return Table("faults", [name_column("observer", "Observer", short=heading), *columns], rows).filled(_COUNTS)
 
 
-def cells(found: FaultDetection, limit: float | None = None) -> list[str]:
-    """The numbers of an observer, in the order of `HEADINGS`; delays are means.
-
-    Args:
-        found: of the observer. limit: longest delay that is allowed [s], told beside the delay; None for none.
-    """
-    share = found.missed_interval
+def _values(found: FaultDetection, limit: float | None) -> list[Any]:
     sizes = [abs(error) for error in found.position_errors]
-    positions = [error_number(fmean(sizes)) if sizes else DASH, error_number(max(sizes)) if sizes else DASH]
+    positions = [fmean(sizes), max(sizes)] if sizes else [None, None]
     if not found.indicates:
-        return [str(found.faults), *[DASH] * (len(HEADINGS) - 3), *positions]
+        return [found.faults, *[None] * (len(_COUNTS) - 1), *positions]
     return [
-        str(found.faults),
-        str(found.missed),
-        _span((100.0 * share[0], 100.0 * share[1])) if found.faults else DASH,
-        str(found.false),
-        _span(found.false_interval),
+        found.faults,
+        found.missed,
+        found.missed_interval if found.faults else None,
+        found.false,
+        None if isnan(found.false_interval[1]) else found.false_interval,
         _start(found, limit),
-        _end(found.end_delays),
-        number(found.time_outside),
+        fmean(found.end_delays) if found.end_delays else None,
+        found.time_outside,
         *positions,
     ]
 
 
-def fault_text(found: Sequence[FaultDetection], spec: ReportSpec) -> str:
-    """The table for a terminal; empty where nothing was judged.
-
-    Args:
-        found: from `fault_detection`. spec: labels.
-
-    Returns:
-        Lines of equal width, p the position error at the last row before each balise; ends without a line break.
-    """
-    if not found:
-        return ""
-    heading = spec.detection.replace("_", " ") + "s" if spec.detection == ReportSpec.detection else spec.detection
-    last = columns(found) + 1
-    rows = [[heading, *SHORT], *([label(spec, f.observer), *cells(f, spec.delay_limit)] for f in found)]
-    return "\n".join(text_table([row[:last] for row in rows], (0,), heading=True))
+def _start(found: FaultDetection, limit: float | None) -> Any:
+    delay = fmean(found.start_delays) if found.start_delays else None
+    return delay if limit is None or not found.faults else {"mean": delay, "within": found.within(limit)}
 
 
-def _span(interval: Interval) -> str:
-    low, high = interval
-    return DASH if high != high else f"{number(low)} to {number(high)}"  # noqa: PLR0124 - NaN
+def _with_limit(column: Column, limit: float | None) -> Column:
+    """Columns of delays as they are written: the first with the longest delay that is allowed [s]."""
 
+    def started(delay: Any) -> str:
+        if not isinstance(delay, dict):
+            return number(delay)
+        return f"{number(delay['mean'])} ({'within' if delay['within'] else 'not within'} {number(limit)})"
 
-def _start(found: FaultDetection, limit: float | None) -> str:
-    delay = number(fmean(found.start_delays)) if found.start_delays else DASH
-    if limit is None or not found.faults:
-        return delay
-    return f"{delay} ({'within' if found.within(limit) else 'not within'} {number(limit)})"
+    def ended(delay: float | None) -> str:
+        return "not ended" if delay == float("inf") else number(delay)
 
-
-def _end(delays: Sequence[float]) -> str:
-    if not delays:
-        return DASH
-    mean = fmean(delays)
-    return "not ended" if mean == float("inf") else number(mean)
+    written = {"start_delay": started, "end_delay": ended}
+    return replace(column, write=written[column.key]) if column.key in written else column

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from cosim.evaluation.error_table import error_text
+from cosim.evaluation.error_table import error_table
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.observer_scores import ObserverScore
-from cosim.observer_benchmark.observer_table import aligned, main_row
+from cosim.observer_benchmark.observer_table import observer_table
 from cosim.run.outcome import Outcome
-from fmus.tables.numbers import cell
+from fmus.tables.table import Table
 
 
 @dataclass(frozen=True)
@@ -38,20 +38,24 @@ class BenchmarkScores:
         """Names of the observers without numbers, or whose numbers end early."""
         return [score.name for score in self.scores if score.failure is not None]
 
-    def rows(self) -> list[dict[str, Any]]:
-        """The main table: one row for each observer, columns with their units, numbers as they are."""
-        return [main_row(score) for score in self.scores]
+    def table(self) -> Table:
+        """The main table: one row for each observer."""
+        title = f"{self.spec.title}: {len(self.scores)} observers on one recorded run of {self.steps} steps"
+        return replace(observer_table(self.scores), title=title)
+
+    def errors(self) -> Table:
+        """Errors of each observer in each phase."""
+        return error_table([phase for score in self.scores for phase in score.phases], self.labelled_spec())
+
+    def remarks(self) -> list[str]:
+        """What failed, and what the reader must know."""
+        failed = [f"{score.label}: {score.failure}" for score in self.scores if score.failure]
+        return [*failed, *(f"- {note}" for note in self.notes)]
 
     def text(self) -> str:
         """The tables for a terminal."""
-        rows = [{key: cell(value) for key, value in row.items()} for row in self.rows()]
-        parts = [f"{self.spec.title}: {len(rows)} observers on one recorded run of {self.steps} steps", aligned(rows)]
-        metrics = [phase for score in self.scores for phase in score.phases]
-        if metrics:
-            parts += ["", error_text(metrics, self.labelled_spec())]
-        for score in self.scores:
-            parts += [f"{score.label}: {text}" for text in ([score.failure] if score.failure else [])]
-        return "\n".join([*parts, *(f"- {note}" for note in self.notes)])
+        tables = [table.text() for table in (self.table(), self.errors()) if table]
+        return "\n".join(["\n\n".join(tables), *self.remarks()])
 
     def labelled_spec(self) -> ReportSpec:
         """The roles with all observers of the benchmark and their labels."""

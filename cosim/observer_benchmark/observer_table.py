@@ -1,70 +1,69 @@
-"""The main table of a comparison of observers: rows of numbers, cells as text, lines of equal width. Touches no
-file.
-"""
+"""The main table of a comparison of observers. Touches no file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore
 from fmus.tables.numbers import number
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Table, error_column, name_column
+
+_MICRO = 1e-6
+_WHOLE = "Estimate minus true value over the whole evaluated run"
+_AT_BALISES = "Estimate minus true value just before telegrams are used"
+_COLUMNS = (
+    name_column("observer", "observer"),
+    error_column("rms_speed_error", "rms v", "m/s", _WHOLE),
+    error_column("max_speed_error", "max |v|", "m/s", _WHOLE),
+    error_column("rms_position_error", "rms p", "m", _WHOLE),
+    error_column("max_position_error", "max |p|", "m", _WHOLE),
+    error_column("rms_speed_error_at_balises", "at balises rms v", "m/s", _AT_BALISES),
+    error_column("rms_position_error_at_balises", "at balises rms p", "m", _AT_BALISES),
+    Column("slip_delays", "slip seen after", "s", "From the begin of each zone to the first indication in it"),
+    Column("false_alarms", "false alarms", "", "Indications that began outside the low-adhesion zones"),
+    Column("certified", "certified", "s", "Longest gap between balises that the certificate covers"),
+    Column("holds", "holds", "", "Whether the certificate covers the gaps expected, and those seen"),
+    Column("cost", "cost", "us/step", "Time in the observer per communication step", factor=1.0 / _MICRO),
+)
 
 
-def main_row(score: ObserverScore) -> dict[str, Any]:
-    """One row of the main table; headings with units.
+def observer_table(scores: Sequence[ObserverScore]) -> Table:
+    """One row for each observer.
 
     Args:
-        score: an observer with its numbers.
+        scores: observers with their numbers.
     """
+    return Table("table", _COLUMNS, [_row(score) for score in scores])
+
+
+def _row(score: ObserverScore) -> list[Any]:
     whole: PhaseMetrics | None = score.whole
     speed, position = (whole.speed, whole.position) if whole is not None else (None, None)
-    at_v, at_p = score.speed_at_balises, score.position_at_balises
     delays = score.indicator.delays if score.indicator is not None else ()
-    return {
-        "observer": score.label,
-        "rms v [m/s]": speed and speed.rms,
-        "max |v| [m/s]": speed and speed.max_abs,
-        "rms p [m]": position and position.rms,
-        "max |p| [m]": position and position.max_abs,
-        "at balises rms v [m/s]": at_v and at_v.rms,
-        "at balises rms p [m]": at_p and at_p.rms,
-        "slip seen after [s]": "/".join("-" if d is None else number(d) for d in delays) or None,
-        "false alarms": score.false_alarms,
-        "certified [s]": None if score.certificate is None else certified_limit(score.certificate),
-        "holds": certified(score.certificate),
-        "cost [us/step]": score.cost,
-    }
+    return [
+        score.label,
+        *(value for size in (speed, position) for value in (size and size.rms, size and size.max_abs)),
+        score.speed_at_balises and score.speed_at_balises.rms,
+        score.position_at_balises and score.position_at_balises.rms,
+        "/".join("-" if d is None else number(d) for d in delays) or None,
+        score.false_alarms,
+        None if score.certificate is None else _limit(score.certificate),
+        _holds(score.certificate),
+        None if score.cost is None else _MICRO * score.cost,
+    ]
 
 
-def certified_limit(certificate: CertifiedGap) -> float | str | None:
-    """Longest gap that is certified [s], ``any`` where every gap is, None where it is not known.
-
-    Args:
-        certificate: of an observer.
-    """
+def _limit(certificate: CertifiedGap) -> float | str | None:
+    """Longest gap that is certified [s], ``any`` where every gap is, None where it is not known."""
     return "any" if certificate.limit == inf else certificate.limit
 
 
-def certified(certificate: CertifiedGap | None) -> str | None:
-    """Whether a certificate holds for the gaps expected and seen, in words.
-
-    Args:
-        certificate: with the gaps it was held against; None where there is none.
-    """
+def _holds(certificate: CertifiedGap | None) -> str | None:
+    """Whether a certificate holds for the gaps expected and seen, in words; None where there is none."""
     if certificate is None:
         return None
     words = {True: "yes", False: "NO", None: "?"}
     return f"{words[certificate.holds_expected]}/{words[certificate.holds_seen]}"
-
-
-def aligned(rows: Sequence[Mapping[str, str]]) -> str:
-    """Rows as lines of equal width; the first column to the left, the others to the right.
-
-    Args:
-        rows: texts by heading.
-    """
-    return "\n".join(text_table([list(rows[0]), *(list(row.values()) for row in rows)], heading=True)) if rows else ""

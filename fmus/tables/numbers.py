@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 DASH = "–"
 
@@ -43,14 +42,3 @@ def error_number(value: float | None, digits: int = 3) -> str:
         digits: significant digits.
     """
     return "diverged" if value is not None and math.isinf(value) else number(value, digits)
-
-
-def cell(value: Any) -> str:
-    """A cell of a table as text.
-
-    Args:
-        value: number, text or None.
-    """
-    if isinstance(value, str | int):
-        return str(value)
-    return DASH if value is None else error_number(value)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, isnan
+from typing import Any
 
-from cosim.evaluation.error_table import MEASURED
+from cosim.evaluation.error_table import sizes
 from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.roles import label, phases
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
 from cosim.report.page.phases import COLUMNS
-from fmus.tables.numbers import DASH, error_number, number
+from fmus.tables.numbers import number
+from fmus.tables.table import Column, Table, name_column
 
 Values = tuple[float | None, ...]
 
@@ -31,7 +33,7 @@ class Measured:
 
 
 def measured(runs: Sequence[OverlayRun]) -> list[Measured]:
-    """Maximal and rms errors of speed and position, in the columns of `table.MEASURED`.
+    """Maximal and rms errors of speed and position, in the columns of `error_table.MEASURED`.
 
     Args:
         runs: from `make_runs`.
@@ -40,7 +42,7 @@ def measured(runs: Sequence[OverlayRun]) -> list[Measured]:
 
 
 def detailed(runs: Sequence[OverlayRun]) -> list[Measured]:
-    """The numbers of `phase_details`, in the columns of `phases.COLUMNS` and their units.
+    """The numbers of `phase_details`, in the columns of `phases.COLUMNS`.
 
     Args:
         runs: from `make_runs`.
@@ -48,39 +50,42 @@ def detailed(runs: Sequence[OverlayRun]) -> list[Measured]:
 
     def of(run: OverlayRun) -> dict[tuple[str, str], Values]:
         return {
-            (d.observer, d.phase): tuple(_scaled(getattr(d, f), f) for f in COLUMNS)
+            (d.observer, d.phase): tuple(getattr(d, column.key) for column in COLUMNS)
             for d in phase_details(run.result, run.spec)
         }
 
     return _by_phase(runs, of)
 
 
-def headings(rows: Sequence[Measured], names: Sequence[str]) -> tuple[list[str], list[int]]:
-    """Headings of the columns that hold a number somewhere, and their indices.
+def numbers_table(runs: Sequence[OverlayRun], rows: Sequence[Measured], columns: Sequence[Column]) -> Table:
+    """A row for each observer, phase and run, with the difference to the first run below each number.
 
     Args:
-        rows: from `measured` or `detailed`.
-        names: headings of all columns.
+        runs: from `make_runs`. rows: from `measured` or `detailed`. columns: of their values.
     """
-    kept = [i for i in range(len(names)) if any(v[i] is not None for row in rows for v in row.values.values())]
-    return [names[i] for i in kept], kept
+    reference = runs[0].label
+    found: list[list[Any]] = []
+    for row in rows:
+        first = row.values.get(reference)
+        for name, values in row.values.items():
+            compared: Values = (None,) * len(values) if first is None or name == reference else first
+            pairs = [None if v is None else (v, other) for v, other in zip(values, compared, strict=True)]
+            found.append([f"{row.observer}, {row.phase}", name, *pairs])
+    names = [name_column("observer and phase", "Observer and phase"), name_column("run", "Run")]
+    return Table("errors", [*names, *map(_compared, columns)], found).filled()
 
 
-ERROR_HEADINGS = tuple(column.text for column in MEASURED)
-DETAIL_HEADINGS = tuple(heading for heading, _ in COLUMNS.values())
+def _compared(column: Column) -> Column:
+    """The column of a number and that of the first run, of which the difference is shown, absolute and in percent."""
 
+    def written(pair: tuple[float, float | None] | None) -> str:
+        value, first = pair or (None, None)
+        if value is None or first is None:
+            return column.cell(value)
+        scaled = [v if isinstance(v, int) else column.factor * v for v in (value, first)]  # counts are not scaled
+        return f"{column.cell(value)}\n{difference(*scaled)}"
 
-def cell(value: float | None, first: float | None) -> str:
-    """A number, and below it the difference to the first run, absolute and in percent.
-
-    Args:
-        value: of a run; None without one.
-        first: of the first run; None where nothing is to be compared.
-    """
-    if value is None:
-        return DASH
-    text = str(value) if isinstance(value, int) else error_number(value)  # counts and sizes
-    return text if first is None else f"{text}\n{difference(value, first)}"
+    return replace(column, write=written)
 
 
 def difference(value: float, first: float) -> str:
@@ -101,12 +106,7 @@ def difference(value: float, first: float) -> str:
 
 
 def _sizes(m: PhaseMetrics) -> Values:
-    sizes = (size for e in (m.speed, m.position) for size in ((e.max_abs, e.rms) if e else (None, None)))
-    return tuple(None if size is None or isnan(size) else size for size in sizes)
-
-
-def _scaled(value: float | None, field: str) -> float | None:
-    return value if value is None or isinstance(value, int) else COLUMNS[field][1] * value
+    return tuple(None if size is None or isnan(size) else size for size in sizes(m))
 
 
 def _by_phase(runs: Sequence[OverlayRun], of: Callable[[OverlayRun], dict[tuple[str, str], Values]]) -> list[Measured]:

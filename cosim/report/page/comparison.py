@@ -8,34 +8,34 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
+from typing import Any
 
 from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
 from cosim.drawing.style import png
 from cosim.report.figures.comparison_figure import comparison_picture
 from cosim.report.page.page_files import explained, page_bytes, write_file
-from cosim.report.page.page_table import PageTable, simple_table
 from cosim.report.page.render import render
 from cosim.report.page.run_statements import Statement
-from fmus.tables.numbers import DASH, number
+from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
+from fmus.tables.table import Column, Table, name_column, text_column
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
 _MOST_PICTURES = 12  # on a page: the worst signals tell the story
 FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
-HEADINGS = (
-    "Signal",
-    "Unit",
-    "Verdict",
-    "Largest error",
-    "Allowed",
-    "At [s]",
-    "Largest shift [s]",
-    "Error, rms",
-    "Outside [%]",
+_COLUMNS = (
+    name_column("signal", "Signal"),
+    text_column("unit", "Unit"),
+    text_column("verdict", "Verdict"),
+    Column("max_error", "Largest error", "", "Of result minus reference"),
+    Column("allowed", "Allowed", "", "Where the error is largest"),
+    Column("max_error_at", "At", "s", digits=6),
+    Column("max_shift", "Largest shift", "s", "Of instants"),
+    Column("rms_error", "Error, rms"),
+    Column("share_outside", "Outside", "%", "Share of the time outside the tolerance", factor=100.0),
 )
 VERDICTS = {
     "equal": "equal to the bit",
@@ -229,13 +229,13 @@ def _text(signal: SignalComparison, finding: ComparisonFinding) -> str:
     return finding.text.removeprefix(f"{signal.name}: ")
 
 
-def _table(comparison: Comparison) -> PageTable:
+def _table(comparison: Comparison) -> Table:
     """All signals, the worst first; those that fail stand out by colour and by word."""
     failed = comparison.failed
     others = [s for s in comparison.signals if not any(s is f for f in failed)]
     others.sort(key=_use_of_tolerance, reverse=True)
-    table = simple_table(HEADINGS, [_row(s) for s in (*failed, *others)], range(3, len(HEADINGS)))
-    return replace(table, bad={VERDICTS[s.status] for s in failed})
+    rows = [_row(signal) for signal in (*failed, *others)]
+    return Table("signals", _COLUMNS, rows, bad={VERDICTS[s.status] for s in failed})
 
 
 def _use_of_tolerance(signal: SignalComparison) -> float:
@@ -245,19 +245,11 @@ def _use_of_tolerance(signal: SignalComparison) -> float:
     return signal.max_error / signal.allowed if signal.allowed > 0.0 else (inf if signal.max_error > 0.0 else 0.0)
 
 
-def _row(signal: SignalComparison) -> list[str]:
+def _row(signal: SignalComparison) -> list[Any]:
     compared = signal.status in ("equal", "within", "differs")
-    return [
-        signal.name,
-        signal.unit,
-        VERDICTS[signal.status],
-        number(signal.max_error),
-        number(signal.allowed),
-        number(signal.max_error_at, 6),
-        number(signal.max_shift) if compared else DASH,
-        number(signal.rms_error),
-        number(100.0 * signal.share_outside) if compared else DASH,
-    ]
+    errors = [signal.max_error, signal.allowed, signal.max_error_at, signal.max_shift if compared else None]
+    verdict, outside = VERDICTS[signal.status], signal.share_outside if compared else None
+    return [signal.name, signal.unit, verdict, *errors, signal.rms_error, outside]
 
 
 # -- files ------------------------------------------------------------------------------------------------------------

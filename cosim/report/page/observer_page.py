@@ -13,13 +13,11 @@ from cosim.drawing.style import png
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
 from cosim.report.page.page_files import explained, write_files
-from cosim.report.page.page_table import PageTable, simple_table
-from cosim.report.page.phases import errors_table
 from cosim.report.page.render import render
-from cosim.report.page.run_tables import HOLDS, telegrams_table
+from cosim.report.page.run_tables import HOLDS, OBSERVER, telegrams_table
 from cosim.results.result import Result
-from fmus.tables.numbers import DASH, cell, number
 from fmus.tables.plain_data import jsonable
+from fmus.tables.table import Column, Table, text_column
 
 if TYPE_CHECKING:
     from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
@@ -59,41 +57,34 @@ def _benchmark_page(benchmark: BenchmarkScores, picture: bytes) -> str:
     Returns:
         The page.
     """
-    metrics = [phase for score in benchmark.scores for phase in score.phases]
     return render(
         "observers.html.j2",
         f"Observers on one run: {benchmark.spec.title}",
         benchmark=benchmark,
-        overview=_overview(benchmark),
+        overview=benchmark.table(),
         picture=picture,
-        phases=errors_table(metrics, benchmark.labelled_spec()),
+        phases=benchmark.errors(),
         over_time=_over_time(benchmark),
         certificates=_certificates(benchmark),
         telegrams=telegrams_table({s.label: s.telegrams for s in benchmark.scores if s.telegrams}, {}, "Observer"),
     )
 
 
-def _overview(benchmark: BenchmarkScores) -> PageTable:
-    rows = benchmark.rows()
-    headings = list(rows[0]) if rows else []
-    return simple_table(headings, [[cell(value) for value in row.values()] for row in rows], range(1, len(headings)))
-
-
-def _certificates(benchmark: BenchmarkScores) -> PageTable:
+def _certificates(benchmark: BenchmarkScores) -> Table:
     rows = [
-        [
-            score.label,
-            number(c.limit),
-            number(c.expected),
-            HOLDS.get(str(c.holds_expected), DASH),
-            number(c.seen),
-            HOLDS.get(str(c.holds_seen), DASH),
-        ]
-        for score in benchmark.scores
-        if (c := score.certificate) is not None
+        [s.label, c.limit, c.expected, HOLDS.get(str(c.holds_expected)), c.seen, HOLDS.get(str(c.holds_seen))]
+        for s in benchmark.scores
+        if (c := s.certificate) is not None
     ]
-    headings = ["Observer", "Certified [s]", "Expected gap [s]", "For it", "Longest gap seen [s]", "For it"]
-    return simple_table(headings, rows, (1, 2, 4))
+    columns = [
+        OBSERVER,
+        Column("limit", "Certified", "s", "Longest gap that the certificate covers"),
+        Column("expected", "Expected gap", "s", "Longest, from the layout of the balises and the speed"),
+        text_column("holds_expected", "For it"),
+        Column("seen", "Longest gap seen", "s"),
+        text_column("holds_seen", "For it"),
+    ]
+    return Table("certificates", columns, rows)
 
 
 def _over_time(benchmark: BenchmarkScores) -> bytes | None:

@@ -7,27 +7,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
+from cosim.evaluation.error_table import MEASURED
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import number_entry
 from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
-from cosim.report.overlay.overlay_measures import (
-    DETAIL_HEADINGS,
-    ERROR_HEADINGS,
-    Measured,
-    cell,
-    detailed,
-    headings,
-    measured,
-)
+from cosim.report.overlay.overlay_measures import Measured, detailed, measured, numbers_table
 from cosim.report.page.page_files import explained, write_file, write_page
-from cosim.report.page.page_table import PageTable, grouped_table, simple_table
+from cosim.report.page.phases import COLUMNS
 from cosim.report.page.render import render
 from cosim.report.page.run_statements import Statement
 from cosim.results.result import Result
-from fmus.tables.numbers import DASH, error_number, number
+from fmus.tables.numbers import error_number, number
+from fmus.tables.table import Column, Table, name_column, text_column
 
 PAGE, FIGURES = "overlay.html", "figures"
 SIGNALS_SHOWN = 8  # where no signal has a role
@@ -114,10 +109,10 @@ def overlay_page(runs: Sequence[OverlayRun], pictures: Sequence[OverlayPicture])
         runs=runs,
         facts=_facts(runs, errors, len(different)),
         ended=_runs_table(runs),
-        errors=_numbers(runs, errors, ERROR_HEADINGS),
+        errors=numbers_table(runs, errors, MEASURED),
         pictures=pictures,
-        details=_numbers(runs, detailed(runs), DETAIL_HEADINGS),
-        different=[simple_table(["What", *(run.label for run in runs)], rows) for rows in _cut(different)],
+        details=numbers_table(runs, detailed(runs), COLUMNS),
+        different=[_differences_table(runs, rows) for rows in _cut(different)],
         layout_note=layout_note(runs),
         notes=_notes(runs),
     )
@@ -144,9 +139,9 @@ def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> 
     """Where the rms speed error rose most and fell most, relative to the first run."""
     changes = []
     for row in errors:
-        first = row.values.get(runs[0].label, (None,) * len(ERROR_HEADINGS))[_RMS_SPEED]
+        first = row.values.get(runs[0].label, (None,) * len(MEASURED))[_RMS_SPEED]
         for run in runs[1:]:
-            now = row.values.get(run.label, (None,) * len(ERROR_HEADINGS))[_RMS_SPEED]
+            now = row.values.get(run.label, (None,) * len(MEASURED))[_RMS_SPEED]
             if first and now is not None and isfinite(first):
                 changes.append((now / first - 1, now, f"{row.observer}, {row.phase}, {run.label}"))
     found: list[Statement] = []
@@ -161,40 +156,32 @@ def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> 
     return found
 
 
-def _runs_table(runs: Sequence[OverlayRun]) -> PageTable:
-    head = ["Run", "Scenario", "From [s]", "To [s]", "Step [ms]", "Rows", "Wall time [s]", "Made"]
-    rows = []
+def _differences_table(runs: Sequence[OverlayRun], rows: Sequence[Sequence[str]]) -> Table:
+    return Table(
+        "differences", [name_column("what", "What"), *(text_column(run.label, run.label) for run in runs)], rows
+    )
+
+
+_RUN_COLUMNS = (
+    name_column("run", "Run"),
+    text_column("scenario", "Scenario"),
+    Column("start", "From", "s"),
+    Column("stop", "To", "s"),
+    Column("step", "Step", "ms", "Communication step", factor=1000.0),
+    Column("rows", "Rows"),
+    Column("wall_seconds", "Wall time", "s", "How long the run took"),
+    text_column("created", "Made"),
+)
+
+
+def _runs_table(runs: Sequence[OverlayRun]) -> Table:
+    rows: list[list[Any]] = []
     for run in runs:
         summary, time = run.result.summary, run.result.time
-        step = number_entry(summary, "step")
-        rows.append(
-            [
-                run.label,
-                str(summary.get("scenario") or DASH),
-                number(float(time[0])),
-                number(float(time[-1])),
-                DASH if step is None else number(1000 * step),
-                str(len(time)),
-                number(number_entry(summary, "wall_seconds")),
-                str(summary.get("created") or DASH),
-            ]
-        )
-    return simple_table(head, rows, range(2, 7))
-
-
-def _numbers(runs: Sequence[OverlayRun], rows: Sequence[Measured], names: Sequence[str]) -> PageTable:
-    """A group of rows for each observer and phase, in it one row for each run, with the difference to the first."""
-    shown, kept = headings(rows, names)
-    reference = runs[0].label
-    groups = []
-    for row in rows if shown else ():
-        first = row.values.get(reference)
-        lines = [
-            [name, *(cell(values[i], None if first is None or name == reference else first[i]) for i in kept)]
-            for name, values in row.values.items()
-        ]
-        groups.append((f"{row.observer}, {row.phase}", lines))
-    return grouped_table(["Observer and phase", "Run", *shown], groups)
+        step, seconds = (number_entry(summary, key) for key in ("step", "wall_seconds"))
+        scenario, created = (summary.get(key) or None for key in ("scenario", "created"))
+        rows.append([run.label, scenario, float(time[0]), float(time[-1]), step, len(time), seconds, created])
+    return Table("runs", _RUN_COLUMNS, rows)
 
 
 def _notes(runs: Sequence[OverlayRun]) -> list[str]:

@@ -1,69 +1,35 @@
-"""The tables of every observer, phase by phase: errors, and the long one with all the rest. Standard library only."""
+"""The long table of every observer, phase by phase: slip, forces, errors around telegrams. Standard library only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 
-from cosim.evaluation.error_table import cells, columns
-from cosim.evaluation.metrics import PhaseMetrics
+from cosim.evaluation.error_table import NAMES
 from cosim.evaluation.phase_details import PhaseDetails
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.page.page_table import PageTable, grouped_table
-from fmus.tables.numbers import DASH, error_number
+from fmus.tables.table import Column, Table, error_column
 
-COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to that unit
-    "slip": ("Slip error, rms [%]", 100.0),
-    "adhesion_force": ("Adhesion force error, rms [kN]", 1e-3),
-    "coupler_force": ("Coupler force error, rms [kN]", 1e-3),
-    "speed_before": ("Speed error before telegrams, rms [m/s]", 1.0),
-    "speed_after": ("and after them [m/s]", 1.0),
-    "position_before": ("Position error before telegrams, rms [m]", 1.0),
-    "position_after": ("and after them [m]", 1.0),
-    "indicator_on": ("Slip indicated [% of the time]", 100.0),
-    "telegrams": ("Telegrams used", 1.0),
-}
-
-
-def errors_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> PageTable:
-    """Errors of speed and position of every observer in every phase, published numbers beside them.
-
-    Args:
-        metrics: from `phase_metrics`.
-        spec: labels.
-
-    Returns:
-        The table; without rows where there are no metrics.
-    """
-    chosen = columns(metrics)
-    groups = groupby(metrics, key=lambda m: m.observer)
-    rows = ((label(spec, name), [[m.phase, *cells(m, chosen)] for m in group]) for name, group in groups)
-    return grouped_table(["Observer", "Phase", *(c.text for c in chosen)], rows)
+_BEFORE = "In the last row before each telegram that the observer used"
+_AFTER = "In the first row after each telegram that the observer used"
+COLUMNS = (
+    error_column("slip", "Slip error, rms", "%", factor=100.0),
+    error_column("adhesion_force", "Adhesion force error, rms", "kN", factor=1e-3),
+    error_column("coupler_force", "Coupler force error, rms", "kN", "Of the first coupler", factor=1e-3),
+    error_column("speed_before", "Speed error before telegrams, rms", "m/s", _BEFORE),
+    error_column("speed_after", "and after them", "m/s", _AFTER),
+    error_column("position_before", "Position error before telegrams, rms", "m", _BEFORE),
+    error_column("position_after", "and after them", "m", _AFTER),
+    error_column("indicator_on", "Slip indicated", "% of the time", factor=100.0),
+    Column("telegrams", "Telegrams used"),
+)
 
 
-def phases_table(details: Sequence[PhaseDetails], spec: ReportSpec) -> PageTable | None:
-    """Root mean squares and counts of every observer in every phase.
+def phases_table(details: Sequence[PhaseDetails], spec: ReportSpec) -> Table:
+    """Root mean squares and counts of every observer in every phase; without rows where there is no number.
 
     Args:
-        details: from `phase_details`.
-        spec: labels.
-
-    Returns:
-        The table with the columns that hold a number somewhere; None without any.
+        details: from `phase_details`. spec: labels.
     """
-    shown = [field for field in COLUMNS if any(getattr(d, field) is not None for d in details)]
-    if not shown:
-        return None
-    groups = groupby(details, key=lambda d: d.observer)
-    rows = (
-        (label(spec, name), [[d.phase, *(_cell(d, field) for field in shown)] for d in group]) for name, group in groups
-    )
-    return grouped_table(["Observer", "Phase", *(COLUMNS[field][0] for field in shown)], rows)
-
-
-def _cell(entry: PhaseDetails, field: str) -> str:
-    value = getattr(entry, field)
-    if value is None:
-        return DASH
-    return str(value) if field == "telegrams" else error_number(COLUMNS[field][1] * value)
+    rows = [[label(spec, d.observer), d.phase, *(getattr(d, column.key) for column in COLUMNS)] for d in details]
+    return Table("phases", [*NAMES, *COLUMNS], rows).filled()

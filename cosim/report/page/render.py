@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from base64 import b64encode
 from functools import cache
+from itertools import groupby
 from typing import Any
 
 from jinja2 import Environment
 
 from fmus.tables.numbers import number
+from fmus.tables.table import Table
 from fmus.templates import environment
 
 _SENTENCE_END = re.compile(r"(?<=[.]) (?=[A-Z])|(?<=;) ")
@@ -56,9 +58,21 @@ def first_sentence(text: object) -> tuple[str, str]:
     return (first.removesuffix(";"), rest[0]) if rest else (whole, "")
 
 
+def groups(table: Table) -> list[tuple[str | None, list[list[str]]]]:
+    """The cells of a table by its first names, where its rows have two names each; else all of them in one group
+    without a name.
+
+    Args:
+        table: of a page.
+    """
+    if table.names < 2:
+        return [(None, table.cells)]
+    return [(name, [row[1:] for row in rows]) for name, rows in groupby(table.cells, key=lambda row: row[0])]
+
+
 @cache
 def _pages() -> Environment:
     pages = environment("cosim.report.page")
-    filters: dict[str, Any] = {"anchor": anchor, "first_sentence": first_sentence, "number": number}
+    filters: dict[str, Any] = {"anchor": anchor, "first_sentence": first_sentence, "groups": groups, "number": number}
     pages.filters |= filters | {"base64": lambda data: b64encode(data).decode("ascii")}
     return pages

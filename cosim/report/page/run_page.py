@@ -9,8 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from cosim.evaluation.balise_gaps import ENVELOPE, gap_errors
-from cosim.evaluation.cost import was_compiled
+from cosim.evaluation.consistency import filter_consistency
+from cosim.evaluation.consistency_table import consistency_table
+from cosim.evaluation.cost import cost_table, was_compiled
+from cosim.evaluation.error_table import error_table
 from cosim.evaluation.event_counts import count_events
+from cosim.evaluation.fault_detection import fault_detection
+from cosim.evaluation.fault_table import fault_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.result_warnings import all_warnings
@@ -23,7 +28,7 @@ from cosim.report.figures.zooms import Zoom, draw_zooms
 from cosim.report.page import run_tables
 from cosim.report.page.gaps import gaps_table
 from cosim.report.page.page_files import explained, page_bytes, write_file, write_page
-from cosim.report.page.phases import errors_table, phases_table
+from cosim.report.page.phases import phases_table
 from cosim.report.page.render import render
 from cosim.report.page.run_statements import run_statements
 from cosim.results.result import Result
@@ -103,7 +108,7 @@ def report_page(
         expectations=run_tables.expectations_table(sorted(judged, key=lambda j: j.passed)),
         warnings=all_warnings(result, spec),
         metrics=shown,
-        errors=errors_table(shown, spec),
+        errors=error_table(shown, spec),
         zooms=zooms,
         figures=figures,
         counts=counts,
@@ -127,10 +132,10 @@ def _run_tables(result: Result, spec: ReportSpec) -> dict[str, Any]:
         "explained": explained,
         "packets": run_tables.packets_table(result),
         "indicators": run_tables.indicators_table(result, spec),
-        "faults": run_tables.faults_table(result, spec),
-        "consistency": run_tables.consistency_table(result, spec),
+        "faults": fault_table(fault_detection(result, spec), spec),
+        "consistency": consistency_table(filter_consistency(result, spec), spec),
         "components": run_tables.components_table(result),
-        "calls": run_tables.calls_table(result),
+        "calls": cost_table(result),
         "messages": run_tables.messages_table(result),
         "versions": run_tables.versions_table(result),
     }

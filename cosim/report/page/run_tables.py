@@ -3,69 +3,74 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
-from cosim.evaluation.consistency import ADVICE, filter_consistency
-from cosim.evaluation.consistency_table import HEADINGS as CONSISTENCY_HEADINGS
-from cosim.evaluation.consistency_table import cells as consistency_cells
-from cosim.evaluation.cost import KINDS, cost_rows
 from cosim.evaluation.event_counts import outcome_columns
-from cosim.evaluation.fault_detection import fault_detection
-from cosim.evaluation.fault_table import HEADINGS, cells, columns
 from cosim.evaluation.indicators import indicator_statistics
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.expectations.judged import Judged
-from cosim.report.page.page_table import PageTable, simple_table
 from cosim.results.result import Result
 from fmus.tables.numbers import DASH, number
+from fmus.tables.table import Column, Table, name_column, text_column
 
 LIMITS = ("aperiodic_limit", "constant_limit")
-_CERTIFICATE_COLUMNS = {
-    "aperiodic_limit": "Limit, varying gaps [s]",
-    "constant_limit": "Limit, constant gap [s]",
-    "max_gap": "Largest gap expected [s]",
-    "largest_gap_seen": "Largest gap seen [s]",
-}
 HOLDS = {"True": "holds", "False": "does not hold"}
-_SEED_COLUMNS = ("lower quartile", "median", "upper quartile", "published", "independent")
-_COMPONENT_COLUMNS = {"name": "Name", "kind": "Kind", "fmi_version": "FMI", "model": "Model", "source": "Source"}
+OBSERVER = name_column("observer", "Observer")
+_CERTIFICATE_COLUMNS = (
+    Column("aperiodic_limit", "Limit, varying gaps", "s", "Longest gap that is certified where gaps vary"),
+    Column("constant_limit", "Limit, constant gap", "s", "Longest gap that is certified where all gaps are equal"),
+    Column("max_gap", "Largest gap expected", "s", "From the layout of the balises and the speed, before the run"),
+    Column("largest_gap_seen", "Largest gap seen", "s", "Between telegrams that were used in the run"),
+)
+_SEED_COLUMNS = tuple(
+    Column(key, key, "m/s", "Maximal speed error")
+    for key in ("lower quartile", "median", "upper quartile", "published", "independent")
+)
+_PACKET_COLUMNS = (
+    Column("sent", "Sent"),
+    Column("lost", "Lost"),
+    Column("duplicates", "Duplicates"),
+    Column("overtaken", "Overtaken", meaning="Packets that a later one arrived before"),
+    Column("undelivered", "On their way at the end"),
+    Column("mean_age", "Mean age", "s", "Of what receivers hold"),
+    Column("largest_age", "Largest age", "s", "Of what receivers hold"),
+)
+_COMPONENT_COLUMNS = (
+    name_column("name", "Name"),
+    *(text_column(key, heading) for key, heading in (("kind", "Kind"), ("fmi_version", "FMI"), ("model", "Model"))),
+    text_column("source", "Source"),
+)
 MESSAGES_SHOWN = 100
 
 
-def expectations_table(judged: list[Judged]) -> PageTable:
+def expectations_table(judged: list[Judged]) -> Table:
     """All expectations with what was measured.
 
     Args:
         judged: in the order in which they are shown.
     """
-    rows = [["met" if j.passed else "not met", j.name, j.text] for j in judged]
-    return simple_table(["Verdict", "Expected", "Measured"], rows)
+    columns = [name_column("verdict", "Verdict"), text_column("expected", "Expected"), text_column("text", "Measured")]
+    return Table("expectations", columns, [["met" if j.passed else "not met", j.name, j.text] for j in judged])
 
 
-def seeds_table(result: Result) -> PageTable:
+def seeds_table(result: Result) -> Table:
     """Quartiles of the maximal speed errors over several seeds.
 
     Args:
         result: the run.
     """
-    rows = [
-        [str(row.get("observer")), str(row.get("phase")), *(number(row.get(column)) for column in _SEED_COLUMNS)]
-        for row in mapping_entry(result, "seed_study").get("rows", [])
-        if isinstance(row, Mapping)
-    ]
-    headings = ["Observer", "Phase", *(f"{column} [m/s]" for column in _SEED_COLUMNS)]
-    return simple_table(headings, rows, range(2, len(headings)))
+    columns = [OBSERVER, name_column("phase", "Phase"), *_SEED_COLUMNS]
+    rows = mapping_entry(result, "seed_study").get("rows", [])
+    return Table("seeds", columns, [[row.get(c.key) for c in columns] for row in rows if isinstance(row, Mapping)])
 
 
-def certificates(result: Result, spec: ReportSpec) -> tuple[PageTable, dict[str, str]]:
+def certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str]]:
     """Limits of the observers' certificates, those of the report first.
 
     Args:
-        result: the run.
-        spec: labels and order of the observers.
+        result: the run. spec: labels and order of the observers.
 
     Returns:
         The table, and what was checked by label of the observer.
@@ -74,49 +79,36 @@ def certificates(result: Result, spec: ReportSpec) -> tuple[PageTable, dict[str,
     order = dict.fromkeys([*(o for o in spec.observers if o in known), *known])
     entries = {label(spec, o): entry for o in order if isinstance(entry := known[o], Mapping)}
     rows = [
-        [name, *(_limit(entry, key) for key in _CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")), DASH)]
+        [name, *(_limit(entry, c.key) for c in _CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")))]
         for name, entry in entries.items()
     ]
-    headings = ["Observer", *_CERTIFICATE_COLUMNS.values(), "Certificate"]
+    holds = text_column("holds", "Certificate", "Whether it holds for the gaps that were expected")
     explained = {name: str(entry.get("explanation") or "") for name, entry in entries.items()}
-    return simple_table(headings, rows, range(1, len(_CERTIFICATE_COLUMNS) + 1)), explained
+    return Table("certificates", [OBSERVER, *_CERTIFICATE_COLUMNS, holds], rows), explained
 
 
-def _limit(entry: Mapping[str, Any], key: str) -> str:
+def _limit(entry: Mapping[str, Any], key: str) -> Any:
     """One number of a certificate; where a search ended without a limit, how far it went."""
     horizon = number_entry(entry, "horizon")
-    if key in LIMITS and entry.get(key) is None and horizon is not None:
-        return f"> {horizon:g}"
-    return number(entry.get(key))
+    return f"> {horizon:g}" if key in LIMITS and entry.get(key) is None and horizon is not None else entry.get(key)
 
 
 def telegrams_table(
     outcomes: Mapping[str, Mapping[str, int]], labels: Mapping[str, str], heading: str = "Receiver"
-) -> PageTable:
+) -> Table:
     """What became of the telegrams in each receiver.
 
     Args:
-        outcomes: number of telegrams by outcome, by name of the receiver.
-        labels: texts for names.
+        outcomes: number of telegrams by outcome, by name of the receiver. labels: texts for names.
         heading: what the receivers are called.
     """
     chosen = outcome_columns(outcomes.values())
-    rows = [[labels.get(name, name), *(str(count.get(o, 0)) for o in chosen)] for name, count in outcomes.items()]
-    return simple_table([heading, *chosen.values()], rows, range(1, len(chosen) + 1))
+    columns = [name_column("receiver", heading), *(Column(outcome, text) for outcome, text in chosen.items())]
+    rows = [[labels.get(name, name), *(count.get(o, 0) for o in chosen)] for name, count in outcomes.items()]
+    return Table("telegrams", columns, rows)
 
 
-_PACKET_COLUMNS = {
-    "sent": "Sent",
-    "lost": "Lost",
-    "duplicates": "Duplicates",
-    "overtaken": "Overtaken",
-    "undelivered": "On their way at the end",
-    "mean_age": "Mean age [s]",
-    "largest_age": "Largest age [s]",
-}
-
-
-def packets_table(result: Result) -> PageTable:
+def packets_table(result: Result) -> Table:
     """What became of the packets of each node, and how old what receivers hold is.
 
     Args:
@@ -125,78 +117,48 @@ def packets_table(result: Result) -> PageTable:
     entry = mapping_entry(result, "network")
     nodes = entry.get("nodes", {})
     rows = [
-        [name, ", ".join(nodes.get(name, ())), *(number(found.get(key)) for key in _PACKET_COLUMNS)]
+        [name, ", ".join(nodes.get(name, ())), *(found.get(column.key) for column in _PACKET_COLUMNS)]
         for name, found in entry.get("packets", {}).items()
     ]
-    headings = ["Node", "Signals", *_PACKET_COLUMNS.values()]
-    return simple_table(headings, rows, range(2, len(headings)))
+    return Table("packets", [name_column("node", "Node"), text_column("signals", "Signals"), *_PACKET_COLUMNS], rows)
 
 
-def indicators_table(result: Result, spec: ReportSpec) -> PageTable:
+def indicators_table(result: Result, spec: ReportSpec) -> Table:
     """How long slip was indicated, and how late.
 
     Args:
-        result: the run.
-        spec: roles and zones.
+        result: the run. spec: roles and zones.
     """
-    headings = ["Observer", "Time on [%]", "Time on outside zones [%]"]
-    headings += [f"Delay in zone {number(a)} to {number(b)} s [s]" for a, b in spec.zones]
-    rows = []
+    delay = "From the begin of the zone to the first indication in it"
+    columns = [
+        OBSERVER,
+        Column("on", "Time on", "%", "Share of the time in which slip was indicated", factor=100.0),
+        Column("on_outside", "Time on outside zones", "%", "Of the time outside of zones", factor=100.0),
+        *(Column(f"delay {a:g}", f"Delay in zone {number(a)} to {number(b)} s", "s", delay) for a, b in spec.zones),
+    ]
+    rows: list[list[Any]] = []
     for s in indicator_statistics(result, spec):
         delays = [
-            "not reached" if zone[0] >= result.time[-1] else "not indicated" if delay is None else number(delay)
+            "not reached" if zone[0] >= result.time[-1] else "not indicated" if delay is None else delay
             for zone, delay in zip(spec.zones, s.delays, strict=True)
         ]
-        rows.append([label(spec, s.observer), number(100 * s.on), number(100 * s.on_outside), *delays])
-    return simple_table(headings, rows, range(1, len(headings)))
+        rows.append([label(spec, s.observer), s.on, s.on_outside, *delays])
+    return Table("indicators", columns, rows)
 
 
-def faults_table(result: Result, spec: ReportSpec) -> PageTable:
-    """Faults: which were found, how late, and what was no fault.
-
-    Args:
-        result: the run.
-        spec: roles and labels.
-    """
-    found = fault_detection(result, spec)
-    shown = columns(found)
-    rows = [[label(spec, one.observer), *cells(one, spec.delay_limit)[:shown]] for one in found]
-    return simple_table(["Observer", *HEADINGS[:shown]], rows, range(1, shown + 1))
-
-
-def consistency_table(result: Result, spec: ReportSpec) -> PageTable:
-    """Filters whose covariances can be judged, and whether they fit.
-
-    Args:
-        result: the run.
-        spec: roles and labels.
-    """
-    rows = [[label(spec, entry.observer), *consistency_cells(entry)] for entry in filter_consistency(result, spec)]
-    table = simple_table(["Observer", *CONSISTENCY_HEADINGS], rows, range(2, len(CONSISTENCY_HEADINGS)))
-    return replace(table, bad=set(ADVICE))
-
-
-def components_table(result: Result) -> PageTable:
+def components_table(result: Result) -> Table:
     """What was run.
 
     Args:
         result: the run.
     """
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping)]
-    rows = [[_shown(entry.get(key)) for key in _COMPONENT_COLUMNS] for entry in entries]
-    return simple_table(list(_COMPONENT_COLUMNS.values()), rows)
+    return Table(
+        "components", _COMPONENT_COLUMNS, [[entry.get(c.key) for c in _COMPONENT_COLUMNS] for entry in entries]
+    )
 
 
-def calls_table(result: Result) -> PageTable:
-    """Calls of the components and the milliseconds they took.
-
-    Args:
-        result: the run.
-    """
-    return simple_table(["Component", *KINDS, "Messages"], cost_rows(result), range(1, len(KINDS) + 2))
-
-
-def messages_table(result: Result) -> PageTable:
+def messages_table(result: Result) -> Table:
     """What the components logged: the first and the last messages.
 
     Args:
@@ -204,19 +166,19 @@ def messages_table(result: Result) -> PageTable:
     """
     messages, half = list(result.messages), MESSAGES_SHOWN // 2
     shown = messages if len(messages) <= MESSAGES_SHOWN else [*messages[:half], *messages[-half:]]
-    rows = [[m.component, number(m.time), m.status, m.category or DASH, m.text] for m in shown]
-    return simple_table(["Component", "Time [s]", "Status", "Category", "Text"], rows, (1,))
+    columns = [
+        name_column("component", "Component"),
+        Column("time", "Time", "s"),
+        *(text_column(key, key.capitalize()) for key in ("status", "category", "text")),
+    ]
+    return Table("messages", columns, [[m.component, m.time, m.status, m.category or DASH, m.text] for m in shown])
 
 
-def versions_table(result: Result) -> PageTable:
+def versions_table(result: Result) -> Table:
     """Versions of the packages that were used.
 
     Args:
         result: the run.
     """
-    versions = mapping_entry(result, "versions")
-    return simple_table(["Package", "Version"], [[str(name), str(version)] for name, version in versions.items()])
-
-
-def _shown(value: Any) -> str:
-    return DASH if value is None else str(value)
+    columns = [name_column("package", "Package"), text_column("version", "Version")]
+    return Table("versions", columns, list(mapping_entry(result, "versions").items()))

@@ -26,7 +26,7 @@ from cosim.diagnostics.call_log import HEADER, CallLog
 from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.diagnostics.call_text import DescribedCall
 from cosim.errors import OutputError
-from cosim.evaluation.cost import cost_rows, cost_text
+from cosim.evaluation.cost import cost_table
 from cosim.master.master import close
 from cosim.report.page.run_page import report_page
 
@@ -365,7 +365,7 @@ def test_both_steppers_count_the_same(tmp_path: Path) -> None:
         outcome = pair(tmp_path, 2).set("stop", 20.0).master(stepper=stepper).run(warn=lambda _: None)
         assert outcome.failure is None
         counts.append([{k: v["calls"] for k, v in c["cost"].items()} for c in outcome.result.summary["components"]])
-        rows.append(cost_rows(outcome.result))
+        rows.append(cost_table(outcome.result).cells)
     assert counts[0] == counts[1]
     assert counts[0][0]["doStep"] == 200
     steps, reading = zip(*(row[1:3] for row in (rows[0][0], rows[1][0])), strict=True)
@@ -376,13 +376,13 @@ def test_both_steppers_count_the_same(tmp_path: Path) -> None:
 
 def test_the_closing_table_and_the_report_show_them() -> None:
     outcome = small().run(warn=lambda _: None)
-    rows = {name: cells for name, *cells in cost_rows(outcome.result)}
+    rows = {name: cells for name, *cells in cost_table(outcome.result).cells}
     cost = {c["name"]: c["cost"] for c in outcome.result.summary["components"]}
     assert rows["odometer"][0].startswith(f"{cost['odometer']['doStep']['calls']} / ")
     assert rows["observer"][3].startswith("3 / ")
     states = sum(cost["locomotive"][kind]["calls"] for kind in ("save", "restore", "release"))
     assert rows["locomotive"][4].startswith(f"{states} / ")
-    text = cost_text(outcome.result)
+    text = cost_table(outcome.result).text()
     assert [line.split()[0] for line in text.splitlines()[2:]] == list(rows)
     assert "<h2>Calls</h2>" in report_page(outcome.result, outcome.spec, {})
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cosim.evaluation.consistency import filter_consistency, true_value
-from cosim.evaluation.consistency_table import consistency_text
+from cosim.evaluation.consistency_table import consistency_table
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import ReportSpec
@@ -109,7 +109,7 @@ def test_the_report_shows_it() -> None:
     assert NeesPanel.available(run(nis=False, covariance=False), SPEC)
     assert nis_figure(result, SPEC).get_yscale() == "log"
     assert len(nees_figure(run(covariance=False), SPEC).lines) == 3  # the line at 1, and two quantities
-    text = consistency_text(filter_consistency(result, SPEC), SPEC)
+    text = consistency_table(filter_consistency(result, SPEC), SPEC).text()
     heading, _, row = text.splitlines()[:3]
     assert heading.startswith("filter consistency  judged by")
     assert (heading[0] == " ", row[0] == " ") == (False, False)  # words begin at the left, numbers end at the right
@@ -119,7 +119,7 @@ def test_the_report_shows_it() -> None:
         "NEES of one quantity",
         "overconfident",
     ]
-    assert consistency_text([], SPEC) == ""
+    assert consistency_table([], SPEC).text() == ""
 
 
 def test_a_warning_says_what_its_words_mean() -> None:

@@ -131,7 +131,7 @@ def test_indicator_shares_and_delays() -> None:
 def test_a_zone_that_the_run_does_not_reach_is_not_called_one_without_indication() -> None:
     result = small_result([0.0, 8.0, 10.0], obs__slip_indicator=[1, 2, 2])
     table = indicators_table(result, ReportSpec(observers=["obs"], zones=[(2, 4), (7, 9), (10, 12)]))
-    ((_, ((*_, missed, seen, later),)),) = table.groups
+    ((*_, missed, seen, later),) = table.cells
     assert (missed, seen, later) == ("not indicated", "1.00", "not reached")
 
 

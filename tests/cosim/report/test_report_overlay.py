@@ -29,10 +29,11 @@ from cosim.report.figures.overlay_figures import (
 )
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.overlaid_runs import MOST_RUNS, OverlayRun, make_runs
-from cosim.report.overlay.overlay_measures import cell, difference, measured
+from cosim.report.overlay.overlay_measures import Measured, difference, measured, numbers_table
 from cosim.report.page import overlay
 from cosim.report.page.overlay import overlay_page, write_overlay
 from cosim.results.result import Result
+from fmus.tables.table import Column
 
 SPEC = synthetic_spec()
 
@@ -171,7 +172,9 @@ def test_differences_are_those_of_the_metrics_of_each_run() -> None:
 )
 def test_difference_in_words(value: float, first: float, text: str) -> None:
     assert difference(value, first) == text
-    assert cell(value, first).partition("\n")[2] == text
+    column, name = Column("size"), ("before", "after")
+    rows = [Measured("o", "p", {name[0]: (first,), name[1]: (value,)})]
+    assert numbers_table(two(), rows, [column]).cells[1][2] == f"{column.cell(value)}\n{text}"
 
 
 def test_the_page_names_the_largest_change() -> None:

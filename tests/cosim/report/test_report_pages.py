@@ -19,7 +19,7 @@ from synthetic_run import OBSERVERS, ZONES, synthetic_result, synthetic_spec
 
 from cosim.drawing.style import new_figure, observer_line, png
 from cosim.errors import OutputError
-from cosim.evaluation.error_table import error_text
+from cosim.evaluation.error_table import error_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import spec_of
@@ -261,7 +261,7 @@ def test_certified_gaps_name_their_observers(result: Result) -> None:
 
 
 def test_text_table_is_aligned_and_shows_published_numbers(result: Result) -> None:
-    lines = error_text(phase_metrics(result, synthetic_spec()), synthetic_spec()).splitlines()
+    lines = error_table(phase_metrics(result, synthetic_spec()), synthetic_spec()).text().splitlines()
     assert len({len(line) for line in lines}) == 1
     assert len(lines) == 2 + 4 * 3
     assert "max |v| [m/s]" in lines[0]

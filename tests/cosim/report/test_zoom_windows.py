@@ -18,6 +18,7 @@ from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.zoom_figure import zoom_figure
 from cosim.report.figures.zooms import draw_zooms
 from cosim.report.page.phases import phases_table
+from cosim.report.page.render import groups
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
 from cosim.results.result import BaliseRecord, Result
 
@@ -283,9 +284,9 @@ def test_the_first_coupler_of_a_vector_is_meant() -> None:
 
 
 def test_columns_without_numbers_are_left_out() -> None:
-    assert phases_table(phase_details(hand_made(), replace(SPEC, true_slip=None)), SPEC) is None
+    assert not phases_table(phase_details(hand_made(), replace(SPEC, true_slip=None)), SPEC)
     table = phases_table(phase_details(synthetic_result(), synthetic_spec()), synthetic_spec())
-    assert table is not None
-    assert "Slip error, rms [%]" in table.headings
-    assert not any("Coupler force" in heading for heading in table.headings)
-    assert [len(rows) for _, rows in table.groups] == [3] * len(OBSERVERS)  # one group each, of three phases
+    headings = [column.title() for column in table.columns]
+    assert "Slip error, rms [%]" in headings
+    assert not any("Coupler force" in heading for heading in headings)
+    assert [len(rows) for _, rows in groups(table)] == [3] * len(OBSERVERS)  # one group each, of three phases

@@ -1,0 +1,163 @@
+"""Cells as lines that fit a terminal. Standard library only.
+
+What is printed to a file or a pipe has no width: there a row stays on one line, so that `grep` and `diff` find it
+whole.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Container, Sequence
+from itertools import zip_longest
+from textwrap import wrap
+
+GAP = "  "
+INDENT = "  "
+"""Before the further lines of a cell on the left, so that they are not taken for a row."""
+LEAST = 16
+"""Columns that a text is not made narrower than before the table is folded."""
+BREAKS = "._/,;:-"
+"""Behind these a long word is broken."""
+
+Lines = list[str]
+
+
+def terminal_width() -> int | None:
+    """Columns of the terminal that is printed to: as the variable COLUMNS says, or the terminal itself; None where it
+    is none.
+    """
+    asked = os.environ.get("COLUMNS", "")
+    if asked.isdecimal() and int(asked) > 0:
+        return int(asked)
+    try:
+        return (os.get_terminal_size(sys.stdout.fileno()).columns or None) if sys.stdout.isatty() else None
+    except (OSError, ValueError):  # standard output was replaced or closed
+        return None
+
+
+def paragraph(text: str, width: int | None) -> Lines:
+    """A text as lines. Only a word that is longer than a line, as a path may be, stands out, so that it can be copied.
+
+    Args:
+        text: its own line breaks stay. width: of the lines; None for any.
+    """
+    lines = text.split("\n")
+    if width is None:
+        return lines
+    found = []
+    for line in lines:
+        blanks = len(line) - len(line.lstrip(" "))
+        indent = " " * min(blanks + (2 if line.lstrip().startswith("- ") else 0), width // 2)
+        broken = (
+            wrap(line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+            if len(line) > width
+            else [line]
+        )
+        found += broken
+    return found
+
+
+def laid_out(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], left: Container[int], names: int, width: int | None
+) -> Lines:
+    """A table as lines, without blanks at their ends, a rule below the headings.
+
+    Args:
+        headings: of the columns, all empty for none. rows: cells, whose line breaks stay.
+        left: indices of the columns that stand on the left. names: how many columns from the first on name a row.
+        width: that no line exceeds; None for any.
+    """
+    widths = [max(_width(cell) for cell in column) for column in zip(headings, *rows, strict=True)]
+    blocks = [list(range(len(headings)))]
+    if width is not None and _total(widths) > width:
+        widths = _with_narrow_headings(headings, rows, widths)
+        if not _narrow_texts(widths, [i for i in blocks[0] if i in left], width):
+            blocks = _folded(widths, min(names, len(headings) - 1), width)
+    tables = [_block([headings, *rows], block, widths, left) for block in blocks]
+    return [line for i, table in enumerate(tables) for line in ([""] if i else []) + table]
+
+
+def _width(cell: str) -> int:
+    return max(map(len, cell.split("\n")))
+
+
+def _total(widths: Sequence[int]) -> int:
+    return sum(widths) + len(GAP) * (len(widths) - 1)
+
+
+def _with_narrow_headings(headings: Sequence[str], rows: Sequence[Sequence[str]], widths: Sequence[int]) -> list[int]:
+    """Widths of the columns whose headings are wrapped at their blanks."""
+    cells = [max((_width(row[i]) for row in rows), default=0) for i in range(len(widths))]
+    words = [max(map(len, heading.split()), default=0) for heading in headings]
+    return [min(old, max(pair)) for old, *pair in zip(widths, cells, words, strict=True)]
+
+
+def _narrow_texts(widths: list[int], texts: Sequence[int], width: int) -> bool:
+    """Make the widest texts narrower until the table fits; whether it does. Where it does not, nothing is changed."""
+    tried = list(widths)
+    while (excess := _total(tried) - width) > 0:
+        widest = max(texts, key=lambda i: tried[i], default=None)
+        if widest is None or tried[widest] <= LEAST:
+            return False
+        second = max([LEAST, *(tried[i] for i in texts if i != widest and tried[i] < tried[widest])])
+        tried[widest] -= max(1, min(excess, tried[widest] - second))
+    widths[:] = tried
+    return True
+
+
+def _folded(widths: list[int], names: int, width: int) -> list[list[int]]:
+    """Columns of tables below each other, each with the names again; too wide columns are made narrower."""
+    head = list(range(names))
+    room = max(width // 2 - len(GAP) * names, names)
+    while sum(widths[i] for i in head) > room:
+        widths[max(head, key=lambda i: widths[i])] -= 1
+    beside = width - (_total([widths[i] for i in head]) + len(GAP) if head else 0)
+    blocks: list[list[int]] = [[]]
+    for i in range(names, len(widths)):
+        widths[i] = min(widths[i], max(beside, 1))
+        if blocks[-1] and _total([widths[j] for j in (*blocks[-1], i)]) > beside:
+            blocks.append([])
+        blocks[-1].append(i)
+    return [head + block for block in blocks]
+
+
+def _block(table: Sequence[Sequence[str]], chosen: Sequence[int], widths: Sequence[int], left: Container[int]) -> Lines:
+    """Some columns as lines; headings stand low, cells high."""
+    found: Lines = []
+    for number, row in enumerate(table):
+        cells = [_broken(row[i], widths[i], indented=i in left and number > 0) for i in chosen]
+        height = max(map(len, cells))
+        if number == 0:
+            cells = [[""] * (height - len(cell)) + cell for cell in cells]
+        for parts in zip_longest(*cells, fillvalue=""):
+            aligned = [
+                p.ljust(widths[i]) if i in left else p.rjust(widths[i]) for i, p in zip(chosen, parts, strict=True)
+            ]
+            found.append(GAP.join(aligned).rstrip())
+        if number == 0:
+            found = [*found, "-" * _total([widths[i] for i in chosen])] if any(table[0]) else []
+    return found
+
+
+def _broken(cell: str, width: int, *, indented: bool) -> Lines:
+    """A cell as lines of a width at most; nothing is left out."""
+    indent = INDENT if indented and width > 2 * len(INDENT) else ""
+    lines: Lines = []
+    for text in cell.split("\n"):
+        rest = text
+        while len(rest) > width:
+            cut = _cut(rest, width)
+            lines.append(rest[:cut].rstrip())
+            rest = indent + rest[cut:].lstrip()
+        lines.append(rest)
+    return lines
+
+
+def _cut(text: str, width: int) -> int:
+    """Where a text is broken: at a blank, behind what parts a word, or where the line ends."""
+    blanks = len(text) - len(text.lstrip())
+    cut = text.rfind(" ", blanks, width + 1)
+    if cut <= blanks:
+        cut = max(text.rfind(mark, blanks, width) + 1 for mark in BREAKS)
+    return cut if cut > blanks else width
