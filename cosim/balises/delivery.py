@@ -79,8 +79,8 @@ class Receiver:
     """A planned component that declares the balise event, or another one by which it is told of something.
 
     An FMI 2 receiver acts on a telegram in the step that follows, and knows one telegram for each step. A telegram of
-    this very instant is therefore announced before the step that ends there; of telegrams that must not be announced
-    together the later ones wait in `backlog` for the next step.
+    this very instant is therefore announced before the step that ends there (`announced`); of telegrams that must not
+    be announced together the later ones wait in `backlog` for the next step.
 
     Args:
         planned: the component in the plan.
@@ -97,18 +97,18 @@ class Receiver:
     backlog: list[Deliverable] = field(default_factory=list)
     arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
     compiled: StepThrough | None = None
+    announced: bool = False
     _open: list[Delivery] = field(default_factory=list)
     _kept: dict[int, Delivery] = field(default_factory=dict)
-    _announced: bool = False
 
     @property
     def busy(self) -> bool:
         """Whether something told or held back earlier still has to be seen to."""
-        return bool(self.backlog or self._announced)
+        return bool(self.backlog or self.announced)
 
     def save(self) -> Any:
         """What it remembers from step to step; the component's own state is saved elsewhere."""
-        return dict(self.seen), list(self.backlog), self._announced, list(self._open), dict(self._kept)
+        return dict(self.seen), list(self.backlog), self.announced, list(self._open), dict(self._kept)
 
     def restore(self, state: Any) -> None:
         """Return to what was saved.
@@ -116,7 +116,7 @@ class Receiver:
         Args:
             state: as `save` gave it.
         """
-        seen, backlog, self._announced, unsettled, kept = state
+        seen, backlog, self.announced, unsettled, kept = state
         self.seen, self.backlog = dict(seen), list(backlog)
         self._open, self._kept = list(unsettled), dict(kept)
 
@@ -140,7 +140,7 @@ class Receiver:
             t: start of the step [s]. until: end of the step [s].
         """
         self.planned.send(t, until)
-        if not self._announced:
+        if not self.announced:
             self._open.clear()
         waiting, self.backlog = self.backlog, []
         if self.timing == "stale":
@@ -167,11 +167,11 @@ class Receiver:
             t: the instant [s]. message: delivered there.
         """
         component = self.planned.component
-        if abs(component.time - t) > TIME_TOLERANCE or self._announced:
+        if abs(component.time - t) > TIME_TOLERANCE or self.announced:
             return self._put_off(message, t)
         if not component.event_needs_step:
             self._open.clear()
-        self._announced = component.event_needs_step
+        self.announced = component.event_needs_step
         return self._notify_here(t, message, message.stamp)
 
     def stepped_elsewhere(self, delivery: Delivery, arrived: np.ndarray) -> None:
@@ -208,13 +208,13 @@ class Receiver:
                 self._advance(now, notified_at)
             return self._notify_here(notified_at, telegram, telegram.stamp)
         on_time = abs(telegram.stamp - notified_at) <= TIME_TOLERANCE
-        if on_time and notified_at > now and not self._announced:
+        if on_time and notified_at > now and not self.announced:
             return self._announce(now, notified_at, telegram)
         if notified_at > now:
             self._advance(now, notified_at)
-        if self._announced:
+        if self.announced:
             return self._put_off(telegram, notified_at)
-        self._announced = True
+        self.announced = True
         return self._notify_here(notified_at, telegram, telegram.stamp)
 
     def _notify_here(self, t: float, telegram: Deliverable, stamp: float) -> Delivery:
@@ -271,7 +271,7 @@ class Receiver:
         # the last payload replaces the others
         known = telegrams[-1:] if self.planned.component.event_needs_step else telegrams
         overwritten = len(telegrams) - len(known)
-        self._announced = bool(known) and self.planned.component.event_needs_step
+        self.announced = bool(known) and self.planned.component.event_needs_step
         return [Delivery(until, self.arrived, self.arrived, "rejected") for _ in range(overwritten)] + [
             self._notify_here(until, telegram, until) for telegram in known
         ]
@@ -284,7 +284,7 @@ class Receiver:
 
     def _advance(self, now: float, until: float) -> None:
         self.planned.advance(now, until)
-        self._announced = False
+        self.announced = False
         self._note_outcome()
 
     def _outputs(self) -> np.ndarray:
@@ -301,7 +301,8 @@ class Receiver:
         self._open.append(delivery)
         if id(telegram) in self._kept:
             self._open.append(self._kept.pop(id(telegram)))  # what was promised when it was put into the backlog
-        self._note_outcome()
+        if not self.planned.component.event_needs_step:  # else nothing has happened yet
+            self._note_outcome()
 
     def _note_outcome(self) -> None:
         """What the receiver's own counters say of the telegrams it was told and has not answered for yet."""

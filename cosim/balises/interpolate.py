@@ -33,9 +33,9 @@ class InterpolateLocaliser(Localiser):
 
     def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:  # noqa: D102 - see Localiser
         watch = self.watch
-        begin, start = (watch.position, watch.speed), watch.outputs.copy()
+        begin, start = watch.motion, watch.outputs.copy()
         watch.step(t, until)
-        step = HermiteStep(until - t, *begin, watch.position, watch.speed)
+        step = HermiteStep(until - t, *begin, *watch.motion)
         spread = self._spread(step)
         if isinstance(self.layout, TrackLayout):
             return self.crossings_between(step, t, start, step.time_bound(spread))

@@ -64,6 +64,12 @@ class PlantMonitor:
         """Speed [m/s]."""
         return float(self.outputs[self._speed]) * self._scales[1]
 
+    @property
+    def motion(self) -> tuple[float, float]:
+        """Position [m] and speed [m/s]."""
+        outputs, (position, speed) = self.outputs, self._scales
+        return float(outputs[self._position]) * position, float(outputs[self._speed]) * speed
+
     def between(self, start: np.ndarray, share: float, position: float) -> np.ndarray:
         """The plant's outputs at a share of a step that began with outputs `start`, where its position was `position`
         [m].

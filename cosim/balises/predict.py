@@ -30,9 +30,9 @@ class PredictLocaliser(Localiser):
         crossings: list[tuple[Crossing, np.ndarray]] = []
         while until - t > TIME_TOLERANCE:
             cut = self._next_cut(self.layout, t, until)
-            begin, start = (watch.position, watch.speed), watch.outputs.copy()
+            begin, start = watch.motion, watch.outputs.copy()
             watch.step(t, cut)
-            taken = HermiteStep(cut - t, *begin, watch.position, watch.speed)
+            taken = HermiteStep(cut - t, *begin, *watch.motion)
             crossings += self.crossings_between(taken, t, start, taken.time_bound(2.0 * ACCELERATION_LIMIT))
             t = cut
         return crossings

@@ -35,14 +35,14 @@ class RollbackLocaliser(Localiser):
             instants = layout.within(t, until)
             if instants:
                 return self._redone(t, until, instants)
-        elif _is_near(watch.position, watch.speed, until - t, layout):
+        elif _is_near(*watch.motion, until - t, layout):
             return self._redone(t, until, [])
-        begin = self._ends()
+        begin = watch.motion
         start = watch.outputs.copy()
         watch.step(t, until)
         if isinstance(layout, InstantLayout) or not layout.crossed(begin[0], watch.position):
             return []
-        step = HermiteStep(until - t, *begin, *self._ends())  # it moved further than any train: too late to go back
+        step = HermiteStep(until - t, *begin, *watch.motion)  # it moved further than any train: too late to go back
         return self.crossings_between(step, t, start, step.h)
 
     def _redone(self, t: float, until: float, instants: list[float]) -> list[tuple[Crossing, np.ndarray]]:
@@ -52,7 +52,7 @@ class RollbackLocaliser(Localiser):
             crossings = []
             for stamp, balise in found:
                 trial.go(stamp)
-                crossings.append((self.crossing(stamp, balise, *self._ends()), self.watch.outputs.copy()))
+                crossings.append((self.crossing(stamp, balise, *self.watch.motion), self.watch.outputs.copy()))
             trial.finish()
             return crossings
         finally:
@@ -79,9 +79,6 @@ class RollbackLocaliser(Localiser):
         bound = max(ROOT_TOLERANCE, rounding) + self.watch.error.time(stamp, position, speed)
         return Crossing(stamp, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
 
-    def _ends(self) -> tuple[float, float]:
-        return self.watch.position, self.watch.speed
-
 
 class _Trial:
     """One step that may be taken again and again, from a saved state. Made with the step already taken once."""
@@ -89,7 +86,7 @@ class _Trial:
     def __init__(self, localiser: RollbackLocaliser, t: float, until: float) -> None:
         self.watch = watch = localiser.watch
         self.t, self.until, self.tries = t, until, 0
-        begin = watch.position, watch.speed
+        begin = watch.motion
         self._start = watch.outputs.copy()
         self._state: Any = watch.save()
         try:
@@ -98,7 +95,7 @@ class _Trial:
             self.release()
             raise
         self._final = watch.outputs.copy()
-        self._hermite = HermiteStep(until - t, *begin, watch.position, watch.speed)
+        self._hermite = HermiteStep(until - t, *begin, *watch.motion)
 
     def go(self, time: float) -> None:
         """Put the plant at `time` [s] within the step, as it was, with the inputs it had."""
@@ -140,10 +137,11 @@ class _Trial:
         Safeguarded Newton iteration on the plant's own steps, started from the Hermite crossing.
         """
         low, high, rising = segment.start, segment.end, segment.rising
-        guess = min(max(self._guess(target, segment), low), high)
+        guess = min(max(self._guess(target, segment, rising), low), high)
         for _ in range(MAX_ROOT_STEPS):
             self.go(self.t + guess)
-            miss, speed = self.watch.position - target, self.watch.speed
+            position, speed = self.watch.motion
+            miss = position - target
             # too short a step to take: `go` stayed at the start, and so does the linear rest
             if guess <= TIME_TOLERANCE:
                 return min(max(-miss / speed, 0.0), high) if speed else guess
@@ -159,9 +157,9 @@ class _Trial:
             guess = following
         return guess
 
-    def _guess(self, target: float, segment: Segment) -> float:
+    def _guess(self, target: float, segment: Segment, rising: bool) -> float:
         for part in self._hermite.segments():
-            if part.rising == segment.rising:
+            if part.rising == rising:
                 return self._hermite.crossing(target, part)
         return 0.5 * (segment.start + segment.end)
 

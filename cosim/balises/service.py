@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,10 @@ Row = tuple[float, np.ndarray]
 Snapshot = tuple[Crossing, np.ndarray]
 NO_ROWS: tuple[Row, ...] = ()
 REPEATED = "repeated"
+
+
+_TIME = attrgetter("time")
+_ANNOUNCED, _BACKLOG = attrgetter("announced"), attrgetter("backlog")
 
 
 class BaliseService:
@@ -92,8 +96,10 @@ class BaliseService:
     def begin(self, t: float, until: float) -> None:
         """A step from `t` to `until` [s] begins."""
         self._t, self._until = t, until
-        self._snapshots = [found for found in self._ahead if found[0].stamp <= until + TIME_TOLERANCE]
-        self._ahead = self._ahead[len(self._snapshots) :]
+        self._snapshots = []
+        if self._ahead:
+            self._snapshots = [found for found in self._ahead if found[0].stamp <= until + TIME_TOLERANCE]
+            self._ahead = self._ahead[len(self._snapshots) :]
         self._telegrams, self._deliveries = None, {}
 
     def _move_plant(self, t: float, until: float) -> None:
@@ -105,7 +111,7 @@ class BaliseService:
         """
         if self._telegrams is None and self._something_to_deliver:
             self._telegrams = self._collect(t, until)
-        if self._telegrams or receiver.busy:
+        if self._telegrams or receiver.announced or receiver.backlog:
             self._deliveries[receiver.planned.component.name] = receiver.step(t, until, self._telegrams or [])
         else:
             drive(t, until)
@@ -148,10 +154,10 @@ class BaliseService:
         """Up to here [s] nothing is on its way to a receiver; what the plant passes in between is not known
         beforehand.
         """
-        if any(receiver.busy for receiver in self.receivers):
+        if any(map(_ANNOUNCED, self.receivers)) or any(map(_BACKLOG, self.receivers)):
             return -np.inf
-        known = [e.delivered_at for e in self.mailbox.waiting[:1]] + [f.time for f in self._false[:1]]
-        return min(known, default=np.inf)
+        first = self.mailbox.waiting[0].delivered_at if self.mailbox.waiting else np.inf
+        return min(first, self._false[0].time) if self._false else first
 
     # -- steps done by somebody else ---------------------------------------------------------------------------------
 
@@ -261,7 +267,7 @@ class BaliseService:
         for i, telegram in enumerate(telegrams):
             deliveries = {name: several[i] for name, several in self._deliveries.items()}
             nominal = min(max(telegram.delivered_at, t), until)
-            times = sorted({d.time for d in deliveries.values()}) or [nominal]
+            times = sorted(set(map(_TIME, deliveries.values()))) or [nominal]
             late = times[0] - telegram.delivered_at > TIME_TOLERANCE
             logged = replace(telegram, delivered_at=times[0]) if late else telegram
             outcomes = self.mailbox.delivered(logged, {name: d.outcome for name, d in deliveries.items()})

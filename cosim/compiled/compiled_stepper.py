@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from operator import attrgetter
 from time import perf_counter
 from typing import Any
 
@@ -52,6 +53,10 @@ STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
 """That one has been called to do the step."""
 
 
+_STOPS = {int(stop): stop for stop in Stop}
+_NEXT_EVENT, _TERMINATED = attrgetter("next_event"), attrgetter("terminated")
+
+
 class CompiledStepper:
     """Does ordinary communication steps in C.
 
@@ -70,10 +75,13 @@ class CompiledStepper:
         self.system: System = control.system
         self.plan: Plan = self.system.plan
         self.steps = 0
+        self._components = [step.component for step in self.plan.steps]
+        self._moves = [{"get": 0, "set": 0} for _ in self.plan.steps]
         self._longest = 1
         _check(control, self.system)
         self._program = Program(self.plan, axis)
         self._program.head.seconds_at_most = SECONDS
+        self._address = self._program.address
         self._library = _load()
         self._repeating = False
         for place, step in enumerate(self.plan.steps):
@@ -101,7 +109,7 @@ class CompiledStepper:
         self._program.count_rows_at(recorder.count_address, recorder.block_start)
         self._first = k
         run = self._library.stepper_run
-        done = int(run(self._program.address, k, k + wanted, rows.ctypes.data, len(rows)))
+        done = int(run(self._address, k, k + wanted, rows.ctypes.data, len(rows)))
         self._first = None
         recorder.commit(int(head.rows_done))
         self.steps += done
@@ -113,7 +121,7 @@ class CompiledStepper:
         if done:
             fitting = int(self._longest * SECONDS / max(head.seconds, 1e-9))
             self._longest = max(1, min(fitting, GROWTH * self._longest, LONGEST))
-        return self._ended(k, done, Stop(head.stop))
+        return self._ended(k, done, _STOPS[head.stop])
 
     def _ended(self, k: int, done: int, stop: Stop) -> Chunk:
         if stop in (Stop.DONE, Stop.TIME):
@@ -141,8 +149,8 @@ class CompiledStepper:
         it.
         """
         free, balises = self.axis.count - k, self.system.balises
-        limit = min((s.component.next_event for s in self.plan.steps), default=NEVER)
-        if any(s.component.terminated for s in self.plan.steps):
+        limit = min(map(_NEXT_EVENT, self._components), default=NEVER)
+        if any(map(_TERMINATED, self._components)):
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
@@ -170,8 +178,9 @@ class CompiledStepper:
         """How many steps from number `k` on end before `limit` [s], and not nearly there."""
         if limit == -math.inf:
             return 0
-        last = math.floor((limit - self.axis.start) / self.axis.step) + 1
-        while last > k and not self.axis[last] + 2.0 * TIME_TOLERANCE < limit:
+        start, step = self.axis.start, self.axis.step
+        last = math.floor((limit - start) / step) + 1
+        while last > k and not start + last * step + 2.0 * TIME_TOLERANCE < limit:
             last -= 1
         return last - k
 
@@ -209,10 +218,10 @@ class CompiledStepper:
 
     def _quicken(self, place: int, step: PlannedComponent) -> None:
         """In the steps that are Python's a component still moves by one call into the stepper."""
-        component = step.component
-        call, address = self._library.stepper_move, self._program.address
+        component, moves = step.component, self._moves[place]
+        call, address = self._library.stepper_move, self._address
 
-        def move(slowly: Mover, t: float, until: float, reads: bool) -> None:
+        def move(reads: bool, slowly: Mover, t: float, until: float) -> None:
             if self._repeating or component.next_event <= until + 2.0 * TIME_TOLERANCE:
                 slowly(t, until)
                 return
@@ -220,18 +229,14 @@ class CompiledStepper:
             if call(address, place, t, until - t, reads):
                 component.time = until
                 component.calls += 1
-                for kind in ("get", "set") if reads else ("set",):
-                    component.call_statistics[kind].add(0.0, 1)
+                moves["set"] += 1
+                moves["get"] += reads
                 component.seconds += perf_counter() - begin
             else:
                 self._repeated_move(slowly, t, until)
 
-        def quickly(reads: bool, slowly: Mover) -> Mover:
-            return lambda t, until: move(slowly, t, until, reads)
-
-        step.add_stage(
-            Stage(Position.COMPILED, COMPILED_STAGE_TEXT, drive=partial(quickly, True), advance=partial(quickly, False))
-        )
+        drive, advance = partial(partial, move, True), partial(partial, move, False)
+        step.add_stage(Stage(Position.COMPILED, COMPILED_STAGE_TEXT, drive=drive, advance=advance))
 
     def _watch_balises(self) -> Crossings | None:
         """The stepper knows of the balises; receivers that allow it are stepped through a telegram by one call into
@@ -289,7 +294,10 @@ class CompiledStepper:
         """Add what was done here to the counters of the components."""
         if self._crossings is not None:
             self._crossings.close()
-        for step, slave in zip(self.plan.steps, self._program.slaves, strict=True):
+        for step, slave, moves in zip(self.plan.steps, self._program.slaves, self._moves, strict=True):
+            for kind, count in moves.items():
+                step.component.call_statistics[kind].add(0.0, count)
+                moves[kind] = 0
             component, calls, over = step.component, slave.calls + slave.all_calls, self._program.head.balises.steps
             component.calls += calls + slave.more_calls
             for kind in ("get", "set") if len(step.inputs) else ("get",):

@@ -28,7 +28,7 @@ from fmus.fmi.instance import shown
 from fmus.fmi.values import element_reader, write_start
 from plant_models.hybrid.missing import MISSED_SAMPLES
 
-MISSED_VARIABLES = {MISSED_SAMPLES: MISSED_SAMPLES}
+_OUTCOMES, _MISSED = "outcomes", "missed samples"
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 
 
@@ -82,7 +82,7 @@ class Component(DifferentiableComponent):
         self.trespasses: dict[str, str] = {}
         self._numbers, self._call_numbers = LAST_CALL.numbers(name), dict[str, int]()
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
-        self._readers: dict[tuple[str, ...], Callable[[], Mapping[str, int] | None]] = {}
+        self._readers: dict[str, Callable[[], Mapping[str, int] | None]] = {}
 
     # -- how it stands ----------------------------------------------------------------------------------------------
 
@@ -156,43 +156,36 @@ class Component(DifferentiableComponent):
         counters = getattr(self.slave, "counters", None)
         if counters is not None:
             return dict(vars(counters))
-        return self._read_counts(OUTCOME_VARIABLES)
+        return (self._readers.get(_OUTCOMES) or self._count_reader(_OUTCOMES, OUTCOME_VARIABLES))()
 
     def missed_samples(self) -> Mapping[str, int]:
         """How many measurements were missing at samples, by the name of the count; empty where none can be.
 
         Apart from `outcomes`, which a receiver asks for while calls of an FMU are answered for the stepper in C.
         """
-        return self._read_counts(MISSED_VARIABLES) or {}
+        return (self._readers.get(_MISSED) or self._count_reader(_MISSED, {MISSED_SAMPLES: MISSED_SAMPLES}))() or {}
 
-    def _read_counts(self, told: Mapping[str, str]) -> Mapping[str, int] | None:
-        """Variables that count, by what they are called; None where there are none.
+    def _count_reader(self, kind: str, names: Mapping[str, str]) -> Callable[[], Mapping[str, int] | None]:
+        """A call that reads variables that count, prepared for the slave as it is instantiated; it gives None where
+        there are none.
 
         Args:
-            told: what a count is called, by variable.
+            kind: of counts, under which the call is kept. names: what a count is called, by variable.
         """
-        key = tuple(told)
-        read = self._readers.get(key) or self._count_reader(told)
-        if self._alive:
-            self._readers[key] = read
-        return read()
+        counted = [name for name in names if name in self.variables]  # an older export knows fewer
+        called, values = [names[name] for name in counted], np.zeros(len(counted))
+        read = element_reader(self, counted, values) if counted and self._alive else None
 
-    def _count_reader(self, told: Mapping[str, str]) -> Callable[[], Mapping[str, int] | None]:
-        """`_read_counts` of the slave as it is instantiated, prepared."""
-        counted = [name for name in told if name in self.variables]  # an older export knows fewer
-        if not counted:
-            return lambda: None
-        names, values = [told[name] for name in counted], np.zeros(len(counted))
-        read = element_reader(self, counted, values) if self._alive else None
-
-        def counts() -> Mapping[str, int]:
+        def counts() -> Mapping[str, int] | None:
             try:
                 if self._alive and read is not None:
                     read()
             except Exception as error:
                 self.explained("counts of events", error)  # after a fatal error nothing is asked any more
-            return dict(zip(names, map(int, values), strict=True))
+            return dict(zip(called, map(int, values), strict=True)) or None
 
+        if self._alive:
+            self._readers[kind] = counts
         return counts
 
     def choose_log(self, choice: LogChoice | None) -> None:

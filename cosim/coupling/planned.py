@@ -104,6 +104,15 @@ class PlannedComponent:
         self.stages = tuple(sorted((*others, stage), key=lambda known: known.position))
         self._link()
 
+    def divide(self, substeps: int) -> None:
+        """Advance in so many steps of its own for each step.
+
+        Args:
+            substeps: how many.
+        """
+        self.substeps = substeps
+        self._link()
+
     def chain(self) -> tuple[str, ...]:
         """How it moves, in words: the stages, outermost first, then the plain way."""
         name = None if self.interpolator is None else self.interpolator.name
@@ -131,7 +140,8 @@ class PlannedComponent:
     # -- the chain --------------------------------------------------------------------------------------------------
 
     def _link(self) -> None:
-        self.prepare, self.drive, self.advance = self._prepare, self._drive, self._advance
+        self.prepare, self.drive = self._prepare, self._drive
+        self.advance = self._go if self.substeps == 1 else self._advance
         for stage in reversed(self.stages):
             self.prepare = stage.prepare(self.prepare)
             self.drive, self.advance = stage.drive(self.drive), stage.advance(self.advance)
@@ -148,9 +158,6 @@ class PlannedComponent:
 
     def _advance(self, t: float, until: float) -> None:
         """In so many steps as the component wants."""
-        if self.substeps == 1:
-            self._go(t, until)
-            return
         begin = t
         for i in range(1, self.substeps + 1):
             end = until if i == self.substeps else t + (until - t) * i / self.substeps

@@ -150,8 +150,10 @@ class Master:
         while k < axis.count:
             if self.between_steps is not None:
                 self.between_steps()
-            step: Callable[[], Sequence[Row]] | None = partial(self.control.step, axis[k], axis[k + 1])
-            if compiled is not None:
+            step: Callable[[], Sequence[Row]] | None
+            if compiled is None:
+                step = partial(self.control.step, axis[k], axis[k + 1])
+            else:
                 chunk = compiled.run(k, self.recorder)
                 k, step = k + chunk.done, chunk.finish
                 if chunk.suspect:

@@ -28,10 +28,13 @@ QUEUE_CAPACITY = 64
 _log = logging.getLogger(__name__)
 
 
-EventsMark = tuple[Mark | None, tuple[list[Stamped], list[float], list[int], Counters] | None]
+EventsMark = tuple[Mark | None, tuple[list[Stamped], list[float], list[int], dict[str, int]] | None]
 """Where the events stood: journal, and queue, stamps, counts seen and counters where something waits; see
 `Events.mark`.
 """
+
+NO_MARK: EventsMark = (None, None)
+"""That of a system without triggered events."""
 
 
 class Events:
@@ -95,7 +98,7 @@ class Events:
         """Where the events stand, for `undo`."""
         waiting = None
         if self.queue or self.counts != self.seen:
-            waiting = (list(self.queue), list(self.stamps), list(self.seen), self.counters.copy())
+            waiting = (list(self.queue), list(self.stamps), list(self.seen), dict(vars(self.counters)))
         return (None if self.journal is None else self.journal.mark(), waiting)
 
     def undo(self, mark: EventsMark) -> None:
@@ -105,7 +108,7 @@ class Events:
             self.journal.undo(past)
         if waiting is not None:
             self.queue, self.stamps[:], self.seen, counters = waiting
-            vars(self.counters).update(vars(counters))
+            vars(self.counters).update(counters)
 
     def tick(self) -> bool:
         """The events of the active clocks happen, in declared order, their payload in the inputs, their stamp in

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from fmu_observer.block.block_events import TIME_TOLERANCE, Events
+from fmu_observer.block.block_events import NO_MARK, TIME_TOLERANCE, Events
 from fmu_observer.block.block_state import BlockState, Shape, check_owner
 from fmu_observer.block.block_variables import (
     ALIVE,
@@ -26,7 +26,7 @@ from fmu_observer.block.block_variables import (
     Role,
     StepDiscarded,
 )
-from fmu_observer.block.policy import communicate
+from fmu_observer.block.policy import Counters, communicate
 from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
@@ -77,7 +77,7 @@ class BlockInstance:
         self.events.reset()
         self.mode: Mode = "instantiated"
         self.discarded = False  # whether the last step was
-        self._plain_step = 0.0
+        self._plain_step, self._plain_for = 0.0, b""  # and the parameters for which that is so
         self.variables.outdate()
 
     # -- variables --------------------------------------------------------------------------------------------------
@@ -210,7 +210,7 @@ class BlockInstance:
             raise BlockError(str(error)) from error
         except Exception as error:
             raise _model_failure(error) from error
-        self._plain_step = self._timing.plain_step(self.runtime.p)
+        self._find_plain_step()
 
     def step(self, t: float, h: float, early_return: bool = False) -> bool:
         """Advance from `t` by `h` [s], through the events announced and the queued ones whose stamps lie inside.
@@ -235,7 +235,10 @@ class BlockInstance:
         end = t + h if due is None else due
         if h > self._plain_step:
             self._check_size(h, end)
-        before, mark = (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)), events.mark()
+        before, mark = (
+            (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)),
+            events.mark() if events.payloads else NO_MARK,
+        )
         self.variables.outdate()
         try:
             if events.counts != events.seen:
@@ -272,7 +275,13 @@ class BlockInstance:
     # -- state ------------------------------------------------------------------------------------------------------
 
     def save(self) -> BlockState:
-        """Everything that decides the future, as a value."""
+        """Everything that decides the future, as a value.
+
+        Raises:
+            BlockError: the block has been freed.
+        """
+        if self.mode == "freed":
+            self.require(*ALIVE)
         events = self.events
         return BlockState(
             token=self.shape.token,
@@ -285,7 +294,7 @@ class BlockInstance:
             stamps=tuple(events.stamps),
             counts=tuple(events.counts),
             seen=tuple(events.seen),
-            counters=events.counters.copy(),
+            counters=Counters(**vars(events.counters)),
         )
 
     def check(self, state: BlockState) -> BlockState:
@@ -306,8 +315,10 @@ class BlockInstance:
         """Return to a saved state, exactly.
 
         Raises:
-            BlockError: it is not a state, or one of another model.
+            BlockError: it is not a state, or one of another model, or the block has been freed.
         """
+        if self.mode == "freed":
+            self.require(*ALIVE)
         if not isinstance(state, BlockState):
             raise BlockError(f"{type(state).__name__} is not a saved state of a block; deserialise bytes first.")
         if state.token != self.shape.token:
@@ -319,9 +330,11 @@ class BlockInstance:
         events.counts, events.seen = list(state.counts), list(state.seen)
         vars(events.counters).update(vars(state.counters))
         events.protocol[:] = state.protocol
-        events.restore_past(state.records)
+        if events.payloads:
+            events.restore_past(state.records)
         self.discarded = False
-        self._plain_step = self._timing.plain_step(self.runtime.p)
+        if self.runtime.p.tobytes() != self._plain_for:
+            self._find_plain_step()
         self.variables.outdate()
 
     # -- life -------------------------------------------------------------------------------------------------------
@@ -339,6 +352,9 @@ class BlockInstance:
             raise BlockError(f"not allowed in mode '{self.mode}', expected {' or '.join(modes)}{hint}.")
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _find_plain_step(self) -> None:
+        self._plain_step, self._plain_for = self._timing.plain_step(self.runtime.p), self.runtime.p.tobytes()
 
     def _check_size(self, h: float, end: float) -> None:
         runtime = self.runtime

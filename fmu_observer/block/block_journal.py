@@ -6,8 +6,9 @@ A record is a value that is never changed, so copies of a journal share their re
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ulp
 from operator import attrgetter
 from typing import NamedTuple
@@ -56,6 +57,10 @@ class Record(NamedTuple):
     event: Stamped | None
 
 
+new_record: Callable[[tuple[np.ndarray, float, float, tuple[int, ...], Stamped | None]], Record]
+new_record = partial(tuple.__new__, Record)
+"""A record of its fields in their order, without a call of Python: a replay makes one for each step."""
+
 Mark = tuple[list[Record], int, int, int]
 """Where a journal stood: its records, how many, the first that counts, when to prune; see `Journal.mark`."""
 
@@ -83,9 +88,16 @@ class Journal:
         """Remember where the runtime stands before it advances to `until` [s], jumps at `event`, or communicates."""
         if len(self._records) >= self._prune_at:
             self._prune(runtime.t)
-        self._records.append(Record(runtime.memory.copy(), runtime.t, until, tuple(runtime.ticks), event))
+        self._records.append(new_record((runtime.memory.copy(), runtime.t, until, tuple(runtime.ticks), event)))
         if len(self._records) - self._first > JOURNAL_CAPACITY:
             self._first += 1
+
+    def extend(self, now: float, records: Sequence[Record]) -> None:
+        """Remember what a runtime that stands at `now` [s] has done since the last record, in order of time."""
+        if len(self._records) >= self._prune_at:
+            self._prune(now)
+        self._records += records
+        self._first = max(self._first, len(self._records) - JOURNAL_CAPACITY)
 
     def out_of_reach(self, stamp: float, tolerance: float, now: float) -> str:
         """Why memory does not reach back to `stamp` [s]; empty where it does.

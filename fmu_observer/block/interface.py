@@ -239,15 +239,19 @@ class FMIInterface:
 
     # -- saved states -----------------------------------------------------------------------------------------------
 
-    @allowed_in(*ALIVE)
     def getFMUState(self) -> BlockState:
         """The whole state, mode and pending events included, as a value."""
-        return self.instance.save()
+        try:
+            return self.instance.save()
+        except BlockError as error:
+            raise self.refusal("getFMUState", error) from error.__cause__
 
-    @allowed_in(*ALIVE)
     def setFMUState(self, state: BlockState) -> None:
         """Return to a state taken by `getFMUState`, exactly and as often as wanted."""
-        self.instance.load(state)
+        try:
+            self.instance.load(state)
+        except BlockError as error:
+            raise self.refusal("setFMUState", error) from error.__cause__
 
     def freeFMUState(self, state: BlockState) -> None:
         """Nothing to free: states are Python values.

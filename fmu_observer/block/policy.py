@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.block.block_journal import Journal, Stamped
+from fmu_observer.block.block_journal import Journal, Record, Stamped, new_record
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import Runtime, Snapshot
 from plant_models.hybrid.event import DOUBTED, IGNORED
@@ -37,10 +37,6 @@ class Counters:
     lost: int = 0
     doubted: int = 0
     ignored: int = 0
-
-    def copy(self) -> Counters:
-        """The same numbers, which stay as they are."""
-        return Counters(*vars(self).values())
 
     def judged(self, verdict: int) -> bool:
         """Count an event by what the model made of it; whether it took effect.
@@ -119,13 +115,20 @@ def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray
     if past[0].until > past[0].t:
         advance(runtime, journal, event.stamp)
     verdict = jump(runtime, journal, event)
+    again: list[Record] = []
     for record in past:
         runtime.memory[given] = record.memory[given]
+        moves = record.until > record.t
+        if moves and record.until <= runtime.t:
+            continue
+        until = record.until if moves else runtime.t
+        again.append(new_record((runtime.memory.copy(), runtime.t, until, tuple(runtime.ticks), record.event)))
         if record.event is not None:
-            jump(runtime, journal, record.event)
-        elif record.until > record.t:
-            advance(runtime, journal, record.until)
+            jump(runtime, None, record.event)
+        elif moves:
+            runtime.advance(until)
         else:
-            communicate(runtime, journal)
+            runtime.communicate()
+    journal.extend(runtime.t, again)
     runtime.memory[given] = present
     return "", verdict

@@ -18,7 +18,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import fmi1_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.slave import Slave, make_step, status_of
+from fmus.fmi.slave import WholeStepSlave, make_step, status_of
 from fmus.fmi.values import negative
 
 TRUE = b"\x01"
@@ -26,7 +26,7 @@ NOTHING = {"String": "", "Boolean": False}
 """What a variable without a declared start value is taken for; else 0."""
 
 
-class FMI1Slave(Slave):
+class FMI1Slave(WholeStepSlave):
     """A co-simulation slave of FMI 1.0.
 
     Args:
@@ -37,6 +37,7 @@ class FMI1Slave(Slave):
 
     fmi_version = 1
     event_needs_step = True
+    _last = (TRUE,)  # each step is new, none is repeated
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
@@ -55,7 +56,7 @@ class FMI1Slave(Slave):
                 raise RuntimeError("fmiInstantiateSlave returned no instance")
         else:
             self.slave.instantiate()
-        self._do_step = make_step(self.slave, "fmi1DoStep", TRUE)  # each is new, none is repeated
+        self._do_step = make_step(self.slave, "fmi1DoStep", *self._last)
         self._forget()
 
     def _forget(self) -> None:
@@ -83,11 +84,7 @@ class FMI1Slave(Slave):
         self.guard("fmiInitializeSlave", lambda: call(tStart=start, stopTime=stop))
         self._initialized = self._running = True
 
-    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
-        self._step_whole(self._after_refusal, t, until)
-
-    def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
-        self._raise_unless_discarded(error, t)
+    def _after_discard(self, error: FMICallException, t: float, until: float) -> None:
         raise self._not_done(error, t, until, status_of(self.slave.getRealStatus, fmi1LastSuccessfulTime)) from error
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave

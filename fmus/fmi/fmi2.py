@@ -12,7 +12,8 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
 from fmus.fmi.native_log import fmi2_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.slave import Slave, make_step, status_of
+from fmus.fmi.quick_calls import quicken_fmi2, quicken_states
+from fmus.fmi.slave import WholeStepSlave, make_step, status_of
 from fmus.fmi.standard import TIME_TOLERANCE
 
 
@@ -49,13 +50,17 @@ class FMI2Instance(Instance):
         self.guard("enterInitializationMode", slave.enterInitializationMode)
 
 
-class FMI2Slave(FMI2Instance, Slave):
+class FMI2Slave(FMI2Instance, WholeStepSlave):
     """A co-simulation slave of FMI 2.0. Arguments as for `Slave`."""
+
+    _last = (False,)  # its state may be set back: nothing of the past may be forgotten
 
     def _instantiate(self) -> None:
         super()._instantiate()
-        # its state may be set back: nothing of the past may be forgotten
-        self._do_step = make_step(self.slave, "fmi2DoStep", False)
+        self._do_step = make_step(self.slave, "fmi2DoStep", *self._last)
+        if is_native(self.slave):
+            quicken_fmi2(self.slave)
+            quicken_states(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
         self._forget()
 
     def _forget(self) -> None:
@@ -64,9 +69,6 @@ class FMI2Slave(FMI2Instance, Slave):
     def exit_initialization(self) -> None:  # noqa: D102 - see Slave
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
-
-    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
-        self._step_whole(self._after_refusal, t, until)
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         self._counts[event.name] += 1
@@ -81,9 +83,8 @@ class FMI2Slave(FMI2Instance, Slave):
         counts, self.time, self.terminated = remembered
         self._counts = dict(counts)
 
-    def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
+    def _after_discard(self, error: FMICallException, t: float, until: float) -> None:
         """A discarded step is the end: the slave has terminated, or it cannot do this step and its state is lost."""
-        self._raise_unless_discarded(error, t)
         reached = status_of(self.slave.getRealStatus, fmi2LastSuccessfulTime)
         if not status_of(self.slave.getBooleanStatus, fmi2Terminated):  # one that cannot say why has not terminated
             raise self._not_done(error, t, until, reached) from error

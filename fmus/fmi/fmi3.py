@@ -17,7 +17,7 @@ from fmus.fmi.intermediate import IntermediateUpdate
 from fmus.fmi.interruption import EventMet
 from fmus.fmi.native_calls import prepared_call
 from fmus.fmi.ports import is_native
-from fmus.fmi.quick_calls import quicken
+from fmus.fmi.quick_calls import quicken_fmi3, quicken_states
 from fmus.fmi.slave import Slave
 from fmus.fmi.standard import DISCARD, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE
 
@@ -87,7 +87,8 @@ class FMI3Slave(FMI3Instance, Slave):
         native = is_native(self.slave)
         self._do_step = _native_step(self.slave) if native else self.slave.doStep
         if native:
-            quicken(self.slave)
+            quicken_fmi3(self.slave)
+            quicken_states(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Slave
         if self.clocks:

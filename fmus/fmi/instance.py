@@ -229,7 +229,15 @@ class Instance(ValueHolder):
 
     def save(self) -> Any:
         """The state, to be restored any number of times and released once."""
-        return self._slave_state(), self._remember()
+        try:
+            state = getattr(self.slave, self._get_state)()
+            if getattr(state, "value", state) is None:  # a null pointer; to restore it would end the process
+                raise RuntimeError("the slave gave no state")
+        except self.mistakes:
+            raise
+        except Exception as error:
+            raise self.explained(f"{self._get_state}{self.without_states}", error) from error
+        return state, self._remember()
 
     def restore(self, state: Any) -> None:
         """Return to a saved state.
@@ -374,18 +382,6 @@ class Instance(ValueHolder):
         self.terminated = remembered[0]
 
     # -- internals --------------------------------------------------------------------------------------------------
-
-    def _slave_state(self) -> Any:
-        """A state from the slave; a null pointer is none, and to restore it would end the process."""
-        try:
-            state = getattr(self.slave, self._get_state)()
-            if getattr(state, "value", state) is None:
-                raise RuntimeError("the slave gave no state")
-        except self.mistakes:
-            raise
-        except Exception as error:
-            raise self.explained(f"{self._get_state}{self.without_states}", error) from error
-        return state
 
     def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
         return element_reader(self, names, values)

@@ -1,7 +1,7 @@
-"""Quick calls: the calls around an event of a native FMI 3 slave with their arguments allocated once. Touches one
-slave.
+"""Quick calls: the calls of a native slave around an event, with their arguments allocated once.
 
-A telegram costs four such calls in every receiver. fmpy's own stay in the class and do what is not prepared here.
+A telegram costs four such calls in every receiver, and states of the plant are saved and restored around it. fmpy's own
+stay in the class and do what is not prepared here.
 """
 
 from __future__ import annotations
@@ -15,18 +15,34 @@ from fmus.fmi.native_calls import prepared_call
 Discrete = tuple[bool, bool, bool, bool, bool, float]
 
 
-def quicken(slave: Any) -> None:
-    """Prepare the calls of an instantiated native slave that enter and leave event mode, tell of an event, and restore
-    a state.
+def quicken_states(slave: Any, version: int, names: Sequence[str]) -> None:
+    """Prepare the calls of an instantiated native slave that save, restore and free a state.
 
     Arguments and results are those of fmpy's methods.
+
+    Args:
+        slave: fmpy's. version: of FMI. names: of its three methods.
+    """
+    functions = [f"fmi{version}{name[0].upper()}{name[1:]}" for name in names]
+    for name, function, make in zip(names, functions, (_getter, _restorer, _releaser), strict=True):
+        setattr(slave, name, make(slave, function))
+
+
+def quicken_fmi2(slave: Any) -> None:
+    """Prepare the calls of an instantiated native slave of FMI 2 that notify of an event; see `quicken_states`."""
+    slave.setReal = _setter(slave, "fmi2SetReal", type(slave).setReal, ctypes.c_double, counted=False)
+    slave.setInteger = _setter(slave, "fmi2SetInteger", type(slave).setInteger, ctypes.c_int, counted=False)
+
+
+def quicken_fmi3(slave: Any) -> None:
+    """Prepare the calls of an instantiated native slave of FMI 3 that enter and leave event mode, and notify of an
+    event; see `quicken_states`.
     """
     slave.enterEventMode = prepared_call(slave, "fmi3EnterEventMode", slave.component)
     slave.enterStepMode = prepared_call(slave, "fmi3EnterStepMode", slave.component)
     slave.updateDiscreteStates = _update(slave)
     slave.setClock = _setter(slave, "fmi3SetClock", type(slave).setClock, ctypes.c_bool, counted=False)
     slave.setFloat64 = _setter(slave, "fmi3SetFloat64", type(slave).setFloat64, ctypes.c_double, counted=True)
-    slave.setFMUState = _with_state(slave, "fmi3SetFMUState")
 
 
 def _update(slave: Any) -> Callable[[], Discrete]:
@@ -69,12 +85,36 @@ def _setter(
     return set_values
 
 
-def _with_state(slave: Any, name: str) -> Callable[[Any], None]:
+def _getter(slave: Any, name: str) -> Callable[[], ctypes.c_void_p]:
+    held = ctypes.c_void_p()
+    call = prepared_call(slave, name, slave.component, ctypes.byref(held))
+
+    def get() -> ctypes.c_void_p:
+        held.value = None  # a new state, and not one that is written over
+        call()
+        return ctypes.c_void_p(held.value)
+
+    return get
+
+
+def _restorer(slave: Any, name: str) -> Callable[[Any], None]:
     held = ctypes.c_void_p()
     call = prepared_call(slave, name, slave.component, held)
 
-    def with_state(state: Any) -> None:
+    def restore(state: Any) -> None:
         held.value = state.value if isinstance(state, ctypes.c_void_p) else state
         call()
 
-    return with_state
+    return restore
+
+
+def _releaser(slave: Any, name: str) -> Callable[[ctypes.c_void_p], None]:
+    held = ctypes.c_void_p()
+    call = prepared_call(slave, name, slave.component, ctypes.byref(held))
+
+    def release(state: ctypes.c_void_p) -> None:
+        held.value = state.value
+        call()
+        state.value = held.value
+
+    return release

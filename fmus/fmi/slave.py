@@ -19,8 +19,6 @@ from fmus.fmi.native_calls import prepared_call
 from fmus.fmi.ports import is_native
 from fmus.fmi.standard import DISCARD, NEVER, OK, PENDING, STATUS, WARNING
 
-Refused = Callable[[FMICallException, float, float], None]
-
 
 class CallNote(Protocol):
     """Where the step under way is noted: its number in `call[0]`, its time [s] in `time[0]`."""
@@ -72,8 +70,11 @@ class Slave(Instance):
         description: its model description.
     """
 
-    _do_step: Callable[[float, float], Any]
-    """The slave's doStep from a time by a length [s], prepared by `instantiate`."""
+    _do_step: Callable[..., Any]
+    """The slave's doStep from a time by a length [s], and with what stands in `_last`, prepared by `instantiate`."""
+
+    _last: tuple[Any, ...] = ()
+    """The last argument of FMI 1 and 2, always the same."""
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
@@ -146,7 +147,7 @@ class Slave(Instance):
             h: length [s].
         """
         try:
-            said = self._do_step(t, h)
+            said = self._do_step(t, h, *self._last)
         except FMICallException as error:
             self.explained("doStep", error)
             return RawStep(STATUS[error.status] if error.status in range(len(STATUS)) else f"status {error.status}")
@@ -174,18 +175,23 @@ class Slave(Instance):
             t,
         )
 
-    # -- internals --------------------------------------------------------------------------------------------------
 
-    def _step_whole(self, refused: Refused, t: float, until: float) -> None:
-        """One timed doStep of a slave that gets to `until` [s] or refuses (FMI 1, 2)."""
+class WholeStepSlave(Slave):
+    """A slave of FMI 1 or 2: a step gets to its end or is refused."""
+
+    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
         note = self._call_note
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
-            self._do_step(t, until - t)
+            self._do_step(t, until - t, *self._last)
             self.time = until
         except FMICallException as error:
-            refused(error, t, until)
+            if error.status == PENDING:
+                raise self.pending(t) from error
+            if error.status != DISCARD:
+                raise self.explained("doStep", error, t) from error
+            self._after_discard(error, t, until)
         except self.mistakes:
             raise
         except Exception as error:
@@ -194,12 +200,9 @@ class Slave(Instance):
             self.seconds += perf_counter() - begin
             self.calls += 1
 
-    def _raise_unless_discarded(self, error: FMICallException, t: float) -> None:
-        """Of a discarded step the slave can be asked why (FMI 1, 2); everything else is an error."""
-        if error.status == PENDING:
-            raise self.pending(t) from error
-        if error.status != DISCARD:
-            raise self.explained("doStep", error, t) from error
+    @abstractmethod
+    def _after_discard(self, error: FMICallException, t: float, until: float) -> None:
+        """The step from `t` to `until` was discarded: the slave can be asked why."""
 
     def _not_done(self, error: Exception, t: float, until: float, reached: float | None) -> Exception:
         """The error of a discarded step from `t` to `until`, of which it did the part to `reached` [s]."""
@@ -223,7 +226,7 @@ def status_of(ask: Callable[[int], Any], kind: int) -> Any:
         return None
 
 
-def make_step(slave: Any, name: str, last: Any) -> Callable[[float, float], None]:
+def make_step(slave: Any, name: str, last: Any) -> Callable[[float, float, Any], None]:
     """The doStep of FMI 1 and 2 from a time by a length, both in [s], its arguments allocated once.
 
     Args:
@@ -232,11 +235,12 @@ def make_step(slave: Any, name: str, last: Any) -> Callable[[float, float], None
         last: the last argument, always the same.
     """
     if not is_native(slave):
-        return lambda t, h: slave.doStep(t, h, last)
+        step: Callable[[float, float, Any], None] = slave.doStep
+        return step
     start, length = ctypes.c_double(), ctypes.c_double()
     call = prepared_call(slave, name, slave.component, start, length, last)
 
-    def do_step(t: float, h: float) -> None:
+    def do_step(t: float, h: float, _last: Any) -> None:
         start.value, length.value = t, h
         call()
 

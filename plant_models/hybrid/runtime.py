@@ -218,10 +218,10 @@ class Runtime:
         if (cell - k) * h > tolerance:  # inside a cell: finish it, or stop within it
             boundary = self.t0 + (k + 1) * h
             if boundary >= target - tolerance:  # a target on the boundary but for rounding is the boundary
-                self._kernel.step(self.t, (boundary if boundary <= target + tolerance else target) - self.t)
+                self._kernel.grid_steps(self.t, 0, 1, (boundary if boundary <= target + tolerance else target) - self.t)
                 self.t = target
                 return
-            self._kernel.step(self.t, boundary - self.t)
+            self._kernel.grid_steps(self.t, 0, 1, boundary - self.t)
             k += 1
         whole = floor((target - self.t0) / h + tolerance / h) - k
         if whole > 0:
@@ -229,5 +229,5 @@ class Runtime:
             k += whole
         rest = target - (self.t0 + k * h)
         if rest > tolerance:
-            self._kernel.step(self.t0 + k * h, rest)
+            self._kernel.grid_steps(self.t0 + k * h, 0, 1, rest)
         self.t = target

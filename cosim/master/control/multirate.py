@@ -73,7 +73,7 @@ def set_rates(
         rates.
     """
     for name, count in substeps.items():
-        plan.find(name).substeps = count
+        plan.find(name).divide(count)
     for name, count in every.items():
         if count == 1:
             continue

@@ -53,7 +53,7 @@ def spied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Wrap], None]]:
     itself.
     """
     kept: list[Any] = []
-    real = dialect.quicken
+    real = dialect.quicken_fmi3
 
     def install(wrap: Wrap) -> None:
         def quicken(slave: Any) -> None:
@@ -62,7 +62,7 @@ def spied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Wrap], None]]:
                 slave._functions[function] = _in_front(slave, function, wrap, counts, kept)
             real(slave)
 
-        monkeypatch.setattr(dialect, "quicken", quicken)
+        monkeypatch.setattr(dialect, "quicken_fmi3", quicken)
 
     yield install
     kept.clear()
