@@ -43,7 +43,7 @@ TRUE_LINE_ABOVE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth"
 NOISY_LINE: dict[str, Any] = {"linestyle": "-", "linewidth": 0.5, "alpha": 0.55, "zorder": 1.6}
 WILD_LINE: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.6, "zorder": 1.2}  # a diverged curve stays behind the others
 
-_PANEL_SIZE = (8.2, 3.4)  # inches
+PANEL_SIZE = (8.2, 3.4)  # inches
 HEADLINE = 11.5  # font size [pt]
 _DPI = 130  # dots per inch
 TIME = "Time [s]"  # on the axis of every curve against time
@@ -120,7 +120,7 @@ def run_line(index: int) -> dict[str, Any]:
     return {"color": colour["color"], "linestyle": dashed[(index - 1 + index // count) % len(dashed)], "linewidth": 1.5}
 
 
-def new_figure(size: tuple[float, float] = _PANEL_SIZE) -> Figure:
+def new_figure(size: tuple[float, float] = PANEL_SIZE) -> Figure:
     """An empty figure on a canvas of its own, without pyplot.
 
     Args:
@@ -144,7 +144,7 @@ def headline(figure: Figure, text: str) -> None:
     figure.suptitle(text, fontsize=HEADLINE, fontweight="bold", x=0.01, ha="left")
 
 
-def axes_or_new(ax: Axes | None, size: tuple[float, float] = _PANEL_SIZE) -> Axes:
+def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL_SIZE) -> Axes:
     """The axes given, or those of a new figure.
 
     Args:

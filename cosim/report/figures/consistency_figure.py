@@ -3,75 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import GAP, MARK, axes_or_new, observer_line, styled
+from cosim.drawing.style import GAP, MARK, observer_line
 from cosim.evaluation.consistency import FilterConsistency, Kind, filter_consistency
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, legend_above, logarithmic, mark_evaluation, time_axis
+from cosim.report.figures.drawing import curve, logarithmic, mark_evaluation
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 from fmu_observer.formulas.filtering.covariance_consistency import chi_square_band
 
 _AVERAGED = 50  # samples in the drawn mean, at most a quarter of all
 SMALLEST, LARGEST = 1e-2, 1e3  # of a drawn share; beyond it is cut
-
-
-@styled
-def nis_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """NIS over its degrees of freedom against time on a logarithmic axis, moving means, and the band of these means.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    return _figure(result, spec, axes_or_new(ax), ("NIS",))
-
-
-@styled
-def nees_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """NEES over its degrees of freedom against time, of all states where the covariance was recorded, else of each
-    quantity with its standard deviation; moving means, and the band of a single sample.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    return _figure(result, spec, axes_or_new(ax), ("NEES", "error"))
-
-
-def _figure(result: Result, spec: ReportSpec, ax: Axes, kinds: Sequence[Kind]) -> Axes:
-    entries = _chosen(result, spec, kinds)
-    shortest = min((len(e.squares) for e in entries), default=0)
-    count = max(min(_AVERAGED, shortest // 4), 1) if kinds == ("NIS",) else 1  # errors of samples that follow are alike
-    for degrees in sorted({float(e.degrees.mean()) for e in entries}):
-        band = chi_square_band(degrees, float(count))
-        text = f"95 % band, {degrees:g} degree{'s' if degrees != 1.0 else ''} of freedom"
-        ax.axhspan(band.low / degrees, band.high / degrees, color=GAP, alpha=0.3, linewidth=0, label=text)
-    ax.axhline(1.0, color=MARK, linewidth=0.8)
-    names = [f"{e.observer} {e.name}" for e in entries]
-    for name, entry in zip(names, entries, strict=True):
-        mean = np.convolve(entry.squares / entry.degrees, np.full(count, 1.0 / count), mode="valid")
-        degrees = float(entry.degrees.mean())
-        band = chi_square_band(degrees, float(count))
-        inside = np.mean((mean * degrees >= band.low) & (mean * degrees <= band.high))
-        text = label(spec, entry.observer) + ("" if entry.kind != "error" else f", {entry.quantity}")
-        text = f"{text}: {100.0 * inside:.3g} % inside"
-        drawn = np.clip(mean, SMALLEST, LARGEST)
-        curve(ax, entry.time[count - 1 :], drawn, None, label=text, **observer_line(names, name))
-    logarithmic(ax)
-    ax.set_ylabel(f"{kinds[0]} / degrees of freedom [1]")
-    mark_evaluation(ax, result, spec)
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
 
 
 def _chosen(result: Result, spec: ReportSpec, kinds: Sequence[Kind]) -> list[FilterConsistency]:
@@ -84,8 +31,45 @@ def _chosen(result: Result, spec: ReportSpec, kinds: Sequence[Kind]) -> list[Fil
     return chosen
 
 
-class NisPanel(Panel):
-    """Normalised innovations."""
+class _ConsistencyPanel(Panel):
+    """Normalised squares over their degrees of freedom on a logarithmic axis, moving means, and the band of these
+    means.
+    """
+
+    kinds: ClassVar[tuple[Kind, ...]]
+
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:
+        entries = _chosen(result, spec, cls.kinds)
+        shortest = min((len(e.squares) for e in entries), default=0)
+        # errors of samples that follow each other are alike
+        count = max(min(_AVERAGED, shortest // 4), 1) if cls.kinds == ("NIS",) else 1
+        for degrees in sorted({float(e.degrees.mean()) for e in entries}):
+            band = chi_square_band(degrees, float(count))
+            text = f"95 % band, {degrees:g} degree{'s' if degrees != 1.0 else ''} of freedom"
+            ax.axhspan(band.low / degrees, band.high / degrees, color=GAP, alpha=0.3, linewidth=0, label=text)
+        ax.axhline(1.0, color=MARK, linewidth=0.8)
+        names = [f"{e.observer} {e.name}" for e in entries]
+        for name, entry in zip(names, entries, strict=True):
+            mean = np.convolve(entry.squares / entry.degrees, np.full(count, 1.0 / count), mode="valid")
+            degrees = float(entry.degrees.mean())
+            band = chi_square_band(degrees, float(count))
+            inside = np.mean((mean * degrees >= band.low) & (mean * degrees <= band.high))
+            text = label(spec, entry.observer) + ("" if entry.kind != "error" else f", {entry.quantity}")
+            text = f"{text}: {100.0 * inside:.3g} % inside"
+            drawn = np.clip(mean, SMALLEST, LARGEST)
+            curve(ax, entry.time[count - 1 :], drawn, None, label=text, **observer_line(names, name))
+        logarithmic(ax)
+        ax.set_ylabel(f"{cls.kinds[0]} / degrees of freedom [1]")
+        mark_evaluation(ax, result, spec)
+
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:
+        return bool(_chosen(result, spec, cls.kinds))
+
+
+class NisPanel(_ConsistencyPanel):
+    """NIS, and the band of the means of many samples."""
 
     name = "nis"
     title = "Normalised innovations (NIS)"
@@ -94,28 +78,16 @@ class NisPanel(Panel):
         "band for 95 % of the time. Above it the filter trusts itself too much, below it too little."
     )
     place = 3.7
-
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return nis_figure(result, spec, ax)
-
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return bool(_chosen(result, spec, ("NIS",)))
+    kinds = ("NIS",)
 
 
-class NeesPanel(Panel):
-    """Normalised errors."""
+class NeesPanel(_ConsistencyPanel):
+    """NEES of all states where the covariance was recorded, else of each quantity with its standard deviation, and the
+    band of one sample.
+    """
 
     name = "nees"
     title = "Normalised errors (NEES)"
     caption = "Squares of the errors over what the filter's covariance lets expect, and the band of 95 % of them."
     place = 3.8
-
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return nees_figure(result, spec, ax)
-
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return bool(_chosen(result, spec, ("NEES", "error")))
+    kinds = ("NEES", "error")

@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import MARK, WILD_LINE, axes_or_new, observer_line, styled
+from cosim.drawing.style import MARK, WILD_LINE, observer_line
 from cosim.evaluation.metrics import error_size
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import (
-    balise_ticks,
-    curve,
-    legend_above,
-    logarithmic,
-    mark_evaluation,
-    shade_zones,
-    time_axis,
-)
+from cosim.report.figures.drawing import balise_ticks, curve, logarithmic, mark_evaluation, shade_zones
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum, window_length
 from cosim.results.result import Result
@@ -29,32 +21,6 @@ from fmus.tables.numbers import error_number, number
 
 SPIKE = 3.0  # a curve that leaves the scale by this factor is named
 FAR = 1e3  # sizes are cut this many times beyond a logarithmic axis
-
-
-@styled
-def speed_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Estimated minus true speed in m/s, against time, with low-adhesion zones and balises.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes. An observer that leaves the scale is named in the legend with its largest error.
-    """
-    return _error_figure(result, spec, axes_or_new(ax), "speed", "m/s")
-
-
-@styled
-def _position_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Estimated minus true position in m, against time, with low-adhesion zones and balises.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes. An observer that leaves the scale is named in the legend with its largest error.
-    """
-    return _error_figure(result, spec, axes_or_new(ax), "position", "m")
 
 
 @dataclass(frozen=True)
@@ -97,23 +63,6 @@ def draw_errors(ax: Axes, curves: Sequence[ErrorCurve], quantity: Quantity, unit
     _apply(ax, scale, quantity, unit, window)
 
 
-def _error_figure(result: Result, spec: ReportSpec, ax: Axes, quantity: Quantity, unit: str) -> Axes:
-    found = ((observer, estimation_error(result, spec, observer, quantity)) for observer in spec.observers)
-    settled = result.time >= spec.evaluate_after
-    shade_zones(ax, spec)
-    curves = [
-        ErrorCurve(result.time, error, settled, observer_line(spec.observers, observer), label(spec, observer))
-        for observer, error in found
-        if error is not None
-    ]
-    draw_errors(ax, curves, quantity, unit)
-    balise_ticks(ax, result)
-    mark_evaluation(ax, result, spec)
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
-
-
 def _off_scale(largest: float, unit: str) -> str:
     size = error_number(largest, 2)
     return size if size == "diverged" else f"off scale: {size} {unit}"
@@ -137,8 +86,38 @@ def _apply(ax: Axes, scale: ErrorScale, quantity: Quantity, unit: str, window: f
     ax.set_ylabel(f"|{quantity} error| [{unit}]\nlargest in {number(window, 1)} s")
 
 
-class SpeedErrorPanel(Panel):
-    """Speed error."""
+class _ErrorPanel(Panel):
+    """Estimated minus true value, with low-adhesion zones and balises. An observer that leaves the scale is named in
+    the legend with its largest error.
+    """
+
+    quantity: ClassVar[Quantity]
+    unit: ClassVar[str]
+
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:
+        settled = result.time >= spec.evaluate_after
+        shade_zones(ax, spec)
+        curves = [
+            ErrorCurve(result.time, error, settled, observer_line(spec.observers, observer), label(spec, observer))
+            for observer, error in cls._errors(result, spec).items()
+        ]
+        draw_errors(ax, curves, cls.quantity, cls.unit)
+        balise_ticks(ax, result)
+        mark_evaluation(ax, result, spec)
+
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:
+        return bool(cls._errors(result, spec))
+
+    @classmethod
+    def _errors(cls, result: Result, spec: ReportSpec) -> dict[str, np.ndarray]:
+        found = {observer: estimation_error(result, spec, observer, cls.quantity) for observer in spec.observers}
+        return {observer: error for observer, error in found.items() if error is not None}
+
+
+class SpeedErrorPanel(_ErrorPanel):
+    """Estimated minus true speed [m/s], against time."""
 
     name = "speed_error"
     title = "Speed error"
@@ -147,28 +126,14 @@ class SpeedErrorPanel(Panel):
         "is named in the legend."
     )
     place = 2
-
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return speed_error_figure(result, spec, ax)
-
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return any(estimation_error(result, spec, observer, "speed") is not None for observer in spec.observers)
+    quantity, unit = "speed", "m/s"
 
 
-class PositionErrorPanel(Panel):
-    """Position error."""
+class PositionErrorPanel(_ErrorPanel):
+    """Estimated minus true position [m], against time."""
 
     name = "position_error"
     title = "Position error"
     caption = "Estimated minus true position, on a scale chosen in the same way."
     place = 3
-
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return _position_error_figure(result, spec, ax)
-
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return any(estimation_error(result, spec, observer, "position") is not None for observer in spec.observers)
+    quantity, unit = "position", "m"

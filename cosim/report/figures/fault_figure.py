@@ -9,7 +9,7 @@ from cosim.drawing.style import MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.fault_detection import intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import legend_above, logarithmic, time_axis
+from cosim.report.figures.drawing import logarithmic
 from cosim.report.figures.panel import Panel, any_estimate
 from cosim.report.figures.scales import bounded, running_maximum, window_length
 from cosim.results.result import Result
@@ -20,92 +20,73 @@ DECADES = 1e3  # from the bottom of the axis to the bound
 _FILLED = 0.7  # share of a row that its bar fills
 
 
-@styled
-def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Bars against time where a fault acts, and below them one row an observer where it says so.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    indicated = {o: v for o in spec.observers if (v := estimate(result, o, spec.detection)) is not None}
+def _rows(result: Result, spec: ReportSpec) -> list[tuple[str, str, np.ndarray]]:
+    """Text, colour and values of each row."""
     true = recorded(result, spec.true_fault)
     rows = [("fault acts", MARK, true)] if true is not None else []
-    rows += [(label(spec, o), observer_line(spec.observers, o)["color"], v) for o, v in indicated.items()]
-    ax = axes_or_new(ax, (8.2, REST + ROW * len(rows)))
-    for place, (_, colour, values) in enumerate(rows):
-        bars = [(start, end - start) for start, end in intervals(result.time, values)]
-        ax.broken_barh(bars, (place - _FILLED / 2, _FILLED), facecolor=colour, edgecolor=colour, linewidth=0.6)
-    ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
-    ax.set_ylim(max(len(rows), 1) - 0.5, -0.5)  # the first row on top
-    time_axis(ax, result)
-    return ax
-
-
-@styled
-def _bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Magnitude of the speed error as a share of the bound that its observer tells at the same instant, the largest in
-    each window of time, on a logarithmic axis; above 1 the bound is broken.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    ax = axes_or_new(ax)
-    true = recorded(result, spec.true_speed)
-    window, largest = window_length([result.time]), 1.0
     for observer in spec.observers:
-        bound, speed = estimate(result, observer, BOUND), estimate(result, observer, "speed")
-        if bound is None or speed is None or true is None:
-            continue
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            share = np.where(speed == true, 0.0, np.abs(speed - true) / bound)
-        middles, sizes = running_maximum(result.time, share, window)
-        sizes = bounded(np.nan_to_num(sizes, posinf=np.inf))
-        ax.plot(middles, sizes, label=label(spec, observer), **observer_line(spec.observers, observer))
-        largest = max(largest, float(np.max(sizes, initial=0.0)))
-    ax.axhline(1.0, color=MARK, linewidth=1.2, label="bound")
-    logarithmic(ax)
-    ax.set_ylim(1.0 / DECADES, 1.5 * largest)
-    ax.set_ylabel("|Speed error| / bound [1]")
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
+        indicated = estimate(result, observer, spec.detection)
+        if indicated is not None:
+            rows.append((label(spec, observer), observer_line(spec.observers, observer)["color"], indicated))
+    return rows
 
 
 class FaultsPanel(Panel):
-    """Faults, of the odometer say."""
+    """Bars against time where a fault acts, and below them one row an observer where it says so."""
 
     name = "faults"
     title = "Faults"
     caption = "When a fault acts, and when each observer says so."
     place = 3.4
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return fault_figure(result, spec, ax)
+    @classmethod
+    @styled
+    def draw(cls, result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:  # noqa: D102 - see Panel
+        return super().draw(result, spec, axes_or_new(ax, (8.2, REST + ROW * len(_rows(result, spec)))))
 
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        rows = _rows(result, spec)
+        for place, (_, colour, values) in enumerate(rows):
+            bars = [(start, end - start) for start, end in intervals(result.time, values)]
+            ax.broken_barh(bars, (place - _FILLED / 2, _FILLED), facecolor=colour, edgecolor=colour, linewidth=0.6)
+        ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
+        ax.set_ylim(max(len(rows), 1) - 0.5, -0.5)  # the first row on top
+
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
         return any_estimate(result, spec, spec.detection) and recorded(result, spec.true_fault) is not None
 
 
 class BoundsPanel(Panel):
-    """Bounds of the speed error."""
+    """Magnitude of the speed error as a share of the bound that its observer states at the same instant, the largest
+    in each window of time, on a logarithmic axis; above 1 the bound is broken.
+    """
 
     name = "bounds"
     title = "Speed error as a share of its bound"
-    caption = "Largest in each window of time; above the line the bound that the observer told was broken."
+    caption = "Largest in each window of time; above the line the bound that the observer stated was broken."
     place = 3.6
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return _bound_figure(result, spec, ax)
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        true = recorded(result, spec.true_speed)
+        window, largest = window_length([result.time]), 1.0
+        for observer in spec.observers:
+            bound, speed = estimate(result, observer, BOUND), estimate(result, observer, "speed")
+            if bound is None or speed is None or true is None:
+                continue
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                share = np.where(speed == true, 0.0, np.abs(speed - true) / bound)
+            middles, sizes = running_maximum(result.time, share, window)
+            sizes = bounded(np.nan_to_num(sizes, posinf=np.inf))
+            ax.plot(middles, sizes, label=label(spec, observer), **observer_line(spec.observers, observer))
+            largest = max(largest, float(np.max(sizes, initial=0.0)))
+        ax.axhline(1.0, color=MARK, linewidth=1.2, label="bound")
+        logarithmic(ax)
+        ax.set_ylim(1.0 / DECADES, 1.5 * largest)
+        ax.set_ylabel("|Speed error| / bound [1]")
 
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
         return any_estimate(result, spec, BOUND) and recorded(result, spec.true_speed) is not None

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
+from cosim.drawing.style import BLACK, GAP, MARK, observer_line
 from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, envelope, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import certified_gap, mapping_entry
-from cosim.report.figures.drawing import legend_above, logarithmic, shade_zones, time_axis
+from cosim.report.figures.drawing import logarithmic, shade_zones
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import bounded
 from cosim.results.result import Result
@@ -61,75 +61,8 @@ def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
     return limits
 
 
-@styled
-def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Time between consecutive balises in s, each gap over the time it lasts, and the certified gaps as levels.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    ax = axes_or_new(ax, (8.2, 3.0))
-    stamps, gaps = sampling_gaps(result)
-    limits = certified_gaps(result, spec)
-    shade_zones(ax, spec)
-    top = float(np.max(gaps)) if len(gaps) else max(limits.values(), default=1.0)
-    if len(gaps):
-        ax.stairs(gaps, stamps, fill=True, color=GAP, label="gap between balises")
-    largest = top
-    for limit in sorted(set(limits.values())):
-        observers = [observer for observer in limits if limits[observer] == limit]
-        line = observer_line(spec.observers, observers[0])
-        text = f"certified to {number(limit)} s: {', '.join(label(spec, observer) for observer in observers)}"
-        if len(gaps) and largest > limit:
-            text += " (exceeded)"
-        if limit <= SHOWN * largest:
-            ax.axhline(limit, label=text, **line)
-            top = max(top, limit)
-        else:
-            ax.plot([], [], label=f"{text} (above the scale)", **line)
-    ax.set_ylim(0.0, 1.12 * top)
-    ax.set_ylabel("Sampling gap [s]")
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
-
-
-@styled
-def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Magnitude of the position error in m at the end of each gap over its length, on a logarithmic axis, for every
-    observer and the plain odometer, with the envelope of SUBSET-041.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    ax = axes_or_new(ax, (8.2, 3.8))
-    found = gap_errors(result, spec)
-    lengths = bounded(np.array([gap.length for gap in found.gaps]))
-    for i, (name, errors) in enumerate(found.errors.items()):
-        plain = name == PLAIN_ODOMETER
-        colour = BLACK if plain else observer_line(spec.observers, name)["color"]
-        marker = "x" if plain else MARKERS[i % len(MARKERS)]
-        sizes = np.clip(np.abs(errors), SMALLEST, LARGEST)
-        ax.plot(lengths, sizes, marker=marker, color=colour, label=found.labels[name], **_MARK_STYLE)
-    # from zero on, so that balises at one distance are a column of marks on a scale that can be read
-    way = np.linspace(0.0, max(1.05 * float(np.max(lengths, initial=0.0, where=np.isfinite(lengths))), 1.0), 50)
-    ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=_GRANTED)
-    ax.set_xlim(way[0], way[-1])
-    logarithmic(ax)
-    ax.set_xlabel("Way since the last balise [m]")
-    ax.set_ylabel("|Position error| at the end [m]")
-    legend_above(ax)
-    return ax
-
-
 class GapsPanel(Panel):
-    """Sampling gaps."""
+    """Time between consecutive balises in s, each gap over the time it lasts, and the certified gaps as levels."""
 
     name = "gaps"
     title = "Sampling gaps"
@@ -138,18 +71,40 @@ class GapsPanel(Panel):
         "certified for."
     )
     place = 6
+    size = (8.2, 3.0)
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return gap_figure(result, spec, ax)
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        stamps, gaps = sampling_gaps(result)
+        limits = certified_gaps(result, spec)
+        shade_zones(ax, spec)
+        top = float(np.max(gaps)) if len(gaps) else max(limits.values(), default=1.0)
+        if len(gaps):
+            ax.stairs(gaps, stamps, fill=True, color=GAP, label="gap between balises")
+        largest = top
+        for limit in sorted(set(limits.values())):
+            observers = [observer for observer in limits if limits[observer] == limit]
+            line = observer_line(spec.observers, observers[0])
+            text = f"certified to {number(limit)} s: {', '.join(label(spec, observer) for observer in observers)}"
+            if len(gaps) and largest > limit:
+                text += " (exceeded)"
+            if limit <= SHOWN * largest:
+                ax.axhline(limit, label=text, **line)
+                top = max(top, limit)
+            else:
+                ax.plot([], [], label=f"{text} (above the scale)", **line)
+        ax.set_ylim(0.0, 1.12 * top)
+        ax.set_ylabel("Sampling gap [s]")
 
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: ARG004, D102 - see Panel
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:  # noqa: ARG003, D102 - see Panel
         return len(sampling_gaps(result)[1]) > 0
 
 
 class GapErrorsPanel(Panel):
-    """Position errors at the end of the gaps."""
+    """Magnitude of the position error [m] at the end of each gap over its length, on a logarithmic axis, for every
+    observer and the plain odometer, with the envelope of SUBSET-041.
+    """
 
     name = "gap_errors"
     title = "Position errors at the end of the gaps"
@@ -159,11 +114,27 @@ class GapErrorsPanel(Panel):
         "the edge."
     )
     place = 7
+    size = (8.2, 3.8)
+    over_time = False
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return gap_error_figure(result, spec, ax)
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        found = gap_errors(result, spec)
+        lengths = bounded(np.array([gap.length for gap in found.gaps]))
+        for i, (name, errors) in enumerate(found.errors.items()):
+            plain = name == PLAIN_ODOMETER
+            colour = BLACK if plain else observer_line(spec.observers, name)["color"]
+            marker = "x" if plain else MARKERS[i % len(MARKERS)]
+            sizes = np.clip(np.abs(errors), SMALLEST, LARGEST)
+            ax.plot(lengths, sizes, marker=marker, color=colour, label=found.labels[name], **_MARK_STYLE)
+        # from zero on, so that balises at one distance are a column of marks on a scale that can be read
+        way = np.linspace(0.0, max(1.05 * float(np.max(lengths, initial=0.0, where=np.isfinite(lengths))), 1.0), 50)
+        ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=_GRANTED)
+        ax.set_xlim(way[0], way[-1])
+        logarithmic(ax)
+        ax.set_xlabel("Way since the last balise [m]")
+        ax.set_ylabel("|Position error| at the end [m]")
 
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
         return bool(gap_errors(result, spec).errors)

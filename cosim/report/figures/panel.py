@@ -7,8 +7,10 @@ from typing import ClassVar
 
 from matplotlib.axes import Axes
 
+from cosim.drawing.style import PANEL_SIZE, axes_or_new, styled
 from cosim.evaluation.roles import estimate
 from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.drawing import legend_above, time_axis
 from cosim.results.result import Result
 
 
@@ -17,13 +19,16 @@ class Panel(ABC):
 
     Attributes:
         name: stem of its file name. title: short. caption: what to see in it.
-        place: where it stands in the report, from small to large.
+        place: where it stands in the report, from small to large. size: of a figure of its own [inch].
+        over_time: its abscissa is the time of the run.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
     place: ClassVar[float] = 100.0
+    size: ClassVar[tuple[float, float]] = PANEL_SIZE
+    over_time: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         lacking = [word for word in ("title", "caption") if "name" in vars(cls) and not hasattr(cls, word)]
@@ -32,10 +37,10 @@ class Panel(ABC):
                 f"the figure {cls.__name__} has no {' and no '.join(lacking)}; write it as a class attribute"
             )
 
-    @staticmethod
-    @abstractmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:
-        """Draw it.
+    @classmethod
+    @styled
+    def draw(cls, result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+        """Draw it, with the legend above.
 
         Args:
             result: the run. spec: roles of its signals. ax: axes to draw on; None for a figure of its own.
@@ -43,10 +48,25 @@ class Panel(ABC):
         Returns:
             The axes.
         """
+        ax = axes_or_new(ax, cls.size)
+        cls.plot(result, spec, ax)
+        if cls.over_time:
+            time_axis(ax, result)
+        legend_above(ax)
+        return ax
 
-    @staticmethod
+    @classmethod
     @abstractmethod
-    def available(result: Result, spec: ReportSpec) -> bool:
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:
+        """Draw all but the legend and the axis of time.
+
+        Args:
+            result: the run. spec: roles of its signals. ax: axes to draw on.
+        """
+
+    @classmethod
+    @abstractmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:
         """Whether a run has something to draw.
 
         Args:

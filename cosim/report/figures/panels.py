@@ -39,6 +39,6 @@ def _drawn(result: Result, spec: ReportSpec) -> Iterator[tuple[type[Panel], byte
     for panel in panels():
         try:
             if panel.available(result, spec):
-                yield panel, png(panel.draw(result, spec, None).figure)
+                yield panel, png(panel.draw(result, spec).figure)
         except Exception as error:
             LOG.warning("the figure %r is left out: %s", panel.name, explained(error))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,14 +19,12 @@ from cosim.drawing.style import (
     TRUE_LINE,
     TRUE_LINE_ABOVE,
     WILD_LINE,
-    axes_or_new,
     observer_line,
-    styled,
 )
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
+from cosim.report.figures.drawing import curve, is_noisy, is_wild, shade_zones
 from cosim.report.figures.panel import Panel, any_estimate
 from cosim.report.figures.scales import bounded, slip_in_percent, value_limits
 from cosim.results.result import Result
@@ -47,6 +45,18 @@ def _scaled(result: Result, name: str | None, factor: float) -> list[np.ndarray]
     return [] if values is None else [factor * bounded(values)]
 
 
+def _draw(
+    ax: Axes,
+    result: Result,
+    curves: Sequence[np.ndarray],
+    limits: tuple[float, float] | None,
+    text: str,
+    line: dict[str, Any],
+) -> None:
+    for values in curves:
+        curve(ax, result.time, values, limits, label=text, **line)
+
+
 def _draw_estimates(
     ax: Axes, result: Result, spec: ReportSpec, estimates: Mapping[str, np.ndarray], limits: tuple[float, float] | None
 ) -> None:
@@ -57,95 +67,9 @@ def _draw_estimates(
             line, text = line | WILD_LINE, f"{text} (off scale)"
         elif is_noisy(values[settled]):
             line = line | NOISY_LINE
-        curve(ax, result.time, values, limits, label=text, **line)
-
-
-@styled
-def _speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """True speed, odometer, reference, other trains and estimates in km/h, against time.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    ax = axes_or_new(ax)
-    true, odometer = _scaled(result, spec.true_speed, KMH), _scaled(result, spec.odometer, KMH)
-    reference, estimates = _scaled(result, spec.speed_reference, KMH), _estimates(result, spec, "speed", KMH)
-    others = {train: _scaled(result, f"{train}.speed", KMH) for train in spec.other_trains}
-    limits = value_limits([*true, *reference, *chain(*others.values())], odometer + list(estimates.values()))
-    shade_zones(ax, spec)
-    for values in true:
-        curve(ax, result.time, values, limits, label="true", **TRUE_LINE)
-    for values in odometer:
-        curve(ax, result.time, values, limits, label="odometer", **ODOMETER_LINE)
-    for values in reference:
-        curve(ax, result.time, values, limits, label="reference", **REFERENCE_LINE)
-    for i, (train, found) in enumerate(others.items()):
-        line = _OTHER_LINE | {"linestyle": _DASHES[i % len(_DASHES)], "label": label(spec, train)}
-        for values in found:
-            curve(ax, result.time, values, limits, **line)
-    _draw_estimates(ax, result, spec, estimates, limits)
+        _draw(ax, result, [values], limits, text, line)
     if limits is not None:
         ax.set_ylim(*limits)
-    ax.set_ylabel("Speed [km/h]")
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
-
-
-@styled
-def adhesion_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """True and estimated adhesion force in kN, against time; the estimates' spikes may leave the axis.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    ax = axes_or_new(ax)
-    true, estimates = _scaled(result, spec.true_adhesion_force, 1e-3), _estimates(result, spec, "adhesion_force", 1e-3)
-    limits = value_limits(true, list(estimates.values()))
-    shade_zones(ax, spec)
-    true_line = TRUE_LINE_ABOVE if any(map(is_noisy, estimates.values())) else TRUE_LINE
-    for values in true:
-        curve(ax, result.time, values, limits, label="true", **true_line)
-    _draw_estimates(ax, result, spec, estimates, limits)
-    if limits is not None:
-        ax.set_ylim(*limits)
-    ax.set_ylabel("Adhesion force [kN]")
-    ax.ticklabel_format(axis="y", useOffset=False)  # a force that does not change has no scale of its own
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
-
-
-@styled
-def slip_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """True and estimated slip in percent, and bars below them where the slip indicators were on, against time.
-
-    Args:
-        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes.
-    """
-    ax = axes_or_new(ax, (8.2, 3.8))
-    true = [slip_in_percent(values) for values in _scaled(result, spec.true_slip, 1.0)]
-    estimates = {o: slip_in_percent(values) for o, values in _estimates(result, spec, "slip", 1.0).items()}
-    settled = result.time >= spec.evaluate_after
-    limits = value_limits([v[settled] for v in true], [v[settled] for v in estimates.values()])
-    shade_zones(ax, spec)
-    for values in true:
-        curve(ax, result.time, values, limits, label="true", **TRUE_LINE)
-    _draw_estimates(ax, result, spec, estimates, limits)
-    _indicator_strips(ax, result, spec, limits)
-    ax.set_ylabel("Slip [%]")
-    time_axis(ax, result)
-    legend_above(ax)
-    return ax
 
 
 def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[float, float] | None) -> None:
@@ -167,53 +91,84 @@ def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[
     ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick <= high])
 
 
-class SpeedPanel(Panel):
-    """Speed."""
+class _RunPanel(Panel):
+    """Drawn where one of these roles is recorded, or one of these outputs estimated."""
+
+    roles: ClassVar[tuple[str, ...]]
+    estimates: ClassVar[tuple[str, ...]]
+
+    @classmethod
+    def available(cls, result: Result, spec: ReportSpec) -> bool:
+        recorded_roles = (recorded(result, getattr(spec, role)) for role in cls.roles)
+        return any(values is not None for values in recorded_roles) or any_estimate(result, spec, *cls.estimates)
+
+
+class SpeedPanel(_RunPanel):
+    """True speed, odometer, reference, other trains and estimates in km/h, against time."""
 
     name = "speed"
     title = "Speed"
     caption = "True speed, odometer, reference, other trains of the run and estimates."
     place = 1
+    roles, estimates = ("true_speed", "odometer", "speed_reference"), ("speed",)
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return _speed_figure(result, spec, ax)
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        true, odometer = _scaled(result, spec.true_speed, KMH), _scaled(result, spec.odometer, KMH)
+        reference, estimates = _scaled(result, spec.speed_reference, KMH), _estimates(result, spec, "speed", KMH)
+        others = {train: _scaled(result, f"{train}.speed", KMH) for train in spec.other_trains}
+        limits = value_limits([*true, *reference, *chain(*others.values())], odometer + list(estimates.values()))
+        shade_zones(ax, spec)
+        _draw(ax, result, true, limits, "true", TRUE_LINE)
+        _draw(ax, result, odometer, limits, "odometer", ODOMETER_LINE)
+        _draw(ax, result, reference, limits, "reference", REFERENCE_LINE)
+        for i, (train, found) in enumerate(others.items()):
+            line = _OTHER_LINE | {"linestyle": _DASHES[i % len(_DASHES)]}
+            _draw(ax, result, found, limits, label(spec, train), line)
+        _draw_estimates(ax, result, spec, estimates, limits)
+        ax.set_ylabel("Speed [km/h]")
 
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        roles = (spec.true_speed, spec.odometer, spec.speed_reference)
-        return any(recorded(result, name) is not None for name in roles) or any_estimate(result, spec, "speed")
 
-
-class SlipPanel(Panel):
-    """Slip."""
+class SlipPanel(_RunPanel):
+    """True and estimated slip in percent, and bars below them where the slip indicators were on, against time."""
 
     name = "slip"
     title = "Slip"
     caption = "True and estimated slip; bars where a slip indicator is on, in the legend's order. Locked wheel: -100 %."
     place = 4
+    roles, estimates = ("true_slip",), ("slip", "slip_indicator")
+    size = (8.2, 3.8)
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return slip_figure(result, spec, ax)
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        true = [slip_in_percent(values) for values in _scaled(result, spec.true_slip, 1.0)]
+        estimates = {o: slip_in_percent(values) for o, values in _estimates(result, spec, "slip", 1.0).items()}
+        settled = result.time >= spec.evaluate_after
+        limits = value_limits([v[settled] for v in true], [v[settled] for v in estimates.values()])
+        shade_zones(ax, spec)
+        _draw(ax, result, true, limits, "true", TRUE_LINE)
+        _draw_estimates(ax, result, spec, estimates, limits)
+        _indicator_strips(ax, result, spec, limits)
+        ax.set_ylabel("Slip [%]")
 
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return recorded(result, spec.true_slip) is not None or any_estimate(result, spec, "slip", "slip_indicator")
 
-
-class AdhesionPanel(Panel):
-    """Adhesion force."""
+class AdhesionPanel(_RunPanel):
+    """True and estimated adhesion force in kN, against time; the estimates' spikes may leave the axis."""
 
     name = "adhesion"
     title = "Adhesion force"
     caption = "True and estimated adhesion force; short spikes may be cut."
     place = 5
+    roles, estimates = ("true_adhesion_force",), ("adhesion_force",)
 
-    @staticmethod
-    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
-        return adhesion_figure(result, spec, ax)
-
-    @staticmethod
-    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
-        return recorded(result, spec.true_adhesion_force) is not None or any_estimate(result, spec, "adhesion_force")
+    @classmethod
+    def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
+        true = _scaled(result, spec.true_adhesion_force, 1e-3)
+        estimates = _estimates(result, spec, "adhesion_force", 1e-3)
+        limits = value_limits(true, list(estimates.values()))
+        shade_zones(ax, spec)
+        true_line = TRUE_LINE_ABOVE if any(map(is_noisy, estimates.values())) else TRUE_LINE
+        _draw(ax, result, true, limits, "true", true_line)
+        _draw_estimates(ax, result, spec, estimates, limits)
+        ax.set_ylabel("Adhesion force [kN]")
+        ax.ticklabel_format(axis="y", useOffset=False)  # a force that does not change has no scale of its own

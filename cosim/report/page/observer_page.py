@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim.drawing.style import png
-from cosim.report.figures.error_figures import speed_error_figure
+from cosim.report.figures.error_figures import SpeedErrorPanel
 from cosim.report.figures.observers_figure import observers_picture
 from cosim.report.page.page_files import explained, write_files
 from cosim.report.page.render import render
@@ -95,7 +95,7 @@ def _over_time(benchmark: BenchmarkScores) -> bytes | None:
     names = {signal.name.partition(".")[0] for signal in result.signals}
     spec = benchmark.labelled_spec()
     shown = replace(spec, observers=[name for name in spec.observers if name in names])
-    return png(speed_error_figure(result, shown).figure)
+    return png(SpeedErrorPanel.draw(result, shown).figure)
 
 
 def _merged_result(benchmark: BenchmarkScores) -> Result | None:

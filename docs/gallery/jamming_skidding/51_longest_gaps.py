@@ -15,7 +15,7 @@ from turned_faults import turned
 from cosim import Scenario
 from cosim.drawing.style import new_figure
 from cosim.evaluation.balise_gaps import gap_errors, largest
-from cosim.report.figures.gap_figure import gap_error_figure
+from cosim.report.figures.gap_figure import GapErrorsPanel
 
 JAMS, SKIDS, MICRO_JAMS, LONGEST = "426-418", "426-420", "426-437", "426-391"  # groups at which these gaps begin
 WHAT = {
@@ -52,7 +52,7 @@ def main() -> None:
         what = f"jams and skids turned, largest of {len(found.gaps)} gaps: {found.labels[name]}"
         sheet.add(what, "m", None, largest(errors), WHY, repeats=0.05)
     figure = new_figure((9.0, 4.6))
-    gap_error_figure(outcome.result, outcome.spec, figure.add_subplot())
+    GapErrorsPanel.draw(outcome.result, outcome.spec, figure.add_subplot())
     sheet.finish(figure)
 
 

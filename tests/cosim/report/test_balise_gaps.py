@@ -8,7 +8,7 @@ import pytest
 
 from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors, rows_before
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.gap_figure import gap_error_figure
+from cosim.report.figures.gap_figure import GapErrorsPanel
 from cosim.report.page.gaps import gaps_table
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.run.outcome import Outcome
@@ -125,7 +125,7 @@ def test_summary_table_and_measures_tell_the_same() -> None:
 @pytest.mark.parametrize(("kinds", "longest"), [(("true",) * 4, 800.0), (("true", "true", "missed", "missed"), 100.0)])
 def test_the_figure_of_gaps_begins_at_zero(kinds: tuple[str, ...], longest: float) -> None:
     """Balises at one distance, 100 m, were once marked 0 on an axis of 1e-10 m."""
-    ax = gap_error_figure(run(kinds=kinds), SPEC)
+    ax = GapErrorsPanel.draw(run(kinds=kinds), SPEC)
     assert ax.get_xlim() == pytest.approx((0.0, 1.05 * longest))
     ax.figure.canvas.draw()
     assert ax.xaxis.get_major_formatter().get_offset() == ""

@@ -11,7 +11,7 @@ from cosim.evaluation.consistency_table import consistency_table
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.consistency_figure import NeesPanel, NisPanel, nees_figure, nis_figure
+from cosim.report.figures.consistency_figure import NeesPanel, NisPanel
 from cosim.report.page.run_page import report_page
 from cosim.results.result import Result
 from cosim.results.result_data import SignalInfo
@@ -107,8 +107,8 @@ def test_the_report_shows_it() -> None:
     assert NisPanel.available(result, SPEC)
     assert not NisPanel.available(run(nis=False), SPEC)
     assert NeesPanel.available(run(nis=False, covariance=False), SPEC)
-    assert nis_figure(result, SPEC).get_yscale() == "log"
-    assert len(nees_figure(run(covariance=False), SPEC).lines) == 3  # the line at 1, and two quantities
+    assert NisPanel.draw(result, SPEC).get_yscale() == "log"
+    assert len(NeesPanel.draw(run(covariance=False), SPEC).lines) == 3  # the line at 1, and two quantities
     text = consistency_table(filter_consistency(result, SPEC), SPEC).text()
     heading, _, row = text.splitlines()[:3]
     assert heading.startswith("filter consistency  judged by")
@@ -142,7 +142,7 @@ def test_sweeps_have_measures_that_are_one_for_a_consistent_filter() -> None:
 
 def test_the_share_in_the_legend_is_that_of_the_curve_that_is_drawn() -> None:
     def share(told: float) -> float:
-        (curve,) = [c for c in nis_figure(run(told), SPEC).get_lines() if "inside" in str(c.get_label())]
+        (curve,) = [c for c in NisPanel.draw(run(told), SPEC).get_lines() if "inside" in str(c.get_label())]
         return float(str(curve.get_label()).split(": ")[1].split(" %")[0])
 
     assert 90.0 < share(1.0) < 99.0

@@ -29,7 +29,7 @@ from cosim.report.figures.main_picture import main_picture
 from cosim.report.figures.other_trains_figure import OtherTrainsPanel
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import FIGURES, draw_all, panels
-from cosim.report.figures.run_figures import SpeedPanel, adhesion_figure, slip_figure
+from cosim.report.figures.run_figures import AdhesionPanel, SlipPanel, SpeedPanel
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.render import first_sentence
 from cosim.report.page.run_page import report_page, write_report
@@ -202,7 +202,7 @@ def test_a_locked_wheel_does_not_squash_the_slip_of_the_others() -> None:
     wild = synthetic_result()
     for observer in OBSERVERS:
         wild.table[f"{observer}.slip"][len(wild.table) // 2 :] = -43.0
-    low, high = slip_figure(wild, replace(synthetic_spec(), true_slip=None)).get_ylim()
+    low, high = SlipPanel.draw(wild, replace(synthetic_spec(), true_slip=None)).get_ylim()
     assert -150.0 < low < high < 150.0
 
 
@@ -212,7 +212,7 @@ def test_a_force_that_does_not_change_is_drawn_without_an_offset() -> None:
     for name in still.table.dtype.names or ():
         if name.endswith("adhesion_force"):
             still.table[name] = -0.8 + 1e-13 * np.sin(still.time)
-    axes = adhesion_figure(still, synthetic_spec())
+    axes = AdhesionPanel.draw(still, synthetic_spec())
     low, high = axes.get_ylim()
     assert high - low > 1e-8
     png(axes.figure)
@@ -408,12 +408,12 @@ def test_a_figure_that_fails_is_left_out(monkeypatch: pytest.MonkeyPatch, caplog
     class BrokenPanel(Panel):
         name, title, caption = "test_broken", "Broken", "Nothing."
 
-        @staticmethod
-        def available(_result: Result, spec: ReportSpec) -> bool:
+        @classmethod
+        def available(cls, _result: Result, spec: ReportSpec) -> bool:
             return bool(spec.no_such_role)  # type: ignore[attr-defined]
 
-        @staticmethod
-        def draw(_result: Result, _spec: ReportSpec, _ax: Axes | None) -> Axes:
+        @classmethod
+        def plot(cls, _result: Result, _spec: ReportSpec, _ax: Axes) -> None:
             raise AssertionError
 
     monkeypatch.setitem(FIGURES, "test_broken", BrokenPanel)

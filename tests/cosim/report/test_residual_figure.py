@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.residual_figure import FLOOR, ResidualsPanel, residual_figure
+from cosim.report.figures.residual_figure import FLOOR, ResidualsPanel
 from cosim.report.page.run_page import report_page
 from cosim.results.formats.format import bare
 from cosim.results.result import Result
@@ -23,7 +23,7 @@ def run() -> Result:
 
 
 def test_residuals_that_cross_their_thresholds_are_named_and_none_is_below_the_floor() -> None:
-    axes = residual_figure(run(), ReportSpec(observers=["a"], true_fault="fault"))
+    axes = ResidualsPanel.draw(run(), ReportSpec(observers=["a"], true_fault="fault"))
     named = [line.get_label() for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
     assert named == ["two wheels", "threshold"]
     assert min(float(np.min(line.get_ydata())) for line in axes.get_lines()) == FLOOR
