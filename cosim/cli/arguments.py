@@ -18,6 +18,19 @@ PLAIN_JSON = argument("--json", action="store_true", help="print JSON")
 PARAMETERS_FILE = argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
 
 
+MANY_RUNS = (
+    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1)"),
+    argument(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="run on the workers of this scheduler of dask.distributed instead",
+    ),
+    argument("--resume", action="store_true", help="take over the runs that are done in the folder already"),
+    argument("--retry", action="store_true", help="with --resume: run all again that failed"),
+)
+"""Arguments of every command that runs many; see `cosim.runs`."""
+
+
 def settings_argument(text: str = OVERRIDES) -> Argument:
     """The argument ``--set``, whose words become ``options.settings``.
 

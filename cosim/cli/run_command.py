@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import QUIET, positive, scenario_arguments
+from cosim.cli.arguments import MANY_RUNS, QUIET, positive, scenario_arguments
 from cosim.cli.output import ignore, print_json, print_notice, print_paths, print_warning, texts_of
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
@@ -33,6 +33,8 @@ from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
 CALL_LOG = "calls.log"
+SEEDS = "seeds"
+"""Folder of the sweep over seeds, among the results."""
 
 PARSER = {
     "description": "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP).",
@@ -53,8 +55,12 @@ ARGUMENTS = (
         help="seed of the run: all chance",
     ),
     argument(
-        "--seeds", type=positive, metavar="N", help="also run the seeds 0 to N - 1 and report medians and quartiles"
+        "--seeds",
+        type=positive,
+        metavar="N",
+        help="also run the seeds 0 to N - 1, a sweep in the folder seeds, and report medians and quartiles",
     ),
+    *MANY_RUNS,
     argument("--json", action="store_true", help="print the summary as JSON instead of the table"),
     argument("--no-report", action="store_true", help="write result files only"),
     argument(
@@ -92,9 +98,9 @@ def execute(options: argparse.Namespace) -> int:
     outcome, paths = results.outcome, results.paths
     study = None
     if options.seeds and outcome.failure is None:
-        study = _study(scenario, options, directory / studies.SEEDS_CSV)
+        study = _study(scenario, options, directory / SEEDS)
         outcome = outcome.with_summary(seed_study=study.to_data())
-        paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / studies.SEEDS_CSV}
+        paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / SEEDS / "index.csv"}
     _print(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
     if outcome.failure is not None:
         return ERROR
@@ -170,13 +176,21 @@ def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) 
     return directory / CALL_LOG
 
 
-def _study(scenario: Scenario, options: argparse.Namespace, path: Path) -> Any:
+def _study(scenario: Scenario, options: argparse.Namespace, directory: Path) -> Any:
     def report(done: int, count: int) -> None:
         if not (options.quiet or options.json) and sys.stderr.isatty():
             print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
 
-    with studies.seed_file(path) as done:
-        return studies.seed_study(scenario.copy().master(log_calls=False), range(options.seeds), report, done)
+    return studies.seed_study(
+        scenario.copy().master(log_calls=False),
+        range(options.seeds),
+        report,
+        workers=options.workers,
+        directory=directory,
+        resume=options.resume,
+        retry=options.retry,
+        scheduler=options.scheduler,
+    )
 
 
 def _print(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:

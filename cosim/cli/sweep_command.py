@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import QUIET, scenario_arguments
+from cosim.cli.arguments import MANY_RUNS, QUIET, scenario_arguments
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
 from cosim.results.results_folder import check_writable
@@ -45,10 +45,9 @@ ARGUMENTS = (
     ),
     argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists"),
     argument("--seed", type=int, default=0, help="of the points (default: 0)"),
-    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)"),
     argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)"),
     argument("--table-only", action="store_true", help="keep the table, and no results folder for each run"),
-    argument("--resume", action="store_true", help="take over the runs that are done in the folder already"),
+    *MANY_RUNS,
     argument("--json", action="store_true", help="print the table as JSON"),
     QUIET,
 )
@@ -73,6 +72,8 @@ def execute(options: argparse.Namespace) -> int:
             directory=directory.absolute(),
             folders=not options.table_only,
             resume=options.resume,
+            retry=options.retry,
+            scheduler=options.scheduler,
         )
     if options.by is not None:
         studies.write_groups(result, options.by, directory)

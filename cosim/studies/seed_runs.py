@@ -1,13 +1,11 @@
-"""Studies: one scenario over several seeds, medians and quartiles of the errors, beside published numbers.
-
-Of each seed only its row is kept, so memory does not grow with the number of runs.
-"""
+"""Studies: one scenario over several seeds, a sweep; medians and quartiles of the errors, beside published numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +13,9 @@ import numpy as np
 from cosim.errors import RunError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
+from cosim.run.signal_roles import report_spec
+from cosim.runs.engine import Progress
+from cosim.studies.measures import error_measures
 from fmus.tables.numbers import error_number
 from fmus.text_table import text_table
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from cosim.simulation.scenario import Scenario
 
 _QUARTILES = (25.0, 50.0, 75.0)
+_ERROR = ".speed_error_max"
 
 
 @dataclass(frozen=True)
@@ -119,41 +121,63 @@ class SeedStudy:
 def seed_study(
     scenario: Scenario,
     seeds: Iterable[int],
-    progress: Callable[[int, int], None] | None = None,
-    done: Callable[[SeedRow], None] | None = None,
+    progress: Progress | None = None,
+    *,
+    workers: int = 1,
+    directory: Path | None = None,
+    resume: bool = False,
+    retry: bool = False,
+    scheduler: str | None = None,
 ) -> SeedStudy:
-    """Run a scenario once for each seed. One that fails is kept as a failure and does not stop the others.
+    """Run a scenario once for each seed: a sweep over ``seed``. One that fails is kept as a failure and does not stop
+    the others.
 
     Args:
         scenario: that leaves something to chance.
         seeds: seeds to run.
         progress: called with the number done and the number in all.
-        done: called with the row of each seed as soon as it is there.
+        workers: processes at a time. directory: of journal and table; None for none.
+        resume: whether seeds are taken over that stand in the journal. retry: whether all that failed are run again.
+        scheduler: address of a scheduler of `dask.distributed` whose workers do the runs.
 
     Returns:
         The study.
 
     Raises:
-        ScenarioError: there are no seeds. RunError: every seed failed.
+        ScenarioError: there are no seeds. RunError: every seed failed, or the cluster cannot be used.
     """
-    chosen = list(seeds)
-    spec: ReportSpec | None = None
-    rows: list[SeedRow] = []
-    sweep = scenario.copy().set("certificates", "ignore").vary({"seed": chosen})
     # what is doubtful is said once, by the scenario's own run, and not for every seed
-    for run in sweep.each(progress=progress):
-        spec = spec or (None if run.outcome is None else run.outcome.spec)
-        rows.append(SeedRow(chosen[run.number], _errors(run.outcome), run.failure))
-        if done is not None:
-            done(rows[-1])
-    if spec is None or all(row.failure is not None for row in rows):
+    sweep = scenario.copy().set("certificates", "ignore").vary({"seed": list(seeds)})
+    result = sweep.run(
+        workers,
+        progress=progress,
+        keep=False,
+        directory=directory,
+        folders=False,
+        resume=resume,
+        retry=retry,
+        scheduler=scheduler,
+        measures=seed_measures,
+    )
+    rows = [SeedRow(run.settings["seed"], _errors(run.measures), run.failure) for run in result.runs]
+    if all(row.failure is not None for row in rows):
         raise RunError(f"No seed could be run to its end. Seed {rows[0].seed}: {rows[0].failure}")
-    return SeedStudy(spec, rows)
+    return SeedStudy(report_spec(scenario.table()), rows)
 
 
-def _errors(outcome: Outcome | None) -> dict[tuple[str, str], float]:
-    if outcome is None:
-        return {}
+def seed_measures(outcome: Outcome) -> dict[str, float]:
+    """The measures of a sweep, and for each observer and phase ``observer.phase.speed_error_max`` [m/s]; none for a
+    phase that the run did not reach.
+
+    Args:
+        outcome: of the run of a seed.
+    """
     sizes = ((row.observer, row.phase, row.speed) for row in phase_metrics(outcome.result, outcome.spec))
-    # NaN: the run ended before this phase
-    return {(o, phase): size.max_abs for o, phase, size in sizes if size is not None and not isnan(size.max_abs)}
+    errors = {f"{o}.{phase}{_ERROR}": s.max_abs for o, phase, s in sizes if s is not None and not isnan(s.max_abs)}
+    return error_measures(outcome) | errors
+
+
+def _errors(measures: Mapping[str, float]) -> dict[tuple[str, str], float]:
+    """Errors by observer and phase, out of the measures of a seed."""
+    parts = {name.removesuffix(_ERROR).partition("."): value for name, value in measures.items() if _ERROR in name}
+    return {(observer, phase): value for (observer, dot, phase), value in parts.items() if dot}

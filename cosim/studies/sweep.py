@@ -1,33 +1,32 @@
-"""A sweep: one scenario run many times with some values changed, here or in several processes. Touches the folder it is
+"""A sweep: one scenario run many times with some values changed: a study of `cosim.runs`. Touches the folder it is
 given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.run.described_components import describe_component
-from cosim.run.outcome import INTERRUPTED, Outcome
+from cosim.run.outcome import Outcome
+from cosim.runs.engine import Done, Progress, run_jobs
+from cosim.runs.executors import make_executor
+from cosim.runs.job import Ended, Job
+from cosim.runs.journal import Journal
+from cosim.runs.run import Run, whole
+from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.override import CASE
 from cosim.studies.measures import Measure, error_measures, own_measures
-from cosim.studies.runnable import RunnableScenario
 from cosim.studies.sampling_plans import Mode, Range, Variation, variations
-from cosim.studies.sweep_files import run_folder, write_index, write_run
-from cosim.studies.sweep_journal import SweepJournal
+from cosim.studies.sweep_files import run_folder, write_index, write_outcome
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
-from cosim.studies.workers import Died, Raised, attempt, in_processes
 
-Progress = Callable[[int, int], None]
-
-
-class _Job(NamedTuple):
-    scenario: RunnableScenario
-    settings: Variation
+Measures = Callable[[Outcome], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -61,35 +60,27 @@ class Sweep:
         return scenario
 
     def each(
-        self, workers: int = 1, progress: Progress | None = None, without: Container[int] = ()
+        self, workers: int = 1, progress: Progress | None = None, scheduler: str | None = None
     ) -> Iterator[SweepRun]:
         """Run all variations and hand each over as soon as it is done, so that none needs to be kept.
 
         Args:
-            workers: processes at a time; 1 runs in this process. In processes of their own, a run that crashes fails
-                alone; results do not depend on their number.
+            workers: processes at a time; results do not depend on their number. A single one is this process, or where
+                the scenario calls FMUs of others a process of its own, so that a run that crashes fails alone.
             progress: called with the number done and the number in all.
-            without: numbers of variations that are not run.
+            scheduler: address of a scheduler of `dask.distributed` whose workers do the runs.
 
         Yields:
-            The runs, in order with one worker, as they come with several.
+            The runs, as they end.
 
         Raises:
-            ScenarioError: `workers` is less than 1. KeyboardInterrupt: a run was interrupted; it has been handed over.
+            ScenarioError: `workers` is less than 1. RunError: the cluster cannot be used.
+            KeyboardInterrupt: a run was interrupted; it has been handed over.
         """
-        if workers < 1:
-            raise ScenarioError(f"A sweep needs at least one worker (got workers={workers}).")
-        numbers = [number for number in range(len(self)) if number not in without]
-        jobs = [_Job(self.scenario, self.variations[number]) for number in numbers]
-        one_by_one = ((place, attempt(_run, job)) for place, job in enumerate(jobs))
-        results = one_by_one if workers == 1 else in_processes(_run, jobs, workers)
-        for done, (place, found) in enumerate(results, start=len(self) - len(jobs) + 1):
-            if progress is not None:
-                progress(done, len(self))
-            run = _entry(numbers[place], self.variations[numbers[place]], found)
-            yield run
-            if run.failure == INTERRUPTED:  # who interrupts a run of a sweep means the sweep
-                raise KeyboardInterrupt
+        jobs = self._jobs(whole, "")
+        with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
+            for done in run_jobs(jobs, executor, progress=progress):
+                yield SweepRun(done.number, done.job.settings, done.row, _reason(done))
 
     def run(
         self,
@@ -102,50 +93,117 @@ class Sweep:
         directory: str | Path | None = None,
         folders: bool = True,
         resume: bool = False,
+        retry: bool = False,
+        scheduler: str | None = None,
+        measures: Measures = error_measures,
     ) -> SweepResult:
         """Run all variations; one that fails does not stop the others.
 
         Args:
-            workers: processes at a time; 1 runs in this process. A script that uses more needs
+            workers: processes at a time, see `each`. A script whose own classes are run in them needs
                 ``if __name__ == "__main__":``.
-            progress: called with the number done and the number in all.
+            progress: called with the number done and the number in all, once a run is in the table.
             measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
             units: of these numbers, by name, for pictures.
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
-            directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at
-                the end, also where the sweep is interrupted.
-            folders: write a results folder for each run; without them `directory` holds the table only.
-            resume: take the runs over that an earlier sweep left in `directory`, where scenario, settings and files are
-                the same; those that failed are run again.
+            directory: where the journal ``runs.jsonl`` gets a line for each run as soon as it is done, and each run is
+                written, ``run_000``, ``run_001``, ..., with an index at the end, also where the sweep is interrupted.
+            folders: write a results folder for each run; without them `directory` holds journal and table only.
+            resume: take the runs over that an earlier sweep left in `directory`, where scenario, settings and the
+                content of files are the same, unless they failed for a reason outside, such as an interruption.
+            retry: with `resume`, run all again that failed.
+            scheduler: address of a scheduler of `dask.distributed` whose workers do the runs: ``tcp://host:8786``.
+            measures: numbers by name that are taken of each outcome where it is run: a function of a module.
 
         Returns:
             The runs in order of the variations, with settings, measures, outcome or failure.
 
         Raises:
             ScenarioError: `workers` is less than 1, or `resume` without a `directory`.
-            OutputError: results cannot be written.
+            OutputError: results cannot be written. RunError: the cluster cannot be used.
         """
         if resume and directory is None:
             raise ScenarioError("A sweep is resumed from its folder: give directory=...")
-        journal = None if directory is None else SweepJournal(Path(directory), self.variations, self.varied)
-        done: dict[int, SweepRun] = {} if journal is None or not resume else journal.read()
-        if journal is not None:
-            journal.begin(done.values())
+        folder = None if directory is None else Path(directory)
+        rows = _Rows(measures, measure or {}, keep, folder, folders)
+        jobs = self._jobs(rows.take, f"{measures.__module__}.{measures.__qualname__}")
         result = SweepResult(self.scenario, self.names, [], dict(units or {}))
-        try:
-            for run in self.each(workers, progress, done.keys()):
-                measured = _measured(run, measure or {})
-                folder = None
-                if directory is not None and folders:
-                    folder = write_run(measured, Path(directory) / run_folder(run.number))
-                done[run.number] = replace(measured, folder=folder, outcome=measured.outcome if keep else None)
-                if journal is not None:
-                    journal.add(done[run.number])
-        finally:
-            result = replace(result, runs=[done[number] for number in sorted(done)])
-            if directory is not None and done:
-                write_index(result, Path(directory))
+        done: dict[int, SweepRun] = {}
+        with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
+            journal = None if folder is None else Journal(folder, resume=resume, retry=retry)
+            try:
+                for each in run_jobs(jobs, executor, journal, reduce=rows.row, fits=rows.fits, progress=progress):
+                    done[each.number] = rows.run(each)
+            finally:
+                result = replace(result, runs=[done[number] for number in sorted(done)])
+                if folder is not None and done:
+                    write_index(result, folder)
         return result
+
+    def _jobs(self, take: Callable[[Outcome], Any], rests_on: str) -> list[Run]:
+        return [Run(self.scenario, settings, take, rests_on) for settings in self.variations]
+
+
+@dataclass
+class _Rows:
+    """What is kept of each run of a sweep: measures, what went wrong in taking them, and where its results are.
+
+    Args:
+        measures: taken of an outcome where it is run. measure: the user's, taken here. keep: whether outcomes stay.
+        directory: of the sweep, or None. folders: whether a results folder is written for each run.
+    """
+
+    measures: Measures
+    measure: Mapping[str, Measure]
+    keep: bool
+    directory: Path | None
+    folders: bool
+    outcomes: dict[int, Outcome] = field(default_factory=dict)
+
+    @property
+    def take(self) -> Callable[[Outcome], Any]:
+        """What is taken of an outcome where it is run: all of it where it is needed here."""
+        return whole if self.keep or self.measure or self._written else self.measures
+
+    @property
+    def _written(self) -> bool:
+        return self.folders and self.directory is not None
+
+    def row(self, number: int, job: Job, ended: Ended) -> dict[str, Any]:
+        """The row of a run; its results are written."""
+        if not isinstance(ended.row, Outcome):
+            return {"measures": ended.row or {}, "faults": [], "folder": None}
+        outcome = ended.row
+        own, faults = own_measures(outcome, self.measure)
+        folder = run_folder(number) if self._written else None
+        if self.directory is not None and folder is not None:
+            write_outcome(outcome, job.settings, self.directory / folder)
+        if self.keep:
+            self.outcomes[number] = outcome
+        return {"measures": {**self.measures(outcome), **own}, "faults": faults, "folder": folder}
+
+    def fits(self, number: int, row: Mapping[str, Any]) -> bool:
+        """Whether the row of an earlier sweep has all that this one takes, and its results the same folder."""
+        written = not self._written or row["folder"] == run_folder(number)
+        return written and set(self.measure) <= set(row["measures"])
+
+    def run(self, done: Done) -> SweepRun:
+        """A run that is done, with the outcome where it is kept."""
+        row = done.row
+        measures = {name: nan if value is None else float(value) for name, value in row["measures"].items()}
+        folder = None if row["folder"] is None or self.directory is None else self.directory / row["folder"]
+        outcome = self.outcomes.get(done.number)
+        return SweepRun(done.number, done.job.settings, outcome, _reason(done), measures, tuple(row["faults"]), folder)
+
+
+def _reason(done: Done) -> str | None:
+    return None if done.failure is None else done.failure.reason
+
+
+def _apart(jobs: Sequence[Run]) -> bool:
+    """Whether a run may take its process along; those that differ in numbers only are alike in this."""
+    worded = [job for job in jobs if any(isinstance(value, str) for value in job.settings.values())]
+    return any(job.apart for job in (*jobs[:1], *worded))
 
 
 def make_sweep(
@@ -195,28 +253,3 @@ def _check_parameters(scenario: RunnableScenario, names: Iterable[str]) -> None:
         table = tables[name]
         if table.recording is None:
             describe_component(name, table, scenario.folder, f"{scenario.where}: components.{name}")
-
-
-def _run(job: _Job) -> Outcome | str:
-    """One run, or why it could not begin. What is doubtful is in the outcome, and not said for every run."""
-    try:
-        return job.scenario.run(overrides=job.settings, warn=_silent)
-    except CosimError as error:
-        return str(error)
-
-
-def _silent(_text: str) -> None: ...
-
-
-def _entry(number: int, settings: Variation, found: Any) -> SweepRun:
-    if isinstance(found, Outcome):
-        return SweepRun(number, settings, found, found.failure)
-    reason = found.reason if isinstance(found, Died | Raised) else str(found)
-    return SweepRun(number, settings, None, reason)
-
-
-def _measured(run: SweepRun, measure: Mapping[str, Measure]) -> SweepRun:
-    if run.outcome is None:
-        return run
-    own, faults = own_measures(run.outcome, measure)
-    return replace(run, measures=error_measures(run.outcome) | own, faults=faults)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from cosim.errors import OutputError
 from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:
+    from cosim.run.outcome import Outcome
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
 _INDEX_CSV, _INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
@@ -26,20 +28,16 @@ def run_folder(number: int) -> str:
     return f"run_{number:03d}"
 
 
-def write_run(run: SweepRun, folder: Path) -> Path | None:
-    """Write the results of a run; None where it has none.
+def write_outcome(outcome: Outcome, settings: Mapping[str, Any], folder: Path) -> None:
+    """Write the results of a run.
 
     Args:
-        run: one run of a sweep.
-        folder: of this run.
+        outcome: of the run. settings: that were changed. folder: of this run.
 
     Raises:
         OutputError: the folder cannot be written.
     """
-    if run.outcome is None:
-        return None
-    run.outcome.with_summary(sweep_settings=dict(run.settings)).write(folder, report=False)
-    return folder
+    outcome.with_summary(sweep_settings=dict(settings)).write(folder, report=False)
 
 
 def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
@@ -52,10 +50,11 @@ def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
     Raises:
         OutputError: the folder cannot be written.
     """
-    runs = [
-        run if run.outcome is None else replace(run, folder=write_run(run, directory / run_folder(run.number)))
-        for run in result.runs
-    ]
+    runs = list(result.runs)
+    for place, run in enumerate(runs):
+        if run.outcome is not None:
+            runs[place] = replace(run, folder=directory / run_folder(run.number))
+            write_outcome(run.outcome, run.settings, directory / run_folder(run.number))
     return write_index(replace(result, runs=runs), directory)
 
 

@@ -12,8 +12,8 @@ from cosim.errors import OutputError, ScenarioError, nearest
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
+from cosim.runs.runnable import RunnableScenario
 from cosim.studies.measures import measure_unit, setting_text, with_unit
-from cosim.studies.runnable import RunnableScenario
 from fmus.tables.numbers import number as number_text
 from fmus.text_table import text_table
 

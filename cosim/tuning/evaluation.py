@@ -18,9 +18,11 @@ import numpy as np
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.results.results_folder import write_results
 from cosim.run.outcome import INTERRUPTED, Outcome
+from cosim.runs.executors import make_executor
+from cosim.runs.job import Job
+from cosim.runs.journal import read_lines, write_line
+from cosim.runs.keys import digest, scenario_content
 from cosim.simulation.scenario import Scenario
-from cosim.studies.sweep_journal import read_lines, scenario_key, write_lines
-from cosim.studies.workers import Died, Raised, Team, attempt
 from cosim.tuning.costs import Cost
 from cosim.tuning.parameters import Tunable
 from cosim.tuning.replays import Replays, make_replays
@@ -50,7 +52,7 @@ class Evaluated:
 
 
 @dataclass(frozen=True)
-class _Job:
+class _Job(Job):
     """One run: recorded to a folder, or judged."""
 
     scenario: Scenario
@@ -58,7 +60,21 @@ class _Job:
     cost: Cost | None = None
     folder: Path | None = None
     observed: str | None = None
-    seed: int | None = None
+    number: int | None = None
+
+    @property
+    def key(self) -> str:
+        """The evaluator keeps keys and journal itself."""
+        return ""
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of the run."""
+        return self.number
+
+    def do(self) -> Evaluated:
+        """Record it, or say what it costs."""
+        return _do(self)
 
 
 class Evaluator:
@@ -83,13 +99,13 @@ class Evaluator:
         self.by_seed, self.tunable, self.cost, self.directory = by_seed, tunable, cost, directory
         self.runs = 0
         self.failures: dict[str, int] = {}
-        self._team = Team(_do, workers) if workers > 1 else None
+        self._executor = make_executor(workers)
         self._journal = directory / JOURNAL
         self._known = {entry["key"]: entry for entry in read_lines(self._journal)} if resume else {}
-        if not resume:
-            if self._journal.is_file() and self._journal.stat().st_size:
-                self._journal.replace(directory / EARLIER)  # whoever forgot to resume has lost nothing
-            write_lines(self._journal, "w", [])
+        directory.mkdir(parents=True, exist_ok=True)
+        if not resume and self._journal.is_file() and self._journal.stat().st_size:
+            self._journal.replace(directory / EARLIER)  # whoever forgot to resume has lost nothing
+        self._journal.touch()
         self._keys: dict[int, str] = {}
         self._bases: dict[int, Scenario] = {}
         self._replays: dict[int, Replays] = {}
@@ -155,7 +171,7 @@ class Evaluator:
             self._note(answer.failure)
             entry = {**label, "candidate": i, "seed": seeds[j], "values": candidates[i], "cost": answer.cost}
             self._known[key] = entry | {"failure": answer.failure, "key": key}
-            write_lines(self._journal, "a", [self._known[key]])
+            write_line(self._journal, self._known[key])
         return found
 
     def _take_known(
@@ -199,12 +215,11 @@ class Evaluator:
 
     def close(self) -> None:
         """Let the worker processes end."""
-        if self._team is not None:
-            self._team.close()
+        self._executor.__exit__(None, None, None)
 
     def _job(self, candidate: Mapping[str, Any] | None, seed: int, observed: str | None = None) -> _Job:
         settings = {} if candidate is None else self.tunable.settings(candidate)
-        return _Job(self._bases[seed], settings, self.cost, observed=observed, seed=seed)
+        return _Job(self._bases[seed], settings, self.cost, observed=observed, number=seed)
 
     def _make_replays(self, seed: int) -> Replays | None:
         candidate = self.by_seed[seed].candidate
@@ -224,11 +239,12 @@ class Evaluator:
             yield others[place], answer
 
     def _in_runs(self, jobs: Sequence[_Job]) -> Iterator[tuple[int, Evaluated]]:
-        answers = ((n, attempt(_do, job)) for n, job in enumerate(jobs))
-        for place, answer in answers if self._team is None else self._team.each(jobs):
+        places = {id(job): place for place, job in enumerate(jobs)}
+        for job, ended in self._executor.each(jobs):
             self.runs += 1
-            if isinstance(answer, Died | Raised):
-                yield place, Evaluated(inf, answer.reason)
+            place, answer = places[id(job)], ended.row
+            if ended.failure is not None:
+                yield place, Evaluated(inf, ended.failure.reason)
                 continue
             if answer.failure == INTERRUPTED:  # who interrupts a run means the search
                 raise KeyboardInterrupt
@@ -237,7 +253,8 @@ class Evaluator:
     def _key(self, seed: int, candidate: Mapping[str, Any] | None) -> str:
         if seed not in self._keys:
             played = "recorded" if self.by_seed[seed].parts is not None else "whole"
-            self._keys[seed] = f"{scenario_key(self.by_seed[seed].whole)} {played} {self.cost.text} {self.cost.signals}"
+            content = scenario_content(self.by_seed[seed].whole)
+            self._keys[seed] = f"{digest(content)} {played} {self.cost.text} {self.cost.signals}"
         said = None if candidate is None else self.tunable.settings(candidate)
         return hashlib.sha256(f"{self._keys[seed]} {json.dumps(said, sort_keys=True)}".encode()).hexdigest()
 

@@ -7,8 +7,8 @@ from inspect import signature
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
+from cosim.runs.journal import write_line
 from cosim.simulation.scenario import Scenario
-from cosim.studies.sweep_journal import write_lines
 from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.identifiability import Directions, covariances, directions, neighbours
 from cosim.tuning.parameters import Tunable
@@ -99,7 +99,7 @@ class Study:
 
     def _search_all(self, searches: int, fixed: Mapping[str, float]) -> bool:
         """Search as often as asked for, or until somebody interrupts; whether somebody did."""
-        write_lines(self.evaluator.directory / ITERATIONS, "w", [])
+        (self.evaluator.directory / ITERATIONS).unlink(missing_ok=True)
         try:
             for seed in range(searches):
                 self._search(seed, self.asked.space.without(fixed), fixed)
@@ -153,7 +153,7 @@ class Study:
             counts.append(optimiser.evaluations)
             best = self._whole(fixed, space.named(optimiser.best))
             entry = label | {"evaluations": optimiser.evaluations, "cost": optimiser.best_cost, "best": best}
-            write_lines(self.evaluator.directory / ITERATIONS, "a", [entry])
+            write_line(self.evaluator.directory / ITERATIONS, entry)
             self.done = [*(s for s in self.done if s.seed != seed), Searched(seed, best, costs, counts)]
 
     def _differentiated(self) -> str:

@@ -25,7 +25,8 @@ from cosim.components.fmi2 import FMI2Component
 from cosim.process import exit_guard, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
 from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page
-from cosim.studies.workers import Died, in_processes
+from cosim.runs.run import Run
+from cosim.runs.workers import Team
 from fmus import cache
 from fmus.toolchain.compile import find_compiler
 from plant_models import PLANTS
@@ -226,17 +227,15 @@ def test_pytest_is_not_green(fmu: Path, tmp_path: Path) -> None:
     assert "test_it.py::test_bad" in done.stderr
 
 
-def run_it(scenario: Scenario) -> Any:
-    return scenario.run().failure
-
-
 @pytest.mark.parametrize(
     ("deed", "words"), [("exits", ": its process ended with exit code 0"), ("hangs", " has not returned for 0.3 s")]
 )
 def test_a_worker_tells_who_took_it_along(fmu: Path, deed: str, words: str) -> None:
-    ((_, answer),) = in_processes(run_it, [hostile(fmu, deed, call_timeout=0.3)], workers=1)
-    assert isinstance(answer, Died)
-    assert answer.reason.startswith(f"component 'bad' in doStep at t = 0.24 s{words}")
+    with Team(1) as team:
+        ((_, ended),) = team.each([Run(hostile(fmu, deed, call_timeout=0.3))])
+    assert ended.failure is not None
+    assert ended.failure.reason.startswith(f"component 'bad' in doStep at t = 0.24 s{words}")
+    assert not ended.failure.outside
 
 
 def test_a_process_that_attaches_a_page_writes_to_that_one(tmp_path: Path) -> None:

@@ -1,13 +1,33 @@
-"""Tasks for processes of their own: importable there by the name of this module."""
+"""Jobs for processes of their own: importable there by the name of this module."""
 
 from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
+from cosim.runs.job import Job
 
-def task(argument: Any) -> Any:
+
+@dataclass(frozen=True)
+class Task(Job):
+    """A function of a module with an argument."""
+
+    function: Callable[[Any], Any]
+    argument: Any = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        return f"{self.function.__qualname__} {self.argument}"
+
+    def do(self) -> Any:
+        return self.function(self.argument)
+
+
+def square(argument: Any) -> Any:
     """Squares a number; ``die``, ``exit``, ``raise`` and ``pickle`` do what they say, or fail to."""
     if argument == "die":
         os.kill(os.getpid(), signal.SIGKILL)

@@ -136,7 +136,7 @@ def test_nothing_is_imported_that_is_not_a_dependency() -> None:
     extras = PROJECT["project"]["optional-dependencies"]
     optional = [
         name
-        for extra in ("hosted", "lmi", "frames", "parquet", "hdf5", "tuning")
+        for extra in ("hosted", "lmi", "frames", "parquet", "hdf5", "tuning", "cluster")
         for name in requirements(extras[extra])
     ]
     required = [name.replace("-", "_") for name in requirements(PROJECT["project"]["dependencies"])]

@@ -10,17 +10,27 @@ from fmus.check.check import LIMIT, Check
 from fmus.check.checks.life_checks import real_names
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, skipped
-from fmus.check.finite_differences import compare, nominal_of
+from fmus.check.finite_differences import compare
 from fmus.check.runner import WARM_UP_STEPS
 
 
-class DirectionalDerivativesCheck(Check, failing=LIMIT, advice="do not use its derivatives", place=18):
+def nominal_of(variable: object) -> float:
+    """The nominal value of a variable, 1 where it declares none."""
+    declared = getattr(variable, "nominal", None)
+    return abs(float(declared)) if declared else 1.0
+
+
+class DirectionalDerivativesCheck(Check):
     """Directional derivatives of the outputs along the inputs between two steps."""
 
     name = "directional derivatives"
+    failing = LIMIT
+    advice = "do not use its derivatives"
+    place = 18
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
+        """Make it."""
         if not context.description.coSimulation.providesDirectionalDerivative:
             return skipped("does not declare providesDirectionalDerivative")
         runner = context.runner

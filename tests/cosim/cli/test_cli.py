@@ -74,7 +74,8 @@ def test_seeds_add_quartiles_to_print_and_report(
     assert study["seeds"] == [0, 1, 2]
     assert row["lower quartile"] <= row["median"] <= row["upper quartile"]
     assert row["published"] == 0.5
-    assert [line.split(",")[0] for line in (tmp_path / "seeds.csv").read_text().splitlines()] == ["seed", "0", "1", "2"]
+    table = (tmp_path / "seeds" / "index.csv").read_text().splitlines()
+    assert [line.split(",")[1] for line in table] == ["seed", "0", "1", "2"]
 
     run, failing = Scenario.run, {"seed": 1}
 

@@ -15,8 +15,8 @@ from scipy import stats
 from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
+from cosim.runs.journal import JOURNAL
 from cosim.studies.groups import grouped, groups_text, mean_of
-from cosim.studies.sweep_journal import JOURNAL
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
 
@@ -131,7 +131,7 @@ def test_a_sweep_goes_on_where_one_ended(swept: SweepResult, tmp_path: Path) -> 
     folder = tmp_path / "s"
     lines = (folder / JOURNAL).read_text().splitlines()
     assert len(lines) == 4
-    failed = json.dumps(json.loads(lines[2]) | {"failure": "stopped"})
+    failed = json.dumps(json.loads(lines[2]) | {"failure": "stopped", "outside": True})
     (folder / JOURNAL).write_text("\n".join([lines[0], lines[1], failed, lines[3][:50]]))
     again: list[float] = []
 

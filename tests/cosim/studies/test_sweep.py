@@ -16,8 +16,8 @@ from cosim.errors import ComparisonError, CosimError, OutputError, RunError, Sce
 from cosim.master.master import Master
 from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
+from cosim.runs.journal import JOURNAL, read_lines
 from cosim.studies.sampling_plans import uniform
-from cosim.studies.seed_rows import seed_file
 from cosim.studies.seed_runs import seed_study
 from cosim.studies.sweep_result import SweepResult
 
@@ -129,11 +129,11 @@ def test_what_is_computed_stays_when_the_sweep_is_interrupted(tmp_path: Path) ->
 
     with pytest.raises(KeyboardInterrupt):
         plant().vary({"train.mass": [70e3, 80e3, 90e3, 100e3]}).run(progress=interrupt, directory=tmp_path)
-    assert sorted(p.name for p in tmp_path.glob("run_*")) == ["run_000", "run_001"]
-    assert [run["settings"] for run in json.loads((tmp_path / "index.json").read_text())["runs"]] == [
-        {"train.mass": 70e3},
-        {"train.mass": 80e3},
-    ]
+    assert sorted(p.name for p in tmp_path.glob("run_*")) == ["run_000", "run_001", "run_002"]
+    journal = [json.loads(line)["settings"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
+    assert journal == [{"train.mass": 70e3}, {"train.mass": 80e3}, {"train.mass": 90e3}]
+    index = json.loads((tmp_path / "index.json").read_text())["runs"]
+    assert [run["settings"] for run in index] == journal
 
 
 def test_outcomes_that_are_not_kept_are_read_from_their_folders(tmp_path: Path) -> None:
@@ -208,7 +208,7 @@ def test_a_study_over_seeds_is_the_sweep_over_them() -> None:
 
 def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = small().set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
-    whole, run, rows = seed_study(scenario, [3, 5, 7]), Scenario.run, []
+    whole, run, key = seed_study(scenario, [3, 5, 7]), Scenario.run, ("observer", "whole run")
 
     def failing(self: Scenario, **arguments: Any) -> Outcome:
         if arguments["overrides"] == {"seed": 5}:
@@ -216,9 +216,8 @@ def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch:
         return run(self, **arguments)
 
     monkeypatch.setattr(Scenario, "run", failing)
-    with seed_file(tmp_path / "seeds.csv") as done:
-        study = seed_study(scenario, [3, 5, 7], None, lambda row: (rows.append(row), done(row)))
-        lines = (tmp_path / "seeds.csv").read_text().splitlines()  # as they come
+    lines: list[list[dict[str, Any]]] = []
+    study = seed_study(scenario, [3, 5, 7], lambda *_: lines.append(read_lines(tmp_path / JOURNAL)), directory=tmp_path)
     assert study.seeds == [3, 7]
     assert study.failures == {5: "the train is lost"}
     assert [row for row in study.each if row.seed != 5] == [row for row in whole.each if row.seed != 5]
@@ -226,10 +225,11 @@ def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch:
     assert "over 2 seeds" in study.text()
     assert "seed 5 failed: the train is lost" in study.text()
     assert [entry["failure"] for entry in study.to_data()["each"]] == [None, "the train is lost", None]
-    assert rows == study.each
-    assert lines[0] == "seed,observer,phase,speed_error_max,failure"
-    assert lines[2] == "5,,,,the train is lost"
-    assert [line.split(",")[0] for line in lines[1:]] == ["3", "5", "7"]
+    assert [len(there) for there in lines] == [1, 2, 3]  # as they come
+    assert [(line["seed"], line["failure"]) for line in lines[2]] == [(3, None), (5, "the train is lost"), (7, None)]
+    assert lines[2][2]["row"]["measures"]["observer.whole run.speed_error_max"] == study.each[2].errors[key]
+    again = seed_study(scenario, [7, 5, 3], directory=tmp_path, resume=True)
+    assert again.each == study.each[::-1]
     with pytest.raises(RunError, match=r"No seed could be run to its end\. Seed 5: the train is lost"):
         seed_study(scenario, [5])
 

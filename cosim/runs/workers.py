@@ -1,0 +1,191 @@
+"""Workers: jobs done in processes of their own, so that one that crashes takes nothing else with it. Knows no
+scenarios.
+
+Processes are started afresh: FMUs are not safe in threads, and a copied process would share their libraries' state.
+They are no processes of `multiprocessing`, which a worker of a cluster may not start, and which run the user's script
+again: here that is done only for jobs whose classes stand in it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from multiprocessing import spawn
+from multiprocessing.connection import Pipe, wait
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from cosim.errors import RunError
+from cosim.process.last_call import make_page
+from cosim.runs.job import Ended, Failure, Job
+
+_STOP_SECONDS = 5.0
+_SERVE = (
+    "import json, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+    "handle, path, page, script = map(json.loads, sys.argv[1:]); sys.path[:] = path; "
+    "from cosim.runs.child import serve; serve(handle, page, script)"
+)
+importing_script = False
+"""Whether this is a worker that is just running the user's script, for its classes."""
+_FROM_OUTSIDE = {-signal.SIGTERM, -signal.SIGINT} | ({-signal.SIGKILL} if hasattr(signal, "SIGKILL") else set())
+"""Exit codes of processes that were ended by somebody else, perhaps by the system for want of memory."""
+
+
+class Team:
+    """Processes that stay for several rounds of jobs; each is started when it is first needed, and replaced when it
+    dies.
+
+    Args:
+        workers: processes at a time.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._idle: list[_Worker] = []
+
+    def each(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Ended]]:
+        """One round.
+
+        Args:
+            jobs: to be done.
+
+        Yields:
+            Jobs with what they left, as they end.
+        """
+        waiting = iter(jobs)
+        busy: list[_Worker] = []
+
+        def occupy() -> None:
+            while len(busy) < self.workers and (job := next(waiting, None)) is not None:
+                busy.append(self._worker_for(job))
+
+        try:
+            occupy()
+            while busy:
+                ready = wait([worker.pipe for worker in busy])
+                for worker in [w for w in busy if w.pipe in ready]:
+                    job, ended = worker.job, worker.answer()
+                    busy.remove(worker)
+                    if worker.dead:
+                        worker.stop()
+                    else:
+                        self._idle.append(worker)
+                    occupy()  # before the answer is used, which may take long
+                    yield job, ended
+        finally:
+            for worker in busy:
+                worker.kill()
+
+    def _worker_for(self, job: Job) -> _Worker:
+        """A process that does this job now; one that does not know the script is exchanged where the job needs it."""
+        data = pickle.dumps(job)
+        script = _script() if b"__main__" in data else {}
+        worker = self._idle.pop() if self._idle else _Worker(script)
+        if script and not worker.script:
+            worker.stop()
+            worker = _Worker(script)
+        worker.give(job, data)
+        return worker
+
+    def close(self) -> None:
+        """Let all processes end."""
+        while self._idle:
+            self._idle.pop().stop()
+
+    def __enter__(self) -> Team:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class _Worker:
+    """One process and the pipe to it.
+
+    Args:
+        script: see `cosim.runs.child.serve`.
+    """
+
+    job: Job
+
+    def __init__(self, script: dict[str, str]) -> None:
+        if importing_script:
+            raise RunError("A script whose own classes run in worker processes needs: if __name__ == '__main__':")
+        self.script, self.dead = script, False
+        self.pipe, theirs = Pipe()
+        self._folder = TemporaryDirectory(prefix="worker-")
+        page = Path(self._folder.name) / "last_call"
+        self._last = make_page(page)
+        words = [json.dumps(value) for value in (theirs.fileno(), sys.path, str(page), script)]
+        self.process = subprocess.Popen([sys.executable, "-c", _SERVE, *words], **_inherited(theirs.fileno()))
+        theirs.close()  # so that the pipe ends when the process does
+
+    def give(self, job: Job, data: bytes) -> None:
+        """Hand it a job; where it has died already, that is found when the answer is read."""
+        self.job = job
+        with suppress(BrokenPipeError, ConnectionResetError):
+            self.pipe.send_bytes(data)
+
+    def answer(self) -> Ended:
+        """What the job left."""
+        try:
+            ended: Ended = pickle.loads(self.pipe.recv_bytes())
+            return ended
+        except (EOFError, ConnectionResetError):
+            self.dead = True
+            return Ended(failure=self._end())
+
+    def _end(self) -> Failure:
+        """How the process ended."""
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(_STOP_SECONDS)
+        if self._last.noted:
+            return Failure(self._last.noted)
+        code = self.process.returncode
+        words = ": ".join(filter(None, (self._last.words(), _how_it_ended(code))))
+        return Failure(words, outside=code in _FROM_OUTSIDE)
+
+    def stop(self) -> None:
+        """Let it end; it has nothing to do."""
+        self.pipe.close()
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(_STOP_SECONDS)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it, whatever it does."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        self.pipe.close()
+        self._folder.cleanup()
+
+
+def _inherited(handle: int) -> dict[str, Any]:
+    """What passes a pipe on to a process."""
+    if sys.platform == "win32":
+        os.set_handle_inheritable(handle, True)
+        return {"close_fds": False}
+    return {"pass_fds": (handle,)}
+
+
+def _script() -> dict[str, str]:
+    """Where the classes of the user's script are found again."""
+    known = spawn.get_preparation_data("worker")
+    return {key: str(value) for key, value in known.items() if key.startswith("init_main_from")}
+
+
+def _how_it_ended(code: int | None) -> str:
+    if code is not None and code < 0:
+        try:
+            return f"its process was ended by the signal {signal.Signals(-code).name}"
+        except ValueError:
+            return f"its process was ended by signal {-code}"
+    return f"its process ended with exit code {code}"

@@ -1,0 +1,141 @@
+"""A cluster on this machine: a scheduler and two workers, one of which is killed midway; the table is the same."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_fmus.events import DEEDS, hostile_fmu
+from worker_tasks import Task, square
+
+from cosim import Scenario
+from cosim.errors import RunError
+from cosim.runs import keys
+from cosim.runs.engine import run_jobs
+from cosim.runs.executors import make_executor
+from cosim.runs.journal import JOURNAL, Journal, read_lines
+from cosim.studies.seed_runs import seed_study
+
+distributed = pytest.importorskip("distributed")
+cluster = pytest.importorskip("cosim.runs.cluster")
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are killed by signals")
+
+
+def started(stack: ExitStack, *words: str, folder: Path) -> subprocess.Popen[bytes]:
+    """A process of the cluster, far from the files of this one; it is gone at the end."""
+    log = stack.enter_context((folder / f"{words[0]}.log").open("ab"))
+    command = [sys.executable, "-m", f"distributed.cli.{words[0]}", *words[1:]]
+    process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
+    stack.callback(process.wait)
+    stack.callback(process.kill)
+    return process
+
+
+@pytest.fixture
+def workers(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address of the scheduler, and two workers."""
+    at = tmp_path / "cluster"
+    at.mkdir()
+    with ExitStack() as stack:
+        started(stack, "dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json", folder=at)
+        while not (at / "s.json").is_file():
+            time.sleep(0.1)
+        more = ["--scheduler-file", "s.json", "--no-dashboard", "--no-nanny", "--nthreads", "1"]
+        both = [started(stack, "dask_worker", *more, "--local-directory", f"w{n}", folder=at) for n in range(2)]
+        with distributed.Client(scheduler_file=str(at / "s.json")) as client:
+            client.wait_for_workers(2, timeout=60)
+            address = client.scheduler.address
+        yield address, both
+
+
+def kill_after(count: int, worker: subprocess.Popen[bytes]) -> Callable[[int, int], None]:
+    return lambda done, _all: worker.kill() if done == count else None
+
+
+MODEL = """
+from neighbour import GROWTH
+class Growing:
+    def __init__(self):
+        self.size = 1.0
+    inputs, outputs = (), ("size",)
+    def step(self, t, inputs, dt):
+        self.size *= 1.0 + GROWTH * dt
+        return {"size": self.size}
+"""
+
+
+def studied(fmu: Path, folder: Path) -> Scenario:
+    """An FMU that may crash, a model in a file that imports another one, and chance."""
+    (folder / "model.py").write_text(MODEL)
+    (folder / "neighbour.py").write_text("GROWTH = 0.5\n")
+    scenario = Scenario(folder=folder, stop=0.5, step=0.01).add("bad", fmu=str(fmu))
+    return scenario.add("growing", model="model.py:Growing")
+
+
+def test_one_of_two_workers_is_killed_and_the_table_is_the_same(
+    workers: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    address, (first, _) = workers
+    deeds = [float(DEEDS.index("crashes" if number in (1, 5) else "nothing")) for number in range(8)]
+    values = {"bad.deed": deeds, "stop": [0.5, 0.5, 0.4, 0.3, 0.2, 0.4, 0.45, 0.1]}
+    sweep = studied(hostile_fmu(tmp_path), tmp_path).vary(values, "zip")
+    measure: Any = {"size": lambda outcome: outcome["growing.size"][-1], "y": lambda outcome: outcome["bad.y"][-1]}
+    here = sweep.run(2, measure=measure)
+    there = sweep.run(measure=measure, scheduler=address, directory=tmp_path / "out", progress=kill_after(2, first))
+    assert [str(row) for row in there.table()] == [str(row) for row in here.table()]
+    assert [run.number for run in there.failed] == [1, 5]
+    assert "component 'bad' in doStep at t = 0.24 s" in str(there[1].failure)
+    for one, other in zip(here.runs, there.runs, strict=True):
+        if one.outcome is not None and other.outcome is not None:
+            np.testing.assert_array_equal(one.outcome.result.table, other.outcome.result.table)
+    assert len(read_lines(tmp_path / "out" / JOURNAL)) == 8
+    kept = tmp_path / "out" / "run_000" / "made_from" / "files"
+    assert sorted(path.name for path in kept.rglob("*.*")) == ["hostile.fmu", "model.py", "neighbour.py"]
+    shipped = sorted(path.name for path in (tmp_path / "cluster").glob("w1/**/cosim-files/*/*"))
+    assert shipped == ["hostile.fmu", "model.py", "neighbour.py"]  # once, for all the runs
+    again = sweep.run(measure=measure, directory=tmp_path / "out", resume=True, keep=False)
+    assert [str(row) for row in again.table()] == [str(row) for row in here.table()]
+
+
+def test_functions_of_the_users_travel_and_seeds_are_the_same(
+    workers: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    address, _ = workers
+    arguments = [1.5, "raise", 2.5, "exit", "pickle"]
+    with make_executor(scheduler=address) as there:
+        found = {d.number: d for d in run_jobs([Task(square, a) for a in arguments], there, Journal(tmp_path))}
+    assert [found[n].row for n in (0, 2)] == [2.25, 6.25]
+    reasons = {n: done.failure.reason for n, done in found.items() if done.failure is not None}
+    assert reasons[1] == "KeyError: 'nothing here'"
+    assert reasons[3] == "its process ended with exit code 3"
+    assert "cannot be passed between processes" in reasons[4]
+    scenario = Scenario.load("freight_profile_d").set("stop", 5.0)
+    assert seed_study(scenario, range(3), scheduler=address).each == seed_study(scenario, range(3)).each
+
+
+def test_other_versions_and_nobody_are_refused_in_words(
+    workers: tuple[str, list[subprocess.Popen[bytes]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address, both = workers
+    monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
+    with pytest.raises(RunError, match=r"scheduler tcp://127\.0\.0\.1:9 cannot be reached"):
+        make_executor(scheduler="tcp://127.0.0.1:9")
+    monkeypatch.setattr(keys, "versions", lambda: {"numpy": "1.0"})
+    keys.version_text.cache_clear()
+    try:
+        with pytest.raises(RunError, match=r'Worker tcp://.* its versions are .*, here they are {"numpy": "1\.0"}'):
+            make_executor(scheduler=address)
+    finally:
+        keys.version_text.cache_clear()
+    for worker in both:
+        worker.kill()
+    with pytest.raises(RunError, match="has no workers"):
+        make_executor(scheduler=address)

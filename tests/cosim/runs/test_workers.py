@@ -1,0 +1,104 @@
+"""Workers: a job that crashes its process fails alone, and everything else is done once."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from worker_tasks import Task, process_id, square
+
+from cosim.runs.engine import run_jobs
+from cosim.runs.job import Failure, perform
+from cosim.runs.journal import Journal
+from cosim.runs.workers import Team
+
+
+def test_one_that_dies_fails_alone_whatever_is_left_to_do() -> None:
+    """The last job dies as well, when no worker is needed any more."""
+    jobs = [Task(square, argument) for argument in [1, "die", "exit", 2, "raise", "pickle", 3, "exit"]]
+    with Team(2) as team:
+        done = list(team.each(jobs))
+    assert sorted(jobs.index(job) for job, _ in done) == [0, 1, 2, 2, 3, 4, 5, 6]  # two of them are equal
+    found = {job.argument: ended for job, ended in done}  # type: ignore[attr-defined]
+    assert [found[n].row for n in (1, 2, 3)] == [1, 4, 9]
+    assert found["die"].failure == Failure("its process was ended by the signal SIGKILL", outside=True)
+    assert found["exit"].failure == Failure("its process ended with exit code 3")
+    assert found["raise"].failure == Failure("KeyError: 'nothing here'")
+    assert "cannot be passed between processes" in str(found["pickle"].failure)
+
+
+def test_it_is_done_elsewhere_and_nobody_is_left_behind_when_the_reader_goes() -> None:
+    with Team(1) as team:
+        rounds = team.each([Task(process_id, n) for n in range(3)])
+        _, ended = next(rounds)
+        assert ended.row != os.getpid()
+        rounds.close()  # type: ignore[attr-defined]
+        with pytest.raises(ProcessLookupError):
+            os.kill(ended.row, 0)
+
+
+def test_what_is_raised_here_is_a_failure_too() -> None:
+    assert perform(Task(square, "raise")).failure == Failure("KeyError: 'nothing here'")
+    assert perform(Task(square, 3)).row == 9
+    with pytest.raises(KeyboardInterrupt):
+        perform(Task(_interrupt))
+
+
+def _interrupt(_: None) -> None:
+    raise KeyboardInterrupt
+
+
+def test_who_is_ended_from_outside_gets_another_try(tmp_path: Path) -> None:
+    jobs = [Task(die_once, str(tmp_path / "tried")), Task(square, 5)]
+    with Team(1) as team:
+        found = {done.number: done for done in run_jobs(jobs, team, Journal(tmp_path))}
+    assert (found[0].row, found[0].failure, found[1].row) == ("alive", None, 25)
+
+
+def die_once(path: str) -> str:
+    if not Path(path).exists():
+        Path(path).touch()
+        square("die")
+    return "alive"
+
+
+SCRIPT = """
+from dataclasses import dataclass
+from cosim.runs.job import Job
+from cosim.runs.workers import Team
+{class_}
+def work():
+    with Team(1) as team:
+        print([ended.row or ended.failure for _, ended in team.each([{job}])])
+{guard}
+    work()
+"""
+OWN = """
+class Mine(Job):
+    key, settings = "", {}
+    def do(self):
+        return "done"
+"""
+
+
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        ({"class_": "from worker_tasks import Task, square", "job": "Task(square, 2)", "guard": "if True:"}, "[4]"),
+        ({"class_": OWN, "job": "Mine()", "guard": "if __name__ == '__main__':"}, "['done']"),
+        ({"class_": OWN, "job": "Mine()", "guard": "if True:"}, "if __name__ == '__main__':"),
+    ],
+    ids=["classes of modules need no guard", "of a script with one", "of a script without"],
+)
+def test_a_script_is_run_again_only_for_its_own_classes(script: dict[str, Any], words: str, tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT.format(**script))
+    here = str(Path(__file__).parents[1])
+    command = [sys.executable, str(tmp_path / "script.py")]
+    done = subprocess.run(
+        command, env=os.environ | {"PYTHONPATH": here}, capture_output=True, text=True, check=False, timeout=100
+    )
+    assert words in done.stdout
