@@ -164,7 +164,7 @@ class Registry(MutableMapping[str, T], Generic[T]):
 
     def _shipped(self) -> Iterator[Member]:
         for room in self.rooms:
-            for path in files_of(room):
+            for path in _files_of(room):
                 module = f"{room}.{path.stem}"
                 for cls, names in _source(module).names.items():
                     target = f"{module}:{cls}"
@@ -242,12 +242,8 @@ def _all_announced(_: tuple[str, ...]) -> EntryPoints:
 
 
 @cache
-def files_of(room: str) -> tuple[Path, ...]:
-    """The files of a package, without those of packages in it, in the order of their names.
-
-    Args:
-        room: name of the package.
-    """
+def _files_of(room: str) -> tuple[Path, ...]:
+    """The files of a package, without those of packages in it, in the order of their names."""
     spec = find_spec(room)
     folders = (spec.submodule_search_locations if spec is not None else None) or ()
     return tuple(path for folder in folders for path in sorted(Path(folder).glob("*.py")) if path.stem != "__init__")
@@ -262,7 +258,7 @@ def lazy_names(room: str) -> Callable[[str], Any]:
     """
 
     def get(name: str) -> Any:
-        files = files_of(room)
+        files = _files_of(room)
         if not name.startswith("_") and name not in {path.stem for path in files}:  # that is a module, not in one
             definition = re.compile(rf"^(?:(?:class |def ){name}\b|(?:\w+, )*{name}\b[^.\n(]*=)", re.MULTILINE)
             for path in files:

@@ -23,7 +23,7 @@ _HORIZON = 20.0  # [s] at unit poles
 
 
 @dataclass(frozen=True)
-class PositionGains:
+class _PositionGains:
     """Gains of sampled positions and what is known of them.
 
     Attributes:
@@ -81,7 +81,7 @@ def sampled_errors(
 
 def design_for_gap(
     max_gap: float, drag_slopes: Sequence[float] = (0.0,), margin: float = 0.1, unit_poles: Sequence[float] = UNIT_POLES
-) -> PositionGains:
+) -> _PositionGains:
     """The fastest gains with poles proportional to `unit_poles` that are certified for every mixture of gaps up to a
     limit.
 
@@ -109,7 +109,7 @@ def design_for_gap(
     certificate = certify_sampled_error(
         errors, max_gap, "four-state error of the augmented observer at the given drag slopes"
     )
-    return PositionGains(tuple(map(float, gains)), float(gains[0]), certificate, noise_to_speed(errors[0], max_gap))
+    return _PositionGains(tuple(map(float, gains)), float(gains[0]), certificate, noise_to_speed(errors[0], max_gap))
 
 
 def noise_to_speed(error: SampledError, gap: float) -> float:

@@ -24,7 +24,7 @@ _SIZE = 1e-3  # weight of the size of the gains in the design [ours]
 
 
 @dataclass(frozen=True)
-class VertexDecrease:
+class _VertexDecrease:
     """Common quadratic Lyapunov function of the vertex errors ``A_i - K_i C``.
 
     Attributes:
@@ -66,7 +66,7 @@ def vertex_errors(model: TakagiSugenoModel, gains: np.ndarray) -> list[np.ndarra
     return [(A - K @ model.C) * T[:, None] / T for A, K in zip(model.A, gains, strict=True)]
 
 
-def vertex_decrease(model: TakagiSugenoModel, gains: np.ndarray) -> VertexDecrease:
+def vertex_decrease(model: TakagiSugenoModel, gains: np.ndarray) -> _VertexDecrease:
     """Seek one P for all vertices by semidefinite programming and recompute what it gives.
 
     Args:
@@ -77,7 +77,7 @@ def vertex_decrease(model: TakagiSugenoModel, gains: np.ndarray) -> VertexDecrea
     conditions = reduce(QuadraticCondition.joined, map(flow_condition, errors))
     found = common_quadratic_form(conditions) if abscissa < 0.0 else None
     margin = -inf if found is None else -float(decrease(conditions, found.P).max())
-    return VertexDecrease(margin, abscissa)
+    return _VertexDecrease(margin, abscissa)
 
 
 def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:

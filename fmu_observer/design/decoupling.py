@@ -13,7 +13,7 @@ import numpy as np
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.observer_model import ObserverModel
-from fmu_observer.models.suitability import require_unknown_inputs
+from fmu_observer.models.suitability import require_linear
 from fmu_observer.observability import MeasuredSystem, require_detectable, unobservable_modes
 from fmu_observer.observability.modes import unobservable_subspace
 
@@ -75,7 +75,7 @@ def decoupling_condition(model: ObserverModel) -> Condition:
     Raises:
         ValueError: the model is nonlinear or declares no unknown inputs.
     """
-    require_unknown_inputs(model, "Decoupling")
+    _require_unknown_inputs(model, "Decoupling")
     H = np.asarray(model.H)
     seen, whole = _decoupling_ranks(H, model.C)
     values: dict[str, float] = {"rank_CH": seen, "rank_H": whole}
@@ -98,7 +98,7 @@ def require_decoupling(model: ObserverModel, observer: str) -> None:
         UnobservableError: an invariant zero does not decay; the message says in which states it lies.
         ValueError: the model is nonlinear, declares no unknown inputs, or the measurements do not show them at once.
     """
-    require_unknown_inputs(model, observer)
+    _require_unknown_inputs(model, observer)
     H = np.asarray(model.H)
     seen, whole = _decoupling_ranks(H, model.C)
     if seen < whole:
@@ -135,3 +135,13 @@ def decoupled_gain(model: ObserverModel, poles: Sequence[float] | np.ndarray) ->
     if len(poles) < seen.shape[1]:
         raise ValueError(f"Decoupling: got {len(poles)} poles, expected {seen.shape[1]}, one for each mode to place.")
     return np.asarray(seen @ observer_gain(seen.T @ free @ seen, C @ seen, np.asarray(poles)[: seen.shape[1]]))
+
+
+def _require_unknown_inputs(model: ObserverModel, observer: str) -> None:
+    """The model is linear and declares unknown inputs."""
+    require_linear(model, observer, "thau")
+    if not model.unknown_inputs:
+        raise ValueError(
+            f"{observer}: model {model.name!r} declares no unknown inputs. Use 'luenberger', or give an ObserverModel "
+            f"with unknown_inputs and the matrix H by which they act."
+        )

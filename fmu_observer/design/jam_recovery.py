@@ -19,7 +19,7 @@ _NEGLIGIBLE, _LONGEST = 1e-9, 5000  # of what is left of an error; periods until
 
 
 @dataclass(frozen=True)
-class RecoveryBounds:
+class _RecoveryBounds:
     """What is proven of `RepairedRules` on a wheel that rolls for good.
 
     Attributes:
@@ -64,7 +64,7 @@ def recovery_bounds(
     rate_error: float = 0.2,
     curvature: float = 1e-3,
     aggregated: bool = False,
-) -> RecoveryBounds:
+) -> _RecoveryBounds:
     """The bounds for the gains and parameters in use, the innovation held between samples.
 
     Args:
@@ -82,14 +82,14 @@ def recovery_bounds(
     return _recovery(p, onset_error, settling, float(p.odometer_period) if aggregated else 0.0)
 
 
-def _recovery(p: Any, onset_error: float, settling: tuple[float, float, float], late: float) -> RecoveryBounds:
+def _recovery(p: Any, onset_error: float, settling: tuple[float, float, float], late: float) -> _RecoveryBounds:
     """The bounds of an estimate that settles so, with readings that come so much later [s]."""
     period, noise, theta = float(p.odometer_period), float(p.odometer_noise), float(doubt_limit(p) / p.residual_gain)
     steady, settle, radius = settling
     quiet = settle + float(p.settle_samples) * period
     hold = period * ceil(float(p.hold_limit) / period - 1e-9) + period
     trust = max(quiet, settle + float(p.trust_time) + period)
-    return RecoveryBounds(
+    return _RecoveryBounds(
         agrees=onset_error + noise <= theta,
         agreement=float(p.recover_samples) * period + late,
         settles=settle < inf,

@@ -16,7 +16,7 @@ from fmu_observer.design.pole_placement import observer_gain
 
 
 @dataclass(frozen=True)
-class SylvesterDesign:
+class _SylvesterDesign:
     """Matrices of ``dz = A z + B_c y_c + B_d w + T G u`` with z standing for ``T x``.
 
     Attributes:
@@ -66,7 +66,7 @@ def sylvester_residual(F: np.ndarray, A: np.ndarray, B: np.ndarray, T: np.ndarra
 
 def sylvester_design(
     F: np.ndarray, unmeasured: int, poles: Sequence[float] | np.ndarray, states: Sequence[str] = (), name: str = ""
-) -> SylvesterDesign:
+) -> _SylvesterDesign:
     """A and B for given poles by the reduced-order observer, and T from the Sylvester equation [ours].
 
     With L placing the poles of ``A = F_11 - L F_21`` the unmeasured part less L times the measured one is such a
@@ -88,4 +88,4 @@ def sylvester_design(
     L = observer_gain(F11, F21, poles, names, name or "Sylvester design")
     A = F11 - L @ F21
     B = F12 - L @ F22 + A @ L
-    return SylvesterDesign(A, B, sylvester_transformation(F, A, B))
+    return _SylvesterDesign(A, B, sylvester_transformation(F, A, B))

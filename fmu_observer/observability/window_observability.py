@@ -12,7 +12,7 @@ _TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below i
 _PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it
 
 
-class WindowObservability(NamedTuple):
+class _WindowObservability(NamedTuple):
     """What a window tells of the state in its first row.
 
     Attributes:
@@ -43,7 +43,7 @@ class WindowObservability(NamedTuple):
         return "the combination " + " ".join(f"{value:+.3g} {name}" for name, value in parts)
 
 
-def window_observability(model: FilterModel, known: Known, period: float, rows: int) -> WindowObservability:
+def window_observability(model: FilterModel, known: Known, period: float, rows: int) -> _WindowObservability:
     """What a number of full rows tell of the state in the first of them, along the model's own way without noise.
 
     Args:
@@ -64,4 +64,4 @@ def window_observability(model: FilterModel, known: Known, period: float, rows: 
     measured = np.vstack(seen)
     _, values, directions = np.linalg.svd(measured)
     rank = int(np.sum(values > _TOLERANCE * values[0])) if values[0] > 0.0 else 0
-    return WindowObservability(measured, rank, directions[rank:].T, tuple(s.name for s in model.states))
+    return _WindowObservability(measured, rank, directions[rank:].T, tuple(s.name for s in model.states))

@@ -15,7 +15,7 @@ import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.observer_limits import Limit
-from fmu_observer.observers.gated_observer import is_gate_parameter
+from fmu_observer.observers.innovation_gate import GATE_PARAMETERS
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, Signal
 
@@ -80,7 +80,7 @@ class GapCertified(HybridSystem):
         """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows
         better.
         """
-        return tuple(s for s in self.parameters if s.name != "sample_period" and not is_gate_parameter(s))
+        return tuple(s for s in self.parameters if s.name != "sample_period" and not _is_gate_parameter(s))
 
     def _deciding_values(self, values: Any) -> tuple[tuple[str, float], ...]:
         return tuple(
@@ -111,3 +111,8 @@ def _limits_of(certificate: Certificate) -> tuple[Limit, ...]:
             exact_test="certificate, longest gap up to which one Lyapunov function covers every mixture",
         ),
     )
+
+
+def _is_gate_parameter(signal: Signal) -> bool:
+    """Whether a parameter is one of the gate, which no question of stability depends on."""
+    return signal.name in {s.name for s in GATE_PARAMETERS}

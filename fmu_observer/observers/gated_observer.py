@@ -146,12 +146,3 @@ def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:
 def _judged(event: TriggeredEvent) -> TriggeredEvent:
     accuracy = () if _LOCATION_ACCURACY.name in (s.name for s in event.payload) else (_LOCATION_ACCURACY,)
     return replace(event, payload=(*event.payload, *accuracy), verdict=VERDICT)
-
-
-def is_gate_parameter(signal: Signal) -> bool:
-    """Whether a parameter is one of the gate, which no question of stability depends on.
-
-    Args:
-        signal: a parameter.
-    """
-    return signal.name in {s.name for s in GATE_PARAMETERS}

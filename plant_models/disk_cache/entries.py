@@ -18,7 +18,7 @@ LOG = logging.getLogger("plant_models")
 FORMAT = "fmu-observer cache 1"
 
 
-class DamagedEntryError(ValueError):
+class _DamagedEntryError(ValueError):
     """A file in the cache is not the entry that was looked for; the message says why."""
 
 
@@ -114,13 +114,13 @@ def _checked(content: bytes, kind: str, key: str) -> Any:
         head = json.loads(first)
         found = {name: head[name] for name in ("format", "kind", "key", "sha256")}
     except (ValueError, KeyError, TypeError) as error:
-        raise DamagedEntryError("it has no head, so it is damaged or of another program.") from error
+        raise _DamagedEntryError("it has no head, so it is damaged or of another program.") from error
     text = rest.removesuffix(b"\n")
     expected = {"format": FORMAT, "kind": kind, "key": key, "sha256": _digest(text)}
     wrong = [name for name in expected if found[name] != expected[name]]
     if wrong:
         what = "its content is damaged" if wrong == ["sha256"] else "it is the entry of something else"
-        raise DamagedEntryError(f"{what} ({', '.join(wrong)} differ).")
+        raise _DamagedEntryError(f"{what} ({', '.join(wrong)} differ).")
     return json.loads(text)
 
 

@@ -49,7 +49,7 @@ def seal(path: Path) -> None:
     Raises:
         OSError: the note cannot be written.
     """
-    write_whole(seal_of(path), file_digest(path).encode())
+    write_whole(_seal_of(path), file_digest(path).encode())
 
 
 def is_sealed(path: Path) -> bool:
@@ -60,15 +60,11 @@ def is_sealed(path: Path) -> bool:
         path: of the file.
     """
     try:
-        return seal_of(path).read_text() == file_digest(path)
+        return _seal_of(path).read_text() == file_digest(path)
     except (OSError, ValueError):
         return False
 
 
-def seal_of(path: Path) -> Path:
-    """Where the digest of a file is noted.
-
-    Args:
-        path: of the entry.
-    """
+def _seal_of(path: Path) -> Path:
+    """Where the digest of a file is noted."""
     return path.with_suffix(".sha256")

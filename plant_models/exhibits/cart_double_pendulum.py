@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.exhibits.noisy_plant import NoisyPlant, solved_3
+from plant_models.exhibits.noisy_plant import NoisyPlant, solved_2
 from plant_models.hybrid import Array, input_signal, output_signal, parameter, state
 
 Pair = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
-class DoublePendulumConstants:
+class _DoublePendulumConstants:
     """Constants of section IV.2.2.3.
 
     Attributes:
@@ -36,7 +36,7 @@ class DoublePendulumConstants:
     centrifugal_sign: float = 1.0
 
 
-SECTION_IV_2_2_3 = DoublePendulumConstants()
+SECTION_IV_2_2_3 = _DoublePendulumConstants()
 _MEASURED = (
     output_signal("measured_position", "m", "Measured position of the cart", variability="discrete"),
     output_signal("measured_first_angle", "rad", "Measured angle of the lower rod", variability="discrete"),
@@ -128,7 +128,7 @@ class CartDoublePendulum(NoisyPlant):
         speed = x.cart_speed
         kinetic = 0.5 * (a11 * speed**2 + a22 * first_rate**2 + a33 * second_rate**2)
         coupled = a12 * speed * first_rate + a13 * speed * second_rate + a23 * first_rate * second_rate
-        heights = both_masses(p) * p.first_length * np.cos(first) + p.second_mass * p.second_length * np.cos(second)
+        heights = _both_masses(p) * p.first_length * np.cos(first) + p.second_mass * p.second_length * np.cos(second)
         values = (x.cart_position, speed, first, first_rate, second, second_rate)
         energy = kinetic + coupled + p.gravity * heights
         return dict(zip((s.name for s in self.plain_outputs), (*values, energy), strict=True))
@@ -139,12 +139,8 @@ def _turning(x: Any) -> tuple[Pair, Pair]:
     return (x.lower_angle, x.upper_angle), (x.lower_rate, x.upper_rate)
 
 
-def both_masses(p: Any) -> Array:
-    """What the lower joint carries, ``m1 + 2 m2`` [kg].
-
-    Args:
-        p: constants by the names of `DoublePendulumConstants`.
-    """
+def _both_masses(p: Any) -> Array:
+    """What the lower joint carries, ``m1 + 2 m2`` [kg]."""
     return p.first_mass + 2.0 * p.second_mass
 
 
@@ -153,10 +149,10 @@ def mass_matrix(angles: Pair, p: Any) -> tuple[Array, ...]:
 
     Args:
         angles: of the lower and of the upper rod from upright [rad]. p: constants by the names of
-            `DoublePendulumConstants`.
+            `_DoublePendulumConstants`.
     """
     first, second = angles
-    lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
+    lower, upper = _both_masses(p) * p.first_length, p.second_mass * p.second_length
     return (
         p.cart_mass + p.first_mass + p.second_mass,
         p.coupling_sign * lower * np.cos(first),
@@ -172,10 +168,10 @@ def right_hand_side(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Ar
 
     Args:
         angles: of the lower and of the upper rod from upright [rad]. rates: their derivatives [rad/s].
-        force: on the cart [N]. p: constants by the names of `DoublePendulumConstants`.
+        force: on the cart [N]. p: constants by the names of `_DoublePendulumConstants`.
     """
     (first, second), (first_rate, second_rate) = angles, rates
-    lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
+    lower, upper = _both_masses(p) * p.first_length, p.second_mass * p.second_length
     centrifugal = p.centrifugal_sign * 2.0 * upper * p.first_length * np.sin(second - first)
     return (
         force + lower * first_rate**2 * np.sin(first) + upper * second_rate**2 * np.sin(second),
@@ -189,6 +185,15 @@ def accelerations(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Arra
 
     Args:
         angles: of the lower and of the upper rod from upright [rad]. rates: their derivatives [rad/s].
-        force: on the cart [N]. p: constants by the names of `DoublePendulumConstants`.
+        force: on the cart [N]. p: constants by the names of `_DoublePendulumConstants`.
     """
-    return solved_3(mass_matrix(angles, p), right_hand_side(angles, rates, force, p))
+    return _solved_3(mass_matrix(angles, p), right_hand_side(angles, rates, force, p))
+
+
+def _solved_3(matrix: tuple[Array, ...], right: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    """Solution of a symmetric positive definite system of three equations, the first eliminated, then `solved_2`."""
+    a11, a12, a13, a22, a23, a33 = matrix
+    second, third = a12 / a11, a13 / a11
+    rest = (a22 - second * a12, a23 - second * a13, a33 - third * a13)
+    y, z = solved_2(rest, (right[1] - second * right[0], right[2] - third * right[0]))
+    return (right[0] - a12 * y - a13 * z) / a11, y, z

@@ -13,7 +13,7 @@ from plant_models.hybrid import Array, input_signal, output_signal, parameter, s
 
 
 @dataclass(frozen=True)
-class CartPendulumConstants:
+class _CartPendulumConstants:
     """Constants of Table 4.1.
 
     Attributes:
@@ -30,7 +30,7 @@ class CartPendulumConstants:
     gravity: float = 9.81
 
 
-TABLE_4_1 = CartPendulumConstants()
+TABLE_4_1 = _CartPendulumConstants()
 
 
 class CartPendulum(NoisyPlant):
@@ -117,7 +117,7 @@ def accelerations(speed: Array, angle: Array, rate: Array, force: Array, p: Any)
 
     Args:
         speed: of the cart [m/s]. angle: from upright [rad]. rate: angular speed [rad/s]. force: on the cart [N].
-        p: constants by the names of `CartPendulumConstants`.
+        p: constants by the names of `_CartPendulumConstants`.
     """
     lever, cosine, sine = p.bob_mass * p.length, np.cos(angle), np.sin(angle)
     matrix = (p.cart_mass + p.bob_mass, lever * cosine, lever * p.length + p.inertia)

@@ -114,16 +114,3 @@ def solved_2(matrix: tuple[Array, Array, Array], right: tuple[Array, Array]) -> 
     a, b, c = matrix
     determinant = a * c - b * b
     return (c * right[0] - b * right[1]) / determinant, (a * right[1] - b * right[0]) / determinant
-
-
-def solved_3(matrix: tuple[Array, ...], right: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """Solution of a symmetric positive definite system of three equations, the first eliminated, then `solved_2`.
-
-    Args:
-        matrix: entries 11, 12, 13, 22, 23, 33. right: right-hand side. Scalars or arrays of shape (members,).
-    """
-    a11, a12, a13, a22, a23, a33 = matrix
-    second, third = a12 / a11, a13 / a11
-    rest = (a22 - second * a12, a23 - second * a13, a33 - third * a13)
-    y, z = solved_2(rest, (right[1] - second * right[0], right[2] - third * right[0]))
-    return (right[0] - a12 * y - a13 * z) / a11, y, z

@@ -22,7 +22,7 @@ from plant_models.hybrid.option import require_chosen
 
 
 @dataclass(frozen=True)
-class Regulated:
+class _Regulated:
     """What a feedback controls.
 
     Attributes:
@@ -40,8 +40,8 @@ CART = (
 )
 FORCE = output_signal("force", "N", "Force on the cart", variability="discrete")
 
-REGULATED: dict[str, Regulated] = {
-    "cart_pendulum": Regulated(
+REGULATED: dict[str, _Regulated] = {
+    "cart_pendulum": _Regulated(
         (
             *CART,
             input_signal("angle", "rad", 0.0, "Angle of the pendulum from upright"),
@@ -50,7 +50,7 @@ REGULATED: dict[str, Regulated] = {
         FORCE,
         (-3.143738089, -6.577127557, -75.540804628, -16.018255246),
     ),
-    "cart_double_pendulum": Regulated(
+    "cart_double_pendulum": _Regulated(
         (
             *CART,
             input_signal("first_angle", "rad", 0.0, "Angle of the lower rod from upright"),

@@ -102,7 +102,7 @@ def step(
         moved = EXPLICIT[system.method](derivative, t, h, x[:count])
     else:
         at_rest = _at_rest(system, t, x, u, p, sign)
-        moved = rosenbrock_step(derivative, _given(jacobian, system), t, h, x[:count], at_rest, system.stiff_mask())
+        moved = _rosenbrock_step(derivative, _given(jacobian, system), t, h, x[:count], at_rest, system.stiff_mask())
     return _before_memory(_stopped(system, moved, sign), x, system)
 
 
@@ -128,7 +128,7 @@ EXPLICIT: Mapping[str, Callable[[Derivative, Array, Array, Array], Array]] = {"r
 """Steps that need no Jacobian, by the name of the method."""
 
 
-def rosenbrock_step(
+def _rosenbrock_step(
     derivative: Derivative,
     jacobian: Jacobian,
     t: Array,
@@ -143,11 +143,6 @@ def rosenbrock_step(
     ``x+ = x + h (3 k1 + k2) / 2`` (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456-1480). Linear
     systems, no iteration: the cost is fixed and the step can be generated as straight-line C. The order is 2 with any
     matrix in place of the Jacobian, so that it may be kept to the states that are stiff.
-
-    Args:
-        derivative, jacobian: of the flow with dry friction resolved. t: time at the start [s]. h: step [s].
-        x: continuous states, shape (nc,). at_rest: 1 for those at rest under dry friction, else 0, shape (nc,); None
-            without. stiff: 1 for those treated implicitly, else 0, shape (nc,); None for all.
     """
     J = _linearised(jacobian, t, x, stiff)
     flow = derivative(t, x)

@@ -53,16 +53,12 @@ def named_values(system: HybridSystem, texts: Iterable[str]) -> list[list[int]]:
     Args:
         system: whose parameters and states are meant. texts: of requirements.
     """
-    places = {name: i for i, name in enumerate(value_names(system))}
+    places = {name: i for i, name in enumerate(_value_names(system))}
     return [sorted({places[word] for word in WORD.findall(text) if word in places}) for text in texts]
 
 
-def value_names(system: HybridSystem) -> list[str]:
-    """Names of all that a requirement may be about: the parameters, then the states.
-
-    Args:
-        system: the hybrid system.
-    """
+def _value_names(system: HybridSystem) -> list[str]:
+    """Names of all that a requirement may be about: the parameters, then the states."""
     return list(scalar_names((*system.parameter_signals, *system.states)))
 
 
@@ -80,7 +76,7 @@ def unfulfilled(system: HybridSystem, p: np.ndarray, start: np.ndarray | None = 
         needed = {**needed, **system.start_requirements(system.unpack_states(start), unpacked)}
     for text, fulfilled in needed.items():
         if not fulfilled:
-            names, (places,) = value_names(system), named_values(system, [text])
+            names, (places,) = _value_names(system), named_values(system, [text])
             values = [*p, *(() if start is None else start)]
             told = ", ".join(f"{names[i]} = {float(values[i])!r}" for i in places[:MOST_NAMED])
             return f"{text} ({told})" if told else text

@@ -12,7 +12,7 @@ from typing import Protocol
 MOST_SWITCHES = 100  # in one internal step; what chatters more is no longer divided
 
 
-class SwitchTrial(Protocol):
+class _SwitchTrial(Protocol):
     """A kernel that can try an internal step."""
 
     def attempt(self, t: float, h: float) -> bool:
@@ -24,7 +24,7 @@ class SwitchTrial(Protocol):
         """Take the state computed last."""
 
 
-def divided_step(kernel: SwitchTrial, t: float, h: float) -> None:
+def divided_step(kernel: _SwitchTrial, t: float, h: float) -> None:
     """Advance by one internal step of length `h` [s] from `t` [s], divided where switches change.
 
     Args:
@@ -43,7 +43,7 @@ def divided_step(kernel: SwitchTrial, t: float, h: float) -> None:
     kernel.accept()
 
 
-def _until_switch(kernel: SwitchTrial, t: float, h: float) -> float:
+def _until_switch(kernel: _SwitchTrial, t: float, h: float) -> float:
     """The shortest step [s] after which a switch has changed, to the resolution of time, where one has after `h`
     [s].
     """

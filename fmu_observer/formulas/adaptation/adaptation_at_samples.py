@@ -16,7 +16,6 @@ Sizes: n states, m constants, q measurements. The covariance is that of ``(eta, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -189,15 +188,6 @@ def state_covariance(V: Array, sensitivity: Array, sizes: Sizes) -> Array:
     n, m = sizes[:2]
     mapped = np.vstack([np.hstack([np.eye(n), sensitivity]), np.hstack([np.zeros((m, n)), np.eye(m)])])
     return mapped @ V[: n + m, : n + m] @ mapped.T
-
-
-def first_covariance(deviations: Sequence[float], sizes: Sizes) -> np.ndarray:
-    """Covariance at the start, where c and lambda are zero, shape (n + m + q, n + m + q).
-
-    Args:
-        deviations: of states and constants, shape (n + m,). sizes: see there.
-    """
-    return np.diag([*np.square(deviations), *([0.0] * sizes.q)])
 
 
 def _faded(W: Array, N: Array) -> Array:

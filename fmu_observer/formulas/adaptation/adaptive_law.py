@@ -201,38 +201,6 @@ def error_drift(plant: Plant, gains: Gains, sizes: Sizes, predicts: bool) -> Arr
     return np.vstack([top, middle, np.zeros((q, n + m + q))])
 
 
-def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes, predicts: bool) -> Array:
-    """Covariance of the error after one measurement, shape (n + m + q, n + m + q).
-
-    Args:
-        V: before it. C: shape (q, n). row: of the measurement. variance: of its noise, in units of its weight. sizes:
-            see there. predicts: whether the output is predicted; else the innovation is held.
-    """
-    n, m, _q = sizes[:3]
-    jump = np.eye(sizes.error)
-    place = n + m + row
-    jump[place, :] = 0.0
-    if not predicts:
-        jump[place, :n] = np.asarray(C)[row]
-    added = np.zeros((sizes.error, sizes.error))
-    added[place, place] = 1.0
-    return jump @ V @ jump.T + variance * added
-
-
-def gentle_gain(R: Array, seen: Array, quickest: float) -> Array:
-    """R after a measurement, so that it moves no constant faster than `quickest`: ``inv(R) + chi' chi / quickest``.
-
-    Without it the first sample after long would make the adaptation stiff.
-
-    Args:
-        R: adaptation gain, shape (m, m). seen: row of chi that has just been set, shape (m,). quickest: rate [1/s].
-    """
-    moved = R @ seen
-    size = len(seen)
-    outer = np.reshape(moved, (size, 1)) @ np.reshape(moved, (1, size))
-    return R - outer / (quickest + seen @ moved)
-
-
 def own_excitation(E: Array, size: int, guard: Array = _TINY) -> Array:
     """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
 

@@ -15,7 +15,7 @@ Instant = Literal["first", "last"]
 
 
 @dataclass(frozen=True, slots=True)
-class FiniteWindowObserver:
+class _FiniteWindowObserver:
     """``x = gain_y Y + gain_u U`` of the samples of a window, oldest first.
 
     Attributes:
@@ -61,7 +61,7 @@ def sampled(A: np.ndarray, B: np.ndarray, sample_period: float) -> tuple[np.ndar
 
 def finite_window_observer(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, samples: int, at: Instant = "last"
-) -> FiniteWindowObserver:
+) -> _FiniteWindowObserver:
     """``x_k = pinv(O) (Y_k - M U_k)``: Omar 2012, (7.7.1)-(7.7.3); for the last sample the model brings it there.
 
     Where the window does not show the whole state, the directions it leaves open are told, and the estimate has zero
@@ -91,7 +91,7 @@ def finite_window_observer(
     if at == "last":
         driven = np.hstack([powers[samples - 2 - i] @ B for i in range(samples - 1)] + [np.zeros((n, m))])
         gain_y, gain_u = powers[-1] @ gain_y, powers[-1] @ gain_u + driven
-    return FiniteWindowObserver(gain_y, gain_u, values, right[rank:].T, at)
+    return _FiniteWindowObserver(gain_y, gain_u, values, right[rank:].T, at)
 
 
 def _impulse_responses(powers: Sequence[np.ndarray], B: np.ndarray, C: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ _HOUR = 3600.0  # [s]
 
 
 @dataclass(frozen=True, slots=True)
-class AlarmRate:
+class _AlarmRate:
     """False alarms in fault-free time.
 
     Attributes:
@@ -39,7 +39,7 @@ class AlarmRate:
         )
 
 
-def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> AlarmRate:
+def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> _AlarmRate:
     """Rate of alarms with its exact Poisson interval (Garwood 1936).
 
     Args:
@@ -58,7 +58,7 @@ def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> AlarmRate
     tail = 0.5 * (1.0 - confidence)
     low = 0.5 * float(scipy.special.chdtri(2 * alarms, 1.0 - tail)) if alarms else 0.0
     high = 0.5 * float(scipy.special.chdtri(2 * alarms + 2, tail))
-    return AlarmRate(alarms, hours, alarms / hours, low / hours, high / hours, confidence)
+    return _AlarmRate(alarms, hours, alarms / hours, low / hours, high / hours, confidence)
 
 
 def proportion_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -137,7 +137,7 @@ def rate_threshold(recordings: Sequence[np.ndarray], sample_period: float, alarm
 
 def checked(
     recordings: Sequence[np.ndarray], threshold: float, sample_period: float, confidence: float = 0.95
-) -> AlarmRate:
+) -> _AlarmRate:
     """False alarms of a threshold on recordings without a fault; take others than those it was made of.
 
     Args:

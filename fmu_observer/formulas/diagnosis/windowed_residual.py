@@ -9,7 +9,7 @@ import numpy as np
 from plant_models.hybrid import Array, vector
 
 
-class Windowed(NamedTuple):
+class _Windowed(NamedTuple):
     """A residual over its window.
 
     Attributes:
@@ -33,7 +33,7 @@ class Alarm(NamedTuple):
     since: Array
 
 
-def windowed_square(memory: Array, residual: Array) -> Windowed:
+def windowed_square(memory: Array, residual: Array) -> _Windowed:
     """``r(k) = sum of x(i)^2, i = k - N + 1 .. k``: Omar 2012, (7.6.10), (7.7.6).
 
     Args:
@@ -47,7 +47,7 @@ def windowed_square(memory: Array, residual: Array) -> Windowed:
     value = square
     for earlier in kept:
         value = value + earlier
-    return Windowed(value, vector(*kept[1:], square) if kept else memory)
+    return _Windowed(value, vector(*kept[1:], square) if kept else memory)
 
 
 def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, clear_after: Array = 1.0) -> Alarm:

@@ -15,7 +15,7 @@ from fmu_observer.formulas.filtering.square_root import factor
 from plant_models.hybrid import Array
 
 
-class EnsembleCorrected(NamedTuple):
+class _EnsembleCorrected(NamedTuple):
     """What a measurement makes of an ensemble.
 
     Attributes:
@@ -64,17 +64,7 @@ def drawn(covariance: Array, draws: Array) -> Array:
     return factor(covariance) @ draws
 
 
-def inflated(members: Array, inflation: Array) -> Array:
-    """Members moved away from their mean, against the loss of spread in small ensembles.
-
-    Args:
-        members: shape (n, M). inflation: factor of the distances [1].
-    """
-    mean = mean_of(members).reshape(members.shape[0], 1)
-    return mean + inflation * (members - mean)
-
-
-def correct_members(members: Array, seen: Array, y: Array, RN: Array, draws: Array) -> EnsembleCorrected:
+def correct_members(members: Array, seen: Array, y: Array, RN: Array, draws: Array) -> _EnsembleCorrected:
     """Every member corrected by the gain of the ensemble and a perturbed measurement of its own.
 
     Args:
@@ -90,4 +80,4 @@ def correct_members(members: Array, seen: Array, y: Array, RN: Array, draws: Arr
     S = readings @ readings.T + RN
     K = np.linalg.solve(S, readings @ spread.T).T
     perturbed = y.reshape(y.shape[0], 1) + drawn(RN, draws) - seen
-    return EnsembleCorrected(members + K @ perturbed, normalised_square(y - expected, S))
+    return _EnsembleCorrected(members + K @ perturbed, normalised_square(y - expected, S))

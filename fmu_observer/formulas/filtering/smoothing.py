@@ -55,7 +55,7 @@ class FilterPass:
 
 
 @dataclass(frozen=True)
-class Smoothed:
+class _Smoothed:
     """Estimates that know the whole recording.
 
     Attributes:
@@ -71,7 +71,7 @@ class Smoothed:
         return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", self.covariances), 0.0)))
 
 
-def smooth(passed: FilterPass) -> Smoothed:
+def smooth(passed: FilterPass) -> _Smoothed:
     """Correct every estimate by all that was measured after it, from the end backwards.
 
     ``G = cross inv(P(k+1|k))``, ``x(k) + G (xs(k+1) - x(k+1|k))``, ``P(k) + G (Ps(k+1) - P(k+1|k)) G'``. Where a
@@ -89,7 +89,7 @@ def smooth(passed: FilterPass) -> Smoothed:
         estimates[k] += gain @ (estimates[k + 1] - passed.predictions[k + 1])
         covariances[k] += gain @ (covariances[k + 1] - passed.predicted[k + 1]) @ gain.T
         covariances[k] = symmetric(covariances[k])
-    return Smoothed(estimates, covariances)
+    return _Smoothed(estimates, covariances)
 
 
 def extended_pass(

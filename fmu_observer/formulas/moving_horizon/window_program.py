@@ -13,8 +13,45 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from fmu_observer.formulas.moving_horizon.free_sweep import free_sweep
 from fmu_observer.formulas.moving_horizon.window_stages import BufferedCall
+
+
+class _FreeSweep:
+    """Minimum of ``sum (dx' A dx + w' w) / 2 + b' dx`` with ``dx = F dx_before + G w + c`` (Bellman's recursion).
+
+    Args:
+        count: N, rows of the window. order: n, states.
+    """
+
+    def __init__(self, count: int, order: int) -> None:
+        self.count, self.order = count, order
+        self._backwards = BufferedCall(_backwards(order).mapaccum(count))
+        self._forwards = BufferedCall(_forwards(order).mapaccum(count))
+
+    def solve(
+        self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Solve one.
+
+        Args:
+            A: cost of the changes, shape (N, n, n), symmetric. b: likewise, shape (N, n).
+            F: transitions into each row, zero into the first, shape (N, n, n). G: of the noises, shape (N, n, n).
+            c: what is missing, shape (N, n).
+
+        Returns:
+            Changes, noises, and multipliers of the transitions, shape (N, n) each.
+        """
+        N, n = self.count, self.order
+        columns_F, columns_G = (np.ascontiguousarray(part.transpose(0, 2, 1)) for part in (F, G))
+        reversed_ = (part[::-1] for part in (A, b, columns_F, columns_G, c))
+        _, gains, values = self._backwards(np.zeros(n * (n + 1)), *reversed_)
+        gains, values = (part.reshape(N, n + 1, n)[::-1] for part in (gains, values))
+        changes, noises = (
+            part.reshape(N, n).copy() for part in self._forwards(np.zeros(n), columns_F, columns_G, c, gains)
+        )
+        prices = np.einsum("kij,ki->kj", values[:, :n], changes) + values[:, n]
+        return changes, noises, prices
+
 
 _SOLVER, _OPTIONS = "piqp", {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100}
 _SOLVED = "SOLVER_RET_SUCCESS"
@@ -170,7 +207,7 @@ class SweptProgram(WindowProgram):
     """One that sweeps over the rows where no bound counts, which is quicker; the solver has the rest."""
 
     def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
-        found = free_sweep(self.count, self.order).solve(A, b, F, G, c)
+        found = _free_sweep(self.count, self.order).solve(A, b, F, G, c)
         return Step(
             *found, _SOLVED if all(np.isfinite(part).all() for part in found) else "numbers that are not finite"
         )
@@ -191,3 +228,33 @@ def _sparsity(counts: list[np.ndarray], rows: list[np.ndarray], height: int | No
     ends = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(int)
     width = len(ends) - 1
     return ca.Sparsity(height or width, width, ends.tolist(), np.concatenate(rows).astype(int).tolist())
+
+
+@lru_cache(maxsize=64)
+def _free_sweep(count: int, order: int) -> _FreeSweep:
+    """The sweep over windows of a size, made once."""
+    return _FreeSweep(count, order)
+
+
+def _backwards(n: int) -> ca.Function:
+    """From what the later rows cost, as matrix and vector of the change in a row, to what they and the row cost."""
+    later, A, F, G = (ca.SX.sym(name, n, width) for name, width in (("later", n + 1), ("A", n), ("F", n), ("G", n)))
+    b, c = ca.SX.sym("b", n), ca.SX.sym("c", n)
+    S, s = A + later[:, :n], b + later[:, n]
+    SG = S @ G
+    factors = ca.ldl(ca.densify(ca.SX.eye(n) + G.T @ SG), False)
+    gains = ca.ldl_solve(ca.horzcat(SG.T @ F, SG.T @ c + G.T @ s), *factors)
+    K, k = gains[:, :n], gains[:, n]
+    T, d = F - G @ K, c - G @ k
+    P = T.T @ S @ T + K.T @ K  # a sum of squares: it stays one with rounding
+    p = T.T @ (S @ d + s) + K.T @ k
+    results = ca.horzcat(0.5 * (P + P.T), p), gains, ca.horzcat(S, s)
+    return ca.Function("backwards", [later, A, b, F, G, c], [ca.densify(r) for r in ca.cse(list(results))])
+
+
+def _forwards(n: int) -> ca.Function:
+    """From the change before a row to the change in it, and its noise."""
+    before, c = ca.SX.sym("before", n), ca.SX.sym("c", n)
+    F, G, gains = ca.SX.sym("F", n, n), ca.SX.sym("G", n, n), ca.SX.sym("gains", n, n + 1)
+    w = -(gains[:, :n] @ before + gains[:, n])
+    return ca.Function("forwards", [before, F, G, c, gains], [ca.densify(F @ before + G @ w + c), ca.densify(w)])

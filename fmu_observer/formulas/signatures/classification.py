@@ -92,7 +92,7 @@ class SearchStage:
 
 
 @dataclass(frozen=True)
-class Classified:
+class _Classified:
     """Verdicts on experiments.
 
     Args:
@@ -116,7 +116,7 @@ class SignatureClassifier:
     last: Hashable
     labels: tuple[Hashable, ...] = field(default=())
 
-    def classify(self, records: np.ndarray, strip: float = 1.0) -> Classified:
+    def classify(self, records: np.ndarray, strip: float = 1.0) -> _Classified:
         """Classes of experiments.
 
         Args:
@@ -134,7 +134,7 @@ class SignatureClassifier:
             nearest = np.where(open_, np.minimum(nearest, np.abs(beyond).min(axis=0)), nearest)
             index = np.where(open_ & inside, self.labels.index(stage.label), index)
             open_ &= outside
-        return Classified(np.where(open_, self.labels.index(self.last), index), nearest)
+        return _Classified(np.where(open_, self.labels.index(self.last), index), nearest)
 
 
 class SeparationError(ValueError):

@@ -70,7 +70,7 @@ class Separation(NamedTuple):
         return Separation(self.margin, self.gap, -self.normal, -self.threshold)
 
 
-class Extent(NamedTuple):
+class _Extent(NamedTuple):
     """How far a cloud reaches in each of `_DIRECTIONS`.
 
     Attributes:
@@ -81,17 +81,17 @@ class Extent(NamedTuple):
     high: np.ndarray
 
 
-def extent(points: np.ndarray) -> Extent:
+def extent(points: np.ndarray) -> _Extent:
     """How far a cloud reaches; of many clouds that are compared in pairs each is looked through once.
 
     Args:
         points: shape (2, n).
     """
     projected = _NORMALS.T @ points
-    return Extent(projected.min(axis=1), projected.max(axis=1))
+    return _Extent(projected.min(axis=1), projected.max(axis=1))
 
 
-def separation(first: Extent, second: Extent) -> Separation:
+def separation(first: _Extent, second: _Extent) -> Separation:
     """Strip between two clouds that is widest beside their range across it, among lines of one a degree.
 
     As a share of that range a strip does not depend on the units of the coordinates, and clouds that lie on one line,

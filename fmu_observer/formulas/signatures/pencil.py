@@ -16,7 +16,7 @@ EPS = 1e-3
 """Regularisation where none is named: the thesis prints no value."""
 
 
-class Pencil(NamedTuple):
+class _Pencil(NamedTuple):
     """What the pencil map computes.
 
     Attributes:
@@ -90,7 +90,7 @@ def pencil_point(past: Array, following: Array, eps: Array = EPS, next_scaling: 
     return centre + position * (weighted - centre)
 
 
-def pencil(past: Array, following: Array, eps: Array = EPS, next_scaling: NextScaling = "norm") -> Pencil:
+def pencil(past: Array, following: Array, eps: Array = EPS, next_scaling: NextScaling = "norm") -> _Pencil:
     """All steps of the pencil map of numbers, as printed: Omar 2012, (2.3.1)-(2.3.6); for drawing and for checking.
 
     Args:
@@ -111,7 +111,7 @@ def pencil(past: Array, following: Array, eps: Array = EPS, next_scaling: NextSc
     edge_points = 0.5 * ((1.0 + scaled) * np.roll(corners, -1, axis=1) - (scaled - 1.0) * corners)
     centre = edge_points.mean(axis=1)
     weighted = (scaled * edge_points).mean(axis=1)
-    return Pencil(edge_points, centre, weighted, position, centre + position * (weighted - centre))
+    return _Pencil(edge_points, centre, weighted, position, centre + position * (weighted - centre))
 
 
 def _scaled(past: Array, following: Array, eps: Array, next_scaling: NextScaling) -> tuple[Array, Array]:

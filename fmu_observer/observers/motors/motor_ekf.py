@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_preset
-from fmu_observer.observers.motors.motor_filter_presets import ROWS, preset_of
-from fmu_observer.observers.motors.motor_jacobians import printed_jacobian, rotor_jacobian
+from fmu_observer.observers.motors.motor_filter_presets import MOTOR_PRESETS
+from fmu_observer.observers.motors.motor_jacobians import rotor_jacobian
 from plant_models.hybrid import Array, matrix, vector
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, Frame, euler_step, rotor_voltages
@@ -46,7 +46,7 @@ class MotorEkf(MotorFilter):
     description = "Extended Kalman filter of a synchronous motor, currents in the rotor frame"
     source = 'Allaoui 2024, "3.39"-"3.45" (4.39-4.45), Tables 1-3'
     presets: Mapping[str, Mapping[str, Any]] = {
-        **{row: preset_of(row) for row in ROWS},
+        **MOTOR_PRESETS,
         "traction_200kw": traction_preset((0.01, 0.01, 1e-6, 1e-8), 1.0),
     }
     default_preset = "bbo_20"
@@ -54,7 +54,7 @@ class MotorEkf(MotorFilter):
 
     def __init__(self, *, frame: Frame = "rotor", jacobian: Jacobian = "exact") -> None:
         require_chosen(self.name, self.option_choices, frame=frame, jacobian=jacobian)
-        self.jacobian = printed_jacobian if jacobian == "as_published" else rotor_jacobian
+        self.jacobian = _printed_jacobian if jacobian == "as_published" else rotor_jacobian
         super().__init__(frame, True, (1.0, 1.0, 1.0, 1.0), jacobian=jacobian)
         self.options["frame"] = frame
 
@@ -71,3 +71,17 @@ class MotorEkf(MotorFilter):
         current_d, current_q, _, angle = estimate
         seen_d, seen_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, angle)
         return vector(seen_d - current_d, seen_q - current_q), MEASURED
+
+
+def _printed_jacobian(current_d: Array, current_q: Array, speed: Array, period: Array, p: Any) -> list[list[Array]]:
+    """Rows of F as they are printed: current d in place of q in the first row, plus in place of minus in the second,
+    L_d under R_s in the second.
+
+    Source: Allaoui 2024, "3.42" (4.42), as printed.
+    """
+    rows = rotor_jacobian(current_d, current_q, speed, period, p)
+    share_d, share_q = period / p.inductance_d, period / p.inductance_q
+    rows[0][2] = share_d * p.inductance_q * p.pole_pairs * current_d
+    rows[1][1] = 1.0 - share_d * p.stator_resistance
+    rows[1][2] = share_q * p.pole_pairs * (p.inductance_d * current_d - p.rotor_flux)
+    return rows

@@ -8,7 +8,6 @@ Source: Allaoui 2024, section III.3.1 (hand) and Tables 1 to 3.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 ROWS: Mapping[str, tuple[float, float, float, float, float, float]] = {
     "hand": (0.01, 0.001, 10.0, 10.0, 0.02, 0.001),
@@ -32,15 +31,6 @@ ROWS: Mapping[str, tuple[float, float, float, float, float, float]] = {
 of 0.347 of current q: conjectures, which reproduce the printed errors. `true_noise` holds the variances of the noise.
 """
 
-
-def preset_of(row: str) -> dict[str, Any]:
-    """A row as a preset.
-
-    Args:
-        row: its name in `ROWS`.
-
-    Returns:
-        Values of `process_variance` and `measurement_variance`.
-    """
-    values = ROWS[row]
-    return {"process_variance": values[:4], "measurement_variance": values[4:]}
+MOTOR_PRESETS = {
+    row: {"process_variance": values[:4], "measurement_variance": values[4:]} for row, values in ROWS.items()
+}

@@ -34,24 +34,3 @@ def rotor_jacobian(current_d: Array, current_q: Array, speed: Array, period: Arr
         [torque * saliency * current_q, torque * (saliency * current_d + p.rotor_flux), by_speed[2], 0.0],
         [0.0, 0.0, by_speed[3], 1.0],
     ]
-
-
-def printed_jacobian(current_d: Array, current_q: Array, speed: Array, period: Array, p: Any) -> list[list[Array]]:
-    """Rows of F as they are printed: current d in place of q in the first row, plus in place of minus in the second,
-    L_d under R_s in the second.
-
-    Args:
-        current_d: along d [A]. current_q: along q [A]. speed: of the shaft [rad/s]. period: T_s [s].
-        p: parameters of the motor.
-
-    Returns:
-        Four rows of four entries.
-
-    Source: Allaoui 2024, "3.42" (4.42), as printed.
-    """
-    rows = rotor_jacobian(current_d, current_q, speed, period, p)
-    share_d, share_q = period / p.inductance_d, period / p.inductance_q
-    rows[0][2] = share_d * p.inductance_q * p.pole_pairs * current_d
-    rows[1][1] = 1.0 - share_d * p.stator_resistance
-    rows[1][2] = share_q * p.pole_pairs * (p.inductance_d * current_d - p.rotor_flux)
-    return rows

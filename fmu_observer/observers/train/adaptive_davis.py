@@ -22,20 +22,12 @@ from fmu_observer.formulas.adaptation.adaptation_at_samples import (
     since_flow,
     state_covariance,
 )
-from fmu_observer.formulas.adaptation.adaptive_law import gentle_gain, learnt_constants, smallest_eigenvalue
+from fmu_observer.formulas.adaptation.adaptive_law import learnt_constants, smallest_eigenvalue
 from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
-from fmu_observer.observers.train.adaptive_davis_states import (
-    FIRST_GAIN,
-    SCALE,
-    SIZES,
-    STATES,
-    just_sampled,
-    moving_values,
-    parts_of,
-)
+from fmu_observer.observers.train.adaptive_davis_states import FIRST_GAIN, SCALE, SIZES, STATES
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
 from fmu_observer.observers.train.train_signals import (
     BALISE,
@@ -137,7 +129,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     )
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        known, since = parts_of(x)
+        known, since = _parts_of(x)
         now = constants_now(known, since)
         sensitivity, inverse_s, speed = x.sensitivity, x.inverse_s, x.estimated_speed
         slope = (p.davis_b + 2.0 * p.davis_c * speed) / p.mass
@@ -154,18 +146,18 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             **named_as((POSITION, SPEED), rates),
             "sensitivity": matrix(d_sensitivity[0], d_speed),
             "inverse_s": d_inverse,
-            **moving_values(moving),
+            **_moving_values(moving),
         }
 
     def friction(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """Constant resistance and brake [m/s2], shape (1,)."""
-        now = constants_now(*parts_of(x))
+        now = constants_now(*_parts_of(x))
         return vector(np.maximum(self._coefficients(now, p)[0], 0.0) + np.maximum(-u.effort, 0.0) / p.mass)
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """One component of the innovation is set to what is measured; the first measurement sets the estimate too."""
         row = 0 if event == BALISE.name else 1
-        known, since = parts_of(x)
+        known, since = _parts_of(x)
         now = constants_now(known, since)
         measured, deviation, gain = self._measured(row, x, now, u, p)
         used, estimate = [*x.samples_used], [x.estimated_position, x.estimated_speed]
@@ -186,11 +178,11 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         excitation = excitation_now(known, since, p.excitation_time)
         return {
             **named_as((POSITION, SPEED), estimate),
-            **just_sampled(),
+            **_just_sampled(),
             "sensitivity": matrix(*sensitivity),
             "corrections": now.values,
             "sampled_innovation": vector(*c),
-            "adaptation_gain": gentle_gain(R, reads, QUICKEST),
+            "adaptation_gain": _gentle_gain(R, reads, QUICKEST),
             "seen_sensitivity": matrix(*seen),
             "mean_excitation": excitation,
             "error_covariance": np.where(first > 0.0, begun, moved),
@@ -206,7 +198,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         return u.odometer + p.reading_age * self._acceleration(x, now, u, p), p.odometer_deviation, 1.0
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        known, since = parts_of(x)
+        known, since = _parts_of(x)
         now = constants_now(known, since)
         covariance = self._covariance(x, known, since, now)
         regressor = _regressor(x.estimated_speed)
@@ -230,7 +222,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
 
     def own_bound(self, x: Any, p: Any) -> Array:
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""
-        known, since = parts_of(x)
+        known, since = _parts_of(x)
         return _root(self._covariance(x, known, since, constants_now(known, since))[0, 0])
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
@@ -288,3 +280,50 @@ def _settled(mu: float) -> np.ndarray:
 
 def _root(variance: Array) -> Array:
     return np.sqrt(np.maximum(variance, 1e-30))
+
+
+def _gentle_gain(R: Array, seen: Array, quickest: float) -> Array:
+    """R after a measurement, so that it moves no constant faster than `quickest`: ``inv(R) + chi' chi / quickest``.
+
+    Without it the first sample after long would make the adaptation stiff.
+    """
+    moved = R @ seen
+    size = len(seen)
+    outer = np.reshape(moved, (size, 1)) @ np.reshape(moved, (1, size))
+    return R - outer / (quickest + seen @ moved)
+
+
+def _parts_of(x: Any) -> tuple[AtSample, Since]:
+    """What was known at the last sample, and what has happened since."""
+    one, two = x.own_transition
+    own = matrix([1.0, one], [0.0, two])
+    return (
+        AtSample(
+            x.corrections,
+            x.sampled_innovation,
+            x.adaptation_gain,
+            x.seen_sensitivity,
+            x.mean_excitation,
+            x.error_covariance,
+            x.learnt,
+        ),
+        Since(x.elapsed, x.decay, x.fade, own, x.forced_transition, x.gathered_noise),
+    )
+
+
+def _moving_values(since: Since) -> dict[str, Array]:
+    """A `Since` by the names of the states."""
+    return {
+        "elapsed": since.elapsed,
+        "decay": since.decay,
+        "fade": since.fade,
+        "own_transition": vector(since.own[0, 1], since.own[1, 1]),
+        "forced_transition": since.forced,
+        "gathered_noise": since.noise,
+    }
+
+
+def _just_sampled() -> dict[str, Array]:
+    """The same at a sample."""
+    none = np.zeros((2, 2))
+    return _moving_values(Since(0.0, np.eye(2), none, np.eye(2), none, none))

@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.formulas.adaptation.adaptation_at_samples import AtSample, Since, first_covariance
 from fmu_observer.formulas.adaptation.adaptive_law import Sizes
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
-from plant_models.hybrid import Array, matrix, memory, state, vector
+from plant_models.hybrid import memory, state
 
 SIZES = Sizes(2, 3, 2, sampled=True)
 SCALE = 30.0  # [m/s]: constants are what each term of the resistance is at this speed [m/s2]
 FIRST_GAIN = 1.0  # [ours], of R
 PRIOR = (100.0, 5.0, 0.02, 0.02, 0.02)  # standard deviations at the start [m], [m/s], [m/s2] three times [ours]
-FIRST = first_covariance(PRIOR, SIZES)
+FIRST = np.diag([*np.square(PRIOR), *([0.0] * SIZES.q)])  # where c and lambda are zero
 _UPPER = "upper triangle row by row"
 
 
@@ -45,47 +44,3 @@ STATES = (
     LAST_INNOVATION,
     memory("last_reading", "m/s", 0.0, "Last reading of the odometer that was not missing"),
 )
-
-
-def parts_of(x: Any) -> tuple[AtSample, Since]:
-    """What was known at the last sample, and what has happened since.
-
-    Args:
-        x: states of the observer, by name.
-    """
-    one, two = x.own_transition
-    own = matrix([1.0, one], [0.0, two])
-    return (
-        AtSample(
-            x.corrections,
-            x.sampled_innovation,
-            x.adaptation_gain,
-            x.seen_sensitivity,
-            x.mean_excitation,
-            x.error_covariance,
-            x.learnt,
-        ),
-        Since(x.elapsed, x.decay, x.fade, own, x.forced_transition, x.gathered_noise),
-    )
-
-
-def moving_values(since: Since) -> dict[str, Array]:
-    """A `Since` by the names of the states.
-
-    Args:
-        since: values, or derivatives.
-    """
-    return {
-        "elapsed": since.elapsed,
-        "decay": since.decay,
-        "fade": since.fade,
-        "own_transition": vector(since.own[0, 1], since.own[1, 1]),
-        "forced_transition": since.forced,
-        "gathered_noise": since.noise,
-    }
-
-
-def just_sampled() -> dict[str, Array]:
-    """The same at a sample."""
-    none = np.zeros((2, 2))
-    return moving_values(Since(0.0, np.eye(2), none, np.eye(2), none, none))

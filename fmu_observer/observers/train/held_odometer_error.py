@@ -24,19 +24,6 @@ def first_gain(z: Array, p: Any) -> Array:
     return p.gain[0] + p.gain_schedule * (p.davis_b + p.davis_c * z) / p.mass
 
 
-def error_slopes(p: Any) -> tuple[Array, Array]:
-    """Smallest and largest entry 11 of the error matrix [1/s], over true, estimated and scheduling speeds from 0 to
-    `speed_max`: ``-(b + c (v + v_estimated)) / m - first_gain(z)``.
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`.
-    """
-    fixed = -p.gain[0] - (1.0 + p.gain_schedule) * p.davis_b / p.mass
-    drag, schedule = p.davis_c / p.mass * 2.0 * p.speed_max, p.gain_schedule * p.davis_c / p.mass * p.speed_max
-    smallest = fixed - np.maximum(drag, 0.0) - np.maximum(schedule, 0.0)
-    return smallest, fixed - np.minimum(drag, 0.0) - np.minimum(schedule, 0.0)
-
-
 def error_matrix(a11: float, p: Any) -> np.ndarray:
     """``A - K C`` of speed, disturbance and its rate, shape (3, 3).
 
@@ -75,16 +62,6 @@ def proven(a11: Array, p: Any) -> Array:
         a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
     """
     return decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay)
-
-
-def unknown_level(p: Any) -> Array:
-    """Largest level of what the model does not know: an acceleration, its rate and the rate of that [m/s2].
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`.
-    """
-    p11, p22, p33 = (p.lyapunov_matrix[i, i] for i in range(3))
-    return np.sqrt(p11) * p.unknown_acceleration + np.sqrt(p22) * p.unknown_jerk + np.sqrt(p33) * p.unknown_jerk_rate
 
 
 def position_error(a11: float, p: Any) -> ImpulsiveError:

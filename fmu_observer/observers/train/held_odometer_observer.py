@@ -20,14 +20,7 @@ from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from fmu_observer.observers.train.held_odometer_error import (
-    error_matrix,
-    error_slopes,
-    first_gain,
-    position_error,
-    proven,
-    unknown_level,
-)
+from fmu_observer.observers.train.held_odometer_error import error_matrix, first_gain, position_error, proven
 from fmu_observer.observers.train.held_odometer_presets import DRAG_SLOPES, HELD_ODOMETER_PRESETS
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
@@ -220,7 +213,7 @@ class HeldOdometerObserver(TrainObserver):
             "estimated_speed": acceleration,
             "estimated_disturbance": drift,
             "estimated_disturbance_rate": rate_drift,
-            "bound_level": reading + unknown_level(p) + own - p.bound_decay * x.bound_level,
+            "bound_level": reading + _unknown_level(p) + own - p.bound_decay * x.bound_level,
             "integrated_bound": bound,
         }
 
@@ -304,14 +297,14 @@ class HeldOdometerObserver(TrainObserver):
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Bounds of the numbers that the bounds rest on, and the proof of the decay at both ends of the drag slopes."""
-        slowest, fastest = error_slopes(p)
+        slowest, fastest = _error_slopes(p)
         shown = [proven(a11, p) for a11 in (slowest, fastest)]
         limited = tuple(s for s in self.estimator_parameters if s.min is not None)
         return super().requirements(p) | within_bounds(limited, p) | {_PROOF: shown[0] * shown[1]}
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of ``de = (A - K C) e`` with the position behind it, for all drag slopes up to `speed_max`."""
-        vertices = tuple(position_error(a11, p) for a11 in dict.fromkeys(map(float, error_slopes(p))))
+        vertices = tuple(position_error(a11, p) for a11 in dict.fromkeys(map(float, _error_slopes(p))))
         model = (
             f"error of position, speed, disturbance and its rate over gaps between balises, drag slopes up to "
             f"{float(p.speed_max):g} m/s, constant over a gap; the motion since an odometer sample is an input to it, "
@@ -334,7 +327,7 @@ class HeldOdometerObserver(TrainObserver):
             ValueError: a parameter or the preset is unknown or not legal, or P does not prove the decay.
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to bound its error"))
-        slopes = tuple(map(float, error_slopes(p)))
+        slopes = tuple(map(float, _error_slopes(p)))
         if not all(proven(a11, p) for a11 in slopes):
             gain = [float(k) for k in p.gain]
             raise ValueError(f"{self.name}: {_PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {gain}).")
@@ -370,3 +363,19 @@ class HeldOdometerObserver(TrainObserver):
     def _moves(self, t: Array, x: Any, p: Any) -> Array:
         """1 where the train cannot have stopped since the held reading."""
         return np.where(x.held_speed > p.bound_min_speed + self._since_reading(t, x, p), 1.0, 0.0)
+
+
+def _error_slopes(p: Any) -> tuple[Array, Array]:
+    """Smallest and largest entry 11 of the error matrix [1/s], over true, estimated and scheduling speeds from 0 to
+    `speed_max`: ``-(b + c (v + v_estimated)) / m - first_gain(z)``.
+    """
+    fixed = -p.gain[0] - (1.0 + p.gain_schedule) * p.davis_b / p.mass
+    drag, schedule = p.davis_c / p.mass * 2.0 * p.speed_max, p.gain_schedule * p.davis_c / p.mass * p.speed_max
+    smallest = fixed - np.maximum(drag, 0.0) - np.maximum(schedule, 0.0)
+    return smallest, fixed - np.minimum(drag, 0.0) - np.minimum(schedule, 0.0)
+
+
+def _unknown_level(p: Any) -> Array:
+    """Largest level of what the model does not know: an acceleration, its rate and the rate of that [m/s2]."""
+    p11, p22, p33 = (p.lyapunov_matrix[i, i] for i in range(3))
+    return np.sqrt(p11) * p.unknown_acceleration + np.sqrt(p22) * p.unknown_jerk + np.sqrt(p33) * p.unknown_jerk_rate

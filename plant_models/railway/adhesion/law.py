@@ -44,7 +44,7 @@ class AdhesionLaw(Protocol):
         """Largest coefficient that can hold a wheel without sliding [1]."""
 
 
-class BurckhardtLaw:
+class _BurckhardtLaw:
     """Burckhardt's curves; the coefficient does not depend on the speed. Source: Bouchama 2024, (3.12), Table 3.2."""
 
     parameters = tuple(
@@ -70,7 +70,7 @@ class BurckhardtLaw:
         return BurckhardtCurve(*(getattr(p, f"burckhardt_{condition}_{key}") for key in _BURCKHARDT_TEXTS))
 
 
-class PolachLaw:
+class _PolachLaw:
     """Polach's curves, dry rail as nominal and wet rail as degraded. Source: Bouchama 2024, (3.4)-(3.10), Table 3.1."""
 
     parameters = (
@@ -108,4 +108,4 @@ class PolachLaw:
         )
 
 
-ADHESION_LAWS: dict[str, type[BurckhardtLaw] | type[PolachLaw]] = {"burckhardt": BurckhardtLaw, "polach": PolachLaw}
+ADHESION_LAWS: dict[str, type[_BurckhardtLaw] | type[_PolachLaw]] = {"burckhardt": _BurckhardtLaw, "polach": _PolachLaw}

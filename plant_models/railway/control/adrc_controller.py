@@ -12,10 +12,9 @@ import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.railway.control.brake_blending import air_brake_demand, building_up, electric_part
+from plant_models.railway.control.brake_blending import air_brake_demand, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
-from plant_models.railway.control.extended_state_observer import observer_derivative, rejecting_force
 from plant_models.railway.control.logic import either, every, holds
 
 Drive = Literal["immediate", "ramped"]
@@ -119,13 +118,13 @@ class AdrcController(HybridSystem):
         command = self._command(x, u, p)
         observed, estimated, built_up = x.observed_speed, x.disturbance_acceleration, x.built_up_brake
         applied = (self._effort(x, command) - built_up) / p.mass
-        speed, disturbance = observer_derivative(u.odometer, observed, estimated, applied, p.observer_bandwidth)
+        speed, disturbance = _observer_derivative(u.odometer, observed, estimated, applied, p.observer_bandwidth)
         relaxing = p.observer_bandwidth * (u.odometer - observed)  # the brake that holds a train is no disturbance
         asked = command.brake_demand * p.full_brake_force
         return {
             "observed_speed": either(command.standing, relaxing, speed),
             "disturbance_acceleration": either(command.standing, -p.observer_bandwidth * estimated, disturbance),
-            "built_up_brake": building_up(built_up, asked, p.brake_build_up_time, p.brake_release_time),
+            "built_up_brake": _building_up(built_up, asked, p.brake_build_up_time, p.brake_release_time),
             **self._drive(x, command, p),
         }
 
@@ -149,7 +148,7 @@ class AdrcController(HybridSystem):
     def _command(x: Any, u: Any, p: Any) -> _Command:
         acceleration, air = u.acceleration_reference, holds(p.full_brake_force > 0.0)
         error, estimated = u.speed_reference - x.observed_speed, x.disturbance_acceleration
-        wanted = rejecting_force(error, acceleration, estimated, p.mass, p.control_bandwidth)
+        wanted = _rejecting_force(error, acceleration, estimated, p.mass, p.control_bandwidth)
         brake_limit = electric_brake_limit(
             u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end
         )
@@ -169,3 +168,27 @@ class AdrcController(HybridSystem):
             either(standing, air_brake_demand(-p.holding_effort, p.full_brake_force, p.full_brake_force), demand),
             standing,
         )
+
+
+def _building_up(built_up: Array, asked: Array, build_up_time: Array, release_time: Array) -> Array:
+    """Rate of the air brake's force [N/s], first order: quick when it builds up, slow when it is released."""
+    return (asked - built_up) / np.where(asked > built_up, build_up_time, release_time)
+
+
+def _observer_derivative(
+    measured: Array, speed: Array, disturbance: Array, applied_acceleration: Array, bandwidth: Array
+) -> tuple[Array, Array]:
+    """Derivatives of both estimates: ``dz1 = z2 + b0 F + 2 wo (y - z1)``, ``dz2 = wo^2 (y - z1)``.
+
+    Both poles of the estimation error lie at ``-wo`` (bandwidth parametrisation). `applied_acceleration` must come from
+    the effort that is really applied, behind all limits: then a limit is no disturbance and nothing winds up.
+
+    Source: Gao, Scaling and bandwidth-parameterization based controller tuning, American Control Conference 2003.
+    """
+    innovation = measured - speed
+    return disturbance + applied_acceleration + 2.0 * bandwidth * innovation, bandwidth * bandwidth * innovation
+
+
+def _rejecting_force(error: Array, acceleration: Array, disturbance: Array, mass: Array, bandwidth: Array) -> Array:
+    """Force ``M (wc e + a_ref - z2)`` [N]: first order towards the reference, the disturbance taken out."""
+    return mass * (bandwidth * error + acceleration - disturbance)

@@ -32,15 +32,6 @@ def electric_part(force: Array, built_up: Array, brake_limit: Array) -> Array:
     return np.maximum(np.minimum(force + built_up, 0.0), -brake_limit)
 
 
-def building_up(built_up: Array, asked: Array, build_up_time: Array, release_time: Array) -> Array:
-    """Rate of the air brake's force [N/s], first order: quick when it builds up, slow when it is released.
-
-    Args:
-        built_up: force by now [N]. asked: force asked for [N]. build_up_time, release_time: time constants [s], > 0.
-    """
-    return (asked - built_up) / np.where(asked > built_up, build_up_time, release_time)
-
-
 def built_up_after(built_up: Array, asked: Array, period: Array, build_up_time: Array, release_time: Array) -> Array:
     """Force [N] to which `building_up` leads within a period [s] of constant demand, exactly.
 

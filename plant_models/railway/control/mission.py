@@ -13,7 +13,7 @@ import numpy as np
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.control.logic import either, every, holds
-from plant_models.railway.control.trapezoid import Trapezoid, braking_curve
+from plant_models.railway.control.trapezoid import Trapezoid
 
 BrakingPoint = Literal["time", "position"]
 _KMH_35, _KMH_50 = 35.0 / 3.6, 50.0 / 3.6
@@ -104,7 +104,7 @@ def _by_curve(elapsed: Array, run: Array, p: Any) -> dict[str, Array]:
     departed = holds(elapsed >= 0.0)
     rising = np.maximum(p.acceleration * elapsed, 0.0)
     ahead = np.minimum(rising, p.target_speed)
-    curve = braking_curve(remaining, p.deceleration)
+    curve = _braking_curve(remaining, p.deceleration)
     arrived = every(departed, holds(remaining <= p.stopping_tolerance))
     braking = every(departed, holds(curve <= ahead))
     cruising = either(holds(rising < p.target_speed), 1.0, 2.0)
@@ -118,3 +118,10 @@ def _by_curve(elapsed: Array, run: Array, p: Any) -> dict[str, Array]:
 
 def _acceleration(phase: Array, acceleration: Array, deceleration: Array) -> Array:
     return np.where(phase == 1.0, acceleration, np.where(phase == 3.0, -deceleration, 0.0))
+
+
+def _braking_curve(remaining: Array, deceleration: Array) -> Array:
+    """Speed from which a constant deceleration stops within the remaining distance, ``sqrt(2 d s)`` [m/s]; 0 beyond the
+    point.
+    """
+    return np.sqrt(2.0 * deceleration * np.maximum(remaining, 0.0))

@@ -34,7 +34,7 @@ class NoBrakingSolutionError(ValueError):
 
 
 @dataclass(frozen=True)
-class StoppingPlan:
+class _StoppingPlan:
     """A constant brake from a place and speed to a mark.
 
     Attributes:
@@ -86,7 +86,7 @@ def plan_stop(
     mass: float = 1.0,
     final_speed: float = 0.0,
     position: float = 0.0,
-) -> StoppingPlan:
+) -> _StoppingPlan:
     """The constant brake that brings a train to a mark, ``v' = -w_1 v + b u* / m``.
 
     ``plan_stop(30.0, 100.0, drag_rate=0.1, brake_coefficient=0.1)`` is the thesis' example: u* = -26.2230, t_f = 7.6269
@@ -121,7 +121,7 @@ def plan_stop(
     _check_braking(speed, distance, drag_rate, final_speed)
     plan = constant_brake(speed, distance, drag_rate, final_speed)
     deceleration = float(plan.deceleration)
-    return StoppingPlan(
+    return _StoppingPlan(
         -deceleration * mass / brake_coefficient,
         float(plan.duration),
         deceleration,

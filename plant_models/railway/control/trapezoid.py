@@ -69,10 +69,3 @@ class Trapezoid:
         falling = np.clip(elapsed - up - hold, 0.0, down)
         braked = self.peak * falling - 0.5 * self.deceleration * falling * falling
         return 0.5 * self.acceleration * rising * rising + self.peak * held + braked
-
-
-def braking_curve(remaining: Array, deceleration: Array) -> Array:
-    """Speed from which a constant deceleration stops within the remaining distance, ``sqrt(2 d s)`` [m/s]; 0 beyond the
-    point.
-    """
-    return np.sqrt(2.0 * deceleration * np.maximum(remaining, 0.0))

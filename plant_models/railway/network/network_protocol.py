@@ -25,7 +25,7 @@ from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.network.loss import loss_threshold
-from plant_models.railway.network.protocols import quadratic_costs, smallest, try_once_discard
+from plant_models.railway.network.protocols import smallest, try_once_discard
 
 Protocol = Literal["round-robin", "periodic", "try-once-discard", "quadratic"]
 PROTOCOLS = ("round-robin", "periodic", "try-once-discard", "quadratic")
@@ -170,7 +170,7 @@ class NetworkProtocol(HybridSystem):
         count = self.signals
         entries = [p.weights[i] for i in range(self.nodes * count * count)]
         rows = [entries[i : i + count] for i in range(0, len(entries), count)]
-        return smallest(quadratic_costs([rows[i : i + count] for i in range(0, len(rows), count)], error)) + 1.0
+        return smallest(_quadratic_costs([rows[i : i + count] for i in range(0, len(rows), count)], error)) + 1.0
 
     def _packets_of(self, under_way: list[tuple[Any, Array, Array]]) -> dict[str, Array]:
         """Packets under way, the oldest first, as they are remembered."""
@@ -245,3 +245,16 @@ def _packets(signals: int, places: int) -> tuple[Any, ...]:
         memory("packet_sender", "1", 0.0, "Who sent them, from 1; 0 where the packet is lost", size=places),
         memory("packet_stamp", "s", 0.0, "When they were measured", size=places),
     )
+
+
+def _quadratic_costs(weights: Sequence[Array], error: Array) -> list[Array]:
+    """``x' P_i x`` of every node, (1.18)."""
+    costs = []
+    for weight in weights:
+        cost = 0.0 * error[0]
+        for row, left in zip(weight, error, strict=True):
+            for entry, right in zip(row, error, strict=True):
+                if not (isinstance(entry, float) and entry == 0.0):  # a plain zero; symbols are not looked at
+                    cost = cost + left * entry * right
+        costs.append(cost)
+    return costs

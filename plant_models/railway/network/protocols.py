@@ -86,23 +86,6 @@ def try_once_discard(node_sizes: Sequence[int], scales: Sequence[float] | None =
     return np.stack([-selection(node_sizes, i) @ weight for i in range(len(node_sizes))])
 
 
-def quadratic_costs(weights: Sequence[Array], error: Array) -> list[Array]:
-    """``x' P_i x`` of every node, (1.18).
-
-    Args:
-        weights: P_i of the nodes, each of shape (p, p). error: x, the network error, shape (p,).
-    """
-    costs = []
-    for weight in weights:
-        cost = 0.0 * error[0]
-        for row, left in zip(weight, error, strict=True):
-            for entry, right in zip(row, error, strict=True):
-                if not (isinstance(entry, float) and entry == 0.0):  # a plain zero; symbols are not looked at
-                    cost = cost + left * entry * right
-        costs.append(cost)
-    return costs
-
-
 def smallest(costs: Sequence[Array]) -> Array:
     """Number of the smallest entry, the first one of several; traceable.
 

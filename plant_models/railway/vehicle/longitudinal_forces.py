@@ -183,12 +183,8 @@ def _vehicle(railway: str) -> tuple[Signal, ...]:
     )
 
 
-def davis_preset(chosen: DavisSet) -> dict[str, float]:
-    """Parameter values of a published set, per unit mass: newtons are m/s2.
-
-    Args:
-        chosen: the set.
-    """
+def _davis_preset(chosen: DavisSet) -> dict[str, float]:
+    """Parameter values of a published set, per unit mass: newtons are m/s2."""
     return {
         "mass": 1.0,
         "traction_coefficient": chosen.effort_coefficient,
@@ -203,9 +199,9 @@ def davis_preset(chosen: DavisSet) -> dict[str, float]:
 
 
 TRAIN_PRESETS: dict[str, dict[str, float]] = {
-    **{name: davis_preset(chosen) for name, chosen in DAVIS_SETS.items() if name != "set_b_observer"},
+    **{name: _davis_preset(chosen) for name, chosen in DAVIS_SETS.items() if name != "set_b_observer"},
     "scenario_3_3_4": {
-        **davis_preset(DAVIS_SETS["set_b"]),
+        **_davis_preset(DAVIS_SETS["set_b"]),
         "grade_amplitude": 0.05,
         "grade_rate": 0.1,
         "train_speed": 45.0,
@@ -213,4 +209,4 @@ TRAIN_PRESETS: dict[str, dict[str, float]] = {
 }
 """Presets of the trains: Davis sets A to F, and set B on the grade ``0.05 sin(0.1 t)`` of section 3.3.4 at 45 m/s."""
 
-__all__ = ["ADHESION_LEVELS", "TRAIN_PRESETS", "Forces", "LongitudinalForces", "davis_preset"]
+__all__ = ["ADHESION_LEVELS", "TRAIN_PRESETS", "Forces", "LongitudinalForces"]

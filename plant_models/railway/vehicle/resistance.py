@@ -42,7 +42,7 @@ def gradient_resistance(mass: Array, gravity: Array, gradient: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class DavisCoefficients:
+class _DavisCoefficients:
     """Coefficients of ``F = a + b v + c v^2``: `a` [N], `b` [N.s/m], `c` [N.s2/m2]."""
 
     a: float
@@ -60,7 +60,7 @@ def davis_from_vehicle(
     gamma: float = 1.5,
     k1: float = 9e-4,
     k2: float = 30e-6,
-) -> DavisCoefficients:
+) -> _DavisCoefficients:
     """Davis coefficients from the dimensions of a vehicle.
 
     ``a = 1e-5 gamma M sqrt(1e4 / m)``, ``b = 3.6e-7 M``, ``c = 0.1296 (k1 S + k2 P L)``. The thesis does not name the
@@ -88,7 +88,7 @@ def davis_from_vehicle(
         if value <= 0.0:
             raise ValueError(f"davis_from_vehicle: {name} must be positive, got {value}.")
     newtons = 1e3
-    return DavisCoefficients(
+    return _DavisCoefficients(
         a=newtons * 1e-5 * gamma * mass * sqrt(1e4 / axle_mass),
         b=newtons * 3.6e-7 * mass,
         c=newtons * 0.1296 * (k1 * cross_section + k2 * perimeter * length),

@@ -5,8 +5,6 @@ Its errors obey a linear equation that no measurement enters, so one run without
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +14,6 @@ from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 HORIZON = 40.0  # [s]; the second regressor of the printed example has faded long before
 COARSE = 0.01  # [s], internal step: RK4 of frequencies of 20 rad/s to 1e-5
 LEFT = 0.02  # share of the first error that may be left in the states
-SHORTEST, _BISECTIONS = 0.02, 6  # [s], [1] of the search for the longest period
 LAST_PART = 0.8  # of the horizon; what is left after it counts
 
 
@@ -29,50 +26,6 @@ class Left(NamedTuple):
 
     states: float
     constants: tuple[float, ...]
-
-
-def adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: float = LEFT) -> float:
-    """Longest period [s] at which the adaptation leaves no more than a share of the states, to 5 %, rounded down.
-
-    By bisection, which takes what fails once for what fails from there on.
-
-    Args:
-        observer, parameters: as `errors_left`. high: from which on it is not looked for [s]. left: share of the first
-            error.
-
-    Returns:
-        The period; 0 where more is left at the shortest one tried too (`shortest_tried`), inf where no more is left at
-        `high`.
-    """
-    key = (observer.name, observer.model.name, observer.sizes, high, left, tuple(float(v) for v in parameters))
-    if key not in _LIMITS:
-        _LIMITS[key] = _longest_kept(lambda period: errors_left(observer, parameters, period).states < left, high)
-    return _LIMITS[key]
-
-
-def _longest_kept(keeps: Callable[[float], bool], high: float) -> float:
-    shortest = shortest_tried(high)
-    if high == 0.0 or not keeps(shortest):
-        return 0.0
-    if keeps(high):
-        return inf
-    low, top = shortest, high
-    for _ in range(_BISECTIONS):
-        middle = float(np.sqrt(low * top))
-        low, top = (middle, top) if keeps(middle) else (low, middle)
-    return low
-
-
-def shortest_tried(high: float) -> float:
-    """The shortest period that the search for the longest one tries [s].
-
-    Args:
-        high: from which on it is not looked for [s].
-    """
-    return min(SHORTEST, 0.5 * high)
-
-
-_LIMITS: dict[Any, float] = {}  # of this process; a run of 40 s takes a quarter of a second
 
 
 def errors_left(observer: Any, parameters: np.ndarray, period: float) -> Left:

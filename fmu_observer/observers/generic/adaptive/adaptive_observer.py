@@ -5,8 +5,9 @@ samples.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,7 +27,6 @@ from fmu_observer.formulas.adaptation.adaptive_law import (
     adaptation_flow,
     adaptation_of,
     adaptation_states,
-    covariance_after,
     error_drift,
     gains_of,
     learnt_constants,
@@ -38,18 +38,18 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.generic.adaptive.adaptive_certificate import (
-    HORIZON,
-    LEFT,
-    adaptation_limit,
-    errors_left,
-    shortest_tried,
-)
+from fmu_observer.observers.generic.adaptive.adaptive_certificate import HORIZON, LEFT, errors_left
 from fmu_observer.observers.generic.adaptive.adaptive_trials import adaptive_trial
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import arrival_event, estimate_outputs, estimate_states
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Array, Signal, output_signal, parameter, scalar_names
+
+SHORTEST, _BISECTIONS = 0.02, 6  # [s], [1] of the search for the longest period
+
+
+_LIMITS: dict[Any, float] = {}  # of this process; a run of 40 s takes a quarter of a second
+
 
 _LATER, _EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
 _LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
@@ -149,7 +149,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         """What is kept is set by the measurements, and the covariance with it; all else stays continuous."""
         V, variance = x.error_covariance, p.noise_deviation**2
         for row in range(self.sizes.q):
-            V = covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
+            V = _covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
         seen = {"seen_sensitivity": self.model.C @ x.sensitivity} if self.sizes.sampled else {}
         y = stacked_of(u, self.model.measurements, f"{self.model.event}_")
         return seen | {"error_covariance": V} | self.kept_after(x, y)
@@ -204,7 +204,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
             f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
         )
         known = first_unstable_gap([self.known_error(float(p.mu))], _LONGEST_PERIOD)
-        longest = adaptation_limit(self, values, min(known, _LONGEST_PERIOD))
+        longest = _adaptation_limit(self, values, min(known, _LONGEST_PERIOD))
         return replace(
             found,
             holds=found.holds and max_gap <= longest and left.states < LEFT,
@@ -248,7 +248,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         bounds = adaptive_bounds(self.model, mu)
         trial = adaptive_trial(self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True)))
         known = min(first_unstable_gap([self.known_error(mu)], _LONGEST_PERIOD), _LONGEST_PERIOD)
-        adapted = adaptation_limit(self, values, known, trial.left)
+        adapted = _adaptation_limit(self, values, known, trial.left)
         return (
             Limit(
                 "period of the samples",
@@ -263,7 +263,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
                 else (),
                 exact=adapted if known == _LONGEST_PERIOD else min(adapted, known),
                 searched_to=_LONGEST_PERIOD,
-                tried=shortest_tried(known),
+                tried=_shortest_tried(known),
                 exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
                 f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",
                 trial=trial,
@@ -305,3 +305,45 @@ def _adaptive_outputs(model: StateAffineModel) -> tuple[Signal, ...]:
         output_signal("smallest_excitation", "1", "Smallest eigenvalue of the mean Gramian of the excitation"),
         output_signal("innovation", "1", "Innovation that acts", size=None if q == 1 else q),
     )
+
+
+def _covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes, predicts: bool) -> Array:
+    """Covariance of the error after one measurement, shape (n + m + q, n + m + q)."""
+    n, m, _q = sizes[:3]
+    jump = np.eye(sizes.error)
+    place = n + m + row
+    jump[place, :] = 0.0
+    if not predicts:
+        jump[place, :n] = np.asarray(C)[row]
+    added = np.zeros((sizes.error, sizes.error))
+    added[place, place] = 1.0
+    return jump @ V @ jump.T + variance * added
+
+
+def _adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: float = LEFT) -> float:
+    """Longest period [s] at which the adaptation leaves no more than a share of the states, to 5 %, rounded down.
+
+    By bisection, which takes what fails once for what fails from there on.
+    """
+    key = (observer.name, observer.model.name, observer.sizes, high, left, tuple(float(v) for v in parameters))
+    if key not in _LIMITS:
+        _LIMITS[key] = _longest_kept(lambda period: errors_left(observer, parameters, period).states < left, high)
+    return _LIMITS[key]
+
+
+def _longest_kept(keeps: Callable[[float], bool], high: float) -> float:
+    shortest = _shortest_tried(high)
+    if high == 0.0 or not keeps(shortest):
+        return 0.0
+    if keeps(high):
+        return inf
+    low, top = shortest, high
+    for _ in range(_BISECTIONS):
+        middle = float(np.sqrt(low * top))
+        low, top = (middle, top) if keeps(middle) else (low, middle)
+    return low
+
+
+def _shortest_tried(high: float) -> float:
+    """The shortest period that the search for the longest one tries [s]."""
+    return min(SHORTEST, 0.5 * high)

@@ -16,10 +16,11 @@ from fmu_observer.certificates.printed_bounds.high_gain_theta import (
     theta_from_slopes,
 )
 from fmu_observer.models.known_models import find_model
-from fmu_observer.models.observer_model import ObserverModel
-from fmu_observer.models.suitability import require_triangular_chain
+from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from fmu_observer.observers.model_observer import ModelObserver
 from plant_models.hybrid import Array, parameter
+
+_POINTS = 5  # states at which the structure of the Jacobian is looked at
 
 
 class HighGain(ModelObserver):
@@ -39,7 +40,7 @@ class HighGain(ModelObserver):
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
-        require_triangular_chain(chosen, self.name)
+        _require_triangular_chain(chosen, self.name)
         self.gain_parameters = (
             parameter("theta", "1/s", 5.0, "High gain", min=0.0),
             self.gain_parameter("high_gain", binomial_gain(chosen.order), "Shape K of the gain"),
@@ -69,4 +70,42 @@ class HighGain(ModelObserver):
             statement="A - K C is Hurwitz (abscissa < 0) and theta >= smallest_theta, enough by e' P e with Q = I; "
             "less may do",
             source="Bouchama 2024, (1.13), Theorem 2, bound ours",
+        )
+
+
+def _require_one_output(model: ObserverModel, observer: str) -> None:
+    """The model has one measurement."""
+    if len(model.measurements) != 1:
+        raise ValueError(
+            f"{observer}: model {model.name!r} has {len(model.measurements)} measurements, expected one. Use "
+            f"'luenberger' or "
+            "'thau', whose gains are of shape (n, q)."
+        )
+
+
+def _require_triangular_chain(model: ObserverModel, observer: str) -> None:
+    """A is the shift matrix, the first state is measured, and phi_i depends on x_1 ... x_i only: Bouchama 2024, (1.10).
+
+    The last is read off the exact Jacobian of phi at a few states.
+    """
+    _require_one_output(model, observer)
+    n = model.order
+    where = f"{observer}: model {model.name!r} is not in the normal form (1.10): "
+    if not np.array_equal(model.A, shift_matrix(n)):
+        raise ValueError(
+            f"{where}A must be the upper shift matrix with everything else in phi, got {model.A.tolist()}."
+        )
+    if not np.array_equal(model.C, np.eye(n)[:1]):
+        raise ValueError(
+            f"{where}the first state must be measured, C = {np.eye(n)[:1].tolist()}, got {model.C.tolist()}."
+        )
+    generator = np.random.default_rng(0)
+    at = generator.normal(size=(_POINTS, n))
+    remainders = [np.asarray(model.jacobian(x, np.ones(len(model.inputs)))) - model.A for x in at]
+    above = np.abs(np.triu(np.stack(remainders), 1)).max(axis=0)
+    if above.max() > 0.0:
+        row, column = map(int, np.argwhere(above > 0.0)[0])
+        names = [s.name for s in model.states]
+        raise ValueError(
+            f"{where}phi of {names[row]!r} must not depend on {names[column]!r}, which stands behind it in the chain."
         )

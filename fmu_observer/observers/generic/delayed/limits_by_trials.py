@@ -24,7 +24,7 @@ _LONGEST_TRIAL = 2.0  # [s] of trials, each predictor its own share
 _THEOREM = "Hann 2014, (2.17)"
 
 
-class DelayedObserver(Protocol):
+class _DelayedObserver(Protocol):
     """What is asked of an observer of late measurements, see `DelayedStateObserver`."""
 
     model: ObserverModel
@@ -57,7 +57,7 @@ class DelayedObserver(Protocol):
         """The same observer with memory_places of memory."""
 
 
-def packet_limit(observer: DelayedObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
+def packet_limit(observer: _DelayedObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
     """Longest interval of the packets: (2.17), the spectral radius over a period of the protocol, trials.
 
     Args:
@@ -87,7 +87,7 @@ def packet_limit(observer: DelayedObserver, p: Any, named: Mapping[str, Any], bo
     )
 
 
-def delay_limit(observer: DelayedObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
+def delay_limit(observer: _DelayedObserver, p: Any, named: Mapping[str, Any], bounds: NetworkBounds) -> Limit:
     """Longest delay of an observer with predictors: (2.17) and (2.59), the roots of the linearised model, trials.
 
     Args:
@@ -121,19 +121,19 @@ def delay_limit(observer: DelayedObserver, p: Any, named: Mapping[str, Any], bou
     )
 
 
-def _interval(observer: DelayedObserver, p: Any) -> float:
+def _interval(observer: _DelayedObserver, p: Any) -> float:
     """First interval between packets at which the error grows from round to round [s]."""
     return first_unstable_gap(
         [observer.turned_error(observer.linearised_drift(), p, observer.turns)], _LONGEST_INTERVAL
     )
 
 
-def _trial(observer: DelayedObserver, what: Varied, high: float, named: Mapping[str, Any], **settings: Any) -> Trial:
+def _trial(observer: _DelayedObserver, what: Varied, high: float, named: Mapping[str, Any], **settings: Any) -> Trial:
     settings |= {"nodes": _nodes(observer), "node_events": observer.node_events}
     return model_trial(
         cast(ModelObserver, observer), what, high / 50.0, high, named, delay_parameter="delay", **settings
     )
 
 
-def _nodes(observer: DelayedObserver) -> int:
+def _nodes(observer: _DelayedObserver) -> int:
     return len(observer.turns) if len(observer.turns) > 1 else 0

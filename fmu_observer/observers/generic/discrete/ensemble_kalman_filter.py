@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.formulas.filtering.ensemble import correct_members, inflated, mean_of, variances_of
+from fmu_observer.formulas.filtering.ensemble import correct_members, mean_of, variances_of
 from fmu_observer.observers.generic.discrete.member_filter import CorrectedMembers, MemberFilter, Sample
 from plant_models.hybrid import Array, parameter
 
@@ -30,7 +30,7 @@ class EnsembleKalmanFilter(MemberFilter):
 
     def spread(self, members: Array, p: Any) -> Array:
         """Members moved apart, see `MemberFilter.spread`."""
-        return inflated(members, p.inflation)
+        return _inflated(members, p.inflation)
 
     def corrected(self, members: Array, x: Any, sample: Sample, u: Any, p: Any) -> CorrectedMembers:
         """Estimate, NIS, variances and members after the gain of the ensemble, see `MemberFilter.corrected`."""
@@ -38,3 +38,9 @@ class EnsembleKalmanFilter(MemberFilter):
         found = correct_members(self.spread(members, p), sample.seen, sample.y, sample.noise, draws)
         after = np.where(sample.count > 0.5, found.members, members)
         return CorrectedMembers(mean_of(after), found.nis, variances_of(after), after)
+
+
+def _inflated(members: Array, inflation: Array) -> Array:
+    """Members moved away from their mean, against the loss of spread in small ensembles."""
+    mean = mean_of(members).reshape(members.shape[0], 1)
+    return mean + inflation * (members - mean)

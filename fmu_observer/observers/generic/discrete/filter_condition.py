@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.design.pole_placement import observability_matrix
-from fmu_observer.design.riccati import steady_filter
 from fmu_observer.formulas.filtering.kalman import through
 from fmu_observer.models.filter_models import FilterModel, Known
 from plant_models.hybrid import Array
+
+
+@dataclass(frozen=True)
+class _SteadyFilter:
+    """Steady state of the filter ``x+ = A x + w``, ``y = C x + v``.
+
+    Attributes:
+        gain: filter gain K of ``xh(k|k) = xh(k|k-1) + K (y - C xh(k|k-1))``, shape (n, q).
+        predicted: covariance P(k|k-1), shape (n, n). updated: P(k|k), shape (n, n).
+        spectral_radius: of ``A (I - K C)`` [1].
+    """
+
+    gain: np.ndarray
+    predicted: np.ndarray
+    updated: np.ndarray
+    spectral_radius: float
+
 
 DOUBTED, WRONG = 1e-4, 1e-2  # differences at half the step: told, and too much for a filter to rest on [ours]
 _INACCURATE = (
@@ -38,7 +56,7 @@ def steady_condition(
     if not np.isfinite(np.asarray(F)).all():
         return _inaccurate(error, source)
     F, H, Q, R = (np.asarray(matrix) for matrix in (F, H, through(noise, W), through(readings, V)))
-    steady, observed = steady_filter(F, H, Q, R), observability_matrix(F, H)
+    steady, observed = _steady_filter(F, H, Q, R), observability_matrix(F, H)
     rank, reached = (int(np.linalg.matrix_rank(m)) for m in (observed, observability_matrix(F.T, Q)))
     return Condition(
         holds=steady is not None and error <= WRONG,
@@ -89,3 +107,15 @@ def _inaccurate(error: float, source: str) -> Condition:
     """Of a transition that gives no numbers."""
     text = "the transition over a period is a number"
     return Condition(False, {"transition_error": error}, text, source, (_INACCURATE.format(error=error),))
+
+
+def _steady_filter(A: np.ndarray, C: np.ndarray, QN: np.ndarray, RN: np.ndarray) -> _SteadyFilter | None:
+    """Solve the discrete Riccati equation of the filter."""
+    try:
+        P = scipy.linalg.solve_discrete_are(A.T, C.T, QN, RN)
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    gain = np.linalg.solve(C @ P @ C.T + RN, C @ P).T
+    rest = np.eye(len(A)) - gain @ C
+    radius = float(np.abs(np.linalg.eigvals(A @ rest)).max())
+    return _SteadyFilter(gain, P, rest @ P, radius) if radius < 1.0 else None
