@@ -8,6 +8,7 @@ Standard library only.
 
 from __future__ import annotations
 
+import builtins
 import logging
 import re
 import sys
@@ -26,10 +27,12 @@ T = TypeVar("T")
 LOG = logging.getLogger("plant_models")
 
 CLASS = re.compile(
-    r"^class (\w+)(?:\(([^)]*)\))?:|^    (?:name(?:: [^=\n]+)? = |check: Literal\[)((?:\"[^\"\n]+\"(?:, )?)+)", re.M
+    r"^class (\w+)(?:\(([^)]*)\))?:|^    (?:name(?:: [^=\n]+)? = |check: Literal\[)((?:\"[^\"\n]+\"(?:, )?)+)"
+    r"|^    def ([a-z]\w*)\(",
+    re.M,
 )
-"""A class at the top of a file with its bases, and the name that it states; a table states it, or several, in
-``check``."""
+"""A class at the top of a file with its bases, the name that it states, and its public methods; a table states its
+name, or several, in ``check``."""
 IMPORT = re.compile(r"^(?: {4})?from ([\w.]+) import (?:\(([^)]*)\)|(.*))", re.M)
 """Names that a file takes from another one."""
 
@@ -168,7 +171,8 @@ class Registry(MutableMapping[str, T], Generic[T]):
                 module = f"{room}.{path.stem}"
                 for cls, names in _source(module).names.items():
                     target = f"{module}:{cls}"
-                    for name in names if _descends(module, cls, self.base) else ():
+                    meant = _descends(module, cls, self.base) or _meant(module, cls, self.base)
+                    for name in names if meant else ():
                         yield Member(name, target, f"this package ({target})", room)
 
     def _announced(self) -> Iterator[Member]:
@@ -182,11 +186,13 @@ class _Source:
 
     Args:
         bases: of each class at the top of the file, as they are written. names: that a class states.
+        methods: public ones of a class.
         imports: module and name by which it is known there, by the name that it has here.
     """
 
     bases: dict[str, tuple[str, ...]]
     names: dict[str, tuple[str, ...]]
+    methods: dict[str, set[str]]
     imports: dict[str, tuple[str, str]]
 
 
@@ -200,10 +206,13 @@ def _source(module: str) -> _Source:
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
     bases: dict[str, tuple[str, ...]] = {}
     names: dict[str, tuple[str, ...]] = {}
+    methods: dict[str, set[str]] = {}
     cls = ""
-    for found, listed, stated in CLASS.findall(text):
+    for found, listed, stated, method in CLASS.findall(text):
         if found:
             cls, bases[found] = found, tuple(re.findall(r"(?:^|, *|\n *)([\w.]+)", re.sub(r"\[[^\]]*\]", "", listed)))
+        elif cls and method:
+            methods.setdefault(cls, set()).add(method)
         elif cls:
             names.setdefault(cls, tuple(re.findall('"(.+?)"', stated)))
     imports = {}
@@ -211,7 +220,7 @@ def _source(module: str) -> _Source:
         for words in (many or one).split("#")[0].split(","):
             own, _, alias = words.strip().partition(" as ")
             imports[alias or own] = (source, own)
-    return _Source(bases, names, imports)
+    return _Source(bases, names, methods, imports)
 
 
 @cache
@@ -223,6 +232,17 @@ def _descends(module: str, cls: str, base: str) -> bool:
     if cls in source.bases:
         return any(_descends(module, one.rpartition(".")[2], base) for one in source.bases[cls])
     return cls in source.imports and _descends(*source.imports[cls], base)
+
+
+@cache
+def _meant(module: str, cls: str, base: str) -> bool:
+    """Whether a class that states a name and has no base of this name is meant as a member all the same, so that its
+    look-up says what is wrong: it has a base that nobody defines, or a method of the base.
+    """
+    source, (home, _, root) = _source(module), base.partition(":")
+    unknown = [b for b in source.bases[cls] if not (b in source.bases or b in source.imports or hasattr(builtins, b))]
+    methods = _source(home).methods.get(root, set()) & source.methods.get(cls, set())
+    return bool(methods) or any("." not in name for name in unknown)
 
 
 def announced(group: str) -> EntryPoints:
@@ -315,10 +335,18 @@ def _load(member: Member, kind: str, base: str) -> Any:
         found = load(member.target)
     except (Exception, SystemExit) as error:  # whatever the code of others, or a file being written, raises on its way
         raise RegistryError(f"{what} cannot be loaded: {explained(error)}") from error
-    if not member.room and not _is_member(found, base):
-        raise RegistryError(f"{what} is no subclass of {base.replace(':', '.')}.")
+    if not _is_member(found, base):
+        raise RegistryError(f"{what} is no subclass of {base.replace(':', '.')}{_its_bases(found, base)}.")
     _require_whole(found, what)
     return found
+
+
+def _its_bases(found: Any, base: str) -> str:
+    """Bases of a class that has others than the one expected, and how to write it; empty for what is no class."""
+    if not isinstance(found, type):
+        return ""
+    named = ", ".join(b.__name__ for b in found.__bases__ if b is not object) or "none"
+    return f": its bases are {named}; write class {found.__name__}({base.rpartition(':')[2]})"
 
 
 def _is_member(found: Any, base: str) -> bool:

@@ -103,7 +103,9 @@ def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
     found = getattr(module, wanted or "-", None)
     if expected.accepts(found):
         return _whole(found, name)
-    what = f" ({wanted} is {_kind(found)})" if found is not None else ""
+    others = {wanted: found} if wanted else {key: value for key, value in own.items() if not fitting}
+    named = ", ".join(f"{key} is {_kind(value)}" for key, value in others.items() if value is not None)
+    what = f" ({named})" if named else ""
     raise UserFileError(
         f"{path} has no {expected.noun} named {wanted!r}{what}; it has: {', '.join(fitting) or 'none'}."
         + (f" Write {path}:Class." if fitting else "")
@@ -160,7 +162,10 @@ def name_of(model: Any) -> str:
 
 def _kind(found: Any) -> str:
     if isinstance(found, type):
-        return f"{'an abstract' if isabstract(found) else 'a'} class"
+        bases = " and ".join(base.__name__ for base in found.__bases__ if base is not object)
+        return (
+            f"{'an abstract' if isabstract(found) else 'a'} class {f'of base {bases}' if bases else 'without a base'}"
+        )
     return f"of type {type(found).__name__}"
 
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from abc import abstractmethod
 from importlib.metadata import EntryPoint
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -113,7 +114,13 @@ FAULTS = {
     "syntax.py:Bias": ("class Bias(:\n", r"cannot be run: SyntaxError: .*syntax.py:1\)"),
     "leaves.py:Bias": ("import sys\nsys.exit('bye')\n", r"cannot be run: SystemExit: bye \(.*leaves.py:2\)"),
     "number.py:Bias": ("Bias = 3.0\n", r"named 'Bias' \(Bias is of type float\)"),
-    "bare.py:Bias": ("class Bias:\n    pass\n", r"named 'Bias' \(Bias is a class\)"),
+    "bare.py:Bias": ("class Bias:\n    pass\n", r"named 'Bias' \(Bias is a class without a base\)"),
+    "no_base.py": ("class Bias:\n    name = 'bias'\n", r"named '' \(Bias is a class without a base\)"),
+    "other_base.py:Bias": ("class Bias(dict):\n    pass\n", r"named 'Bias' \(Bias is a class of base dict\)"),
+    "misspelt.py:Bias": (
+        "from plant_models.hybrid import HybridSystem\nclass Bias(HybridSytem):\n    name = 'bias'\n",
+        r"NameError: name 'HybridSytem' is not defined; did you mean 'HybridSystem'\? \(.*misspelt.py:2\)",
+    ),
     "two.py": (
         "class One:\n    step = print\nclass Two:\n    step = print\n",
         "it has: One, Two. Write [^ ]*two.py:Class",
@@ -269,6 +276,32 @@ def own_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry[Any]:
 def test_a_member_is_a_subclass_of_the_base_whatever_else_has_a_name(own_room: Registry[Any]) -> None:
     assert list(own_room) == ["bare", "unfinished"]
     assert own_room["bare"].__name__ == "Bare"
+
+
+MEANT = ':\n    name = "new"\n\n    def flow(self): ...\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("class New(Roott)", "name 'Roott' is not defined; did you mean 'Root'\\?"),
+        ("class New", "its bases are none; write class New\\(Base\\)"),
+        ("class New(ABC)", "its bases are ABC; write class New\\(Base\\)"),
+    ],
+)
+def test_a_member_whose_base_is_misspelt_is_listed_and_its_look_up_says_so(
+    own_room: Registry[Any], text: str, words: str
+) -> None:
+    (room,) = own_room.rooms
+    folder = Path(next(iter(find_spec(room).submodule_search_locations)))  # type: ignore[union-attr,arg-type]
+    (folder / "added.py").write_text(
+        ROOM.format(package=room.split(".")[0]).split("class")[0] + text + MEANT, encoding="utf-8"
+    )
+    (folder.parent / "base.py").write_text("class Base:\n    def flow(self): ...\n", encoding="utf-8")
+    registry._files_of.cache_clear()
+    assert "new" in own_room
+    with pytest.raises(RegistryError, match=f"the thing 'new' of this package .*{words}"):
+        own_room["new"]
 
 
 def test_a_member_that_is_not_complete_is_told_with_what_it_lacks(own_room: Registry[Any]) -> None:
