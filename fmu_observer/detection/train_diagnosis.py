@@ -27,7 +27,6 @@ from fmu_observer.formulas.diagnosis.isolation_table import largest
 from plant_models.hybrid import Array, HybridSystem, vector
 from plant_models.hybrid.event import IGNORED, USED
 from plant_models.hybrid.option import require_whole
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.vehicle.pneumatic_brake import filling, limited
 
 _SPEED_PAIRS = 6  # residuals of speed stand first in `MOTION`
@@ -75,6 +74,7 @@ class TrainDiagnosis(HybridSystem):
     description = "Faults of a train's odometers, radar, satellites, balises, brake and traction: isolated and timed"
     source = "Omar 2012, 7.5.1, (7.6.9)-(7.6.13), (7.7.6)-(7.7.8), for a train; table of isolation ours"
     internal_step = 1e-2  # the flow is exact for held inputs, but for the cylinder's lag
+    bounded_parameters = "all"
     inputs = INPUTS
     outputs = OUTPUTS
     parameters = PARAMETERS
@@ -110,10 +110,6 @@ class TrainDiagnosis(HybridSystem):
             fitted: names of sensors.
         """
         return isolability(fitted)
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        """Thresholds and times are within their bounds; a threshold of zero would be an alarm for ever."""
-        return super().requirements(p) | within_bounds(self.parameters, p)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         pipe = p.pipe_pressure_released - limited(u.brake_demand) * p.pipe_depression_full

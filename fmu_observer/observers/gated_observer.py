@@ -16,7 +16,7 @@ from fmu_observer.observers.innovation_gate import (
     ReportedPlace,
     judge,
 )
-from plant_models.hybrid import Array, Event, HybridSystem, Signal, TriggeredEvent, input_signal
+from plant_models.hybrid import Array, Event, HybridSystem, TriggeredEvent, input_signal
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.requirements import within_bounds
 
@@ -47,7 +47,6 @@ class GatedObserver(HybridSystem):
        the weight of the gate, so its gain is scaled down by it, and never up. ``position``: at a balise it sets
        `weighed_states`, and they go to that value by the weight. ``itself``: it has a variance of the place, and
        `place_deviation` gives it.
-    5. Time does not run where one of its `bounded_parameters` is out of its bounds.
 
     Args:
         options: of the observer, see its `option_choices`.
@@ -56,7 +55,6 @@ class GatedObserver(HybridSystem):
     position_state: str = ""
     gate_start: float = REJECT
     weighing: _Weighing = "innovation"
-    bounded_parameters: tuple[Signal, ...] = ()
     weighed_states: ClassVar[tuple[str, ...]] = ("estimated_position",)
 
     def __init__(self, **options: Any) -> None:
@@ -92,9 +90,8 @@ class GatedObserver(HybridSystem):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Bounds of the gate's parameters and of `bounded_parameters`, see `HybridSystem.requirements`."""
-        of_gate = GATE_PARAMETERS if self.gated else ()
-        return super().requirements(p) | within_bounds((*of_gate, *self.bounded_parameters), p)
+        """Bounds of the gate's parameters, and what `HybridSystem.requirements` says."""
+        return within_bounds(GATE_PARAMETERS if self.gated else (), p) | super().requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """`update`, where the gate lets the telegram pass."""

@@ -12,7 +12,6 @@ from plant_models.faults.fault_cause import Carrier, Fault, FaultCause, one_wher
 from plant_models.hybrid import Array, HybridSystem, OutputWarning, Signal, output_signal, vector
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import MemberNames, require_whole
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.user_file import Expected, load_class, make, names_code
 
 CAUSES = MemberNames(FAULT_CAUSES)
@@ -35,6 +34,7 @@ class FaultSystem(HybridSystem):
     """
 
     internal_step = 1e-2  # what flows is exact for a held input, whatever the step
+    bounded_parameters = "all"
     purpose = Purpose.FAULTS
 
     def __init__(self, carrier: Carrier, **options: Any) -> None:
@@ -75,7 +75,7 @@ class FaultSystem(HybridSystem):
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and what the cause requires."""
-        return {**within_bounds(self.parameters, p), **self.cause.requirements(p)}
+        return {**super().requirements(p), **self.cause.requirements(p)}
 
     def _refuse_clashes(self, cause: FaultCause) -> None:
         """A name of the cause that means something else in the system."""

@@ -40,6 +40,7 @@ class Declarations:
     frictions: tuple[str, ...] = ()
     switchings: tuple[str, ...] = ()
     stiff: tuple[str, ...] = ()
+    bounded_parameters: tuple[Signal, ...] | Literal["all"] = ()
     resources: tuple[Resource, ...] = ()
     presets: Mapping[str, Mapping[str, Any]] = {}
     default_preset: str | None = None

@@ -18,6 +18,7 @@ from plant_models.hybrid.arrays import Array, of_length, vector
 from plant_models.hybrid.declaration_checks import check_declarations
 from plant_models.hybrid.declarations import Declarations
 from plant_models.hybrid.missing import is_there, or_else
+from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.signal_layout import SignalLayout
 
 __all__ = ["HybridSystem"]
@@ -49,10 +50,11 @@ class HybridSystem(Declarations):
     8. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
     9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The
        step keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
-    10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or
-        what several must fulfil together. They are checked before time runs, so they are about fixed parameters.
+    10. Time does not run with parameters that break one of the `requirements`: bounds of the `bounded_parameters`
+        (``"all"`` for every one), or what several must fulfil together. They are checked before time runs, so they are
+        about fixed parameters.
         Nor does it begin with states that break one of the `start_requirements`; later nobody asks for these.
-    11. `late_policy` is what an event stamped in the past means unless it is told otherwise: to be replayed at its
+    11. `late_policy` is what an event stamped in the past means unless it is set otherwise: to be replayed at its
         stamp, to be rejected, or, for equations that count with the delay, to act when it arrives (``late``).
     12. Measurements that an event reads are its `samples`. They become signals that can be missing, and the memory
         `MISSED` is put behind all states, which counts them; `jump` neither gets nor returns it.
@@ -91,10 +93,11 @@ class HybridSystem(Declarations):
         return np.zeros(len(self.switchings))
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else
-        0.
+        """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else 0;
+        by itself that `bounded_parameters` are within their bounds.
         """
-        return {}
+        bounded = self.parameters if self.bounded_parameters == "all" else self.bounded_parameters
+        return within_bounds(bounded, p)
 
     def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """What the states must fulfil where time begins, by what is said where they do not (it names them): 1 where

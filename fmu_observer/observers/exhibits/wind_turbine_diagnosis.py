@@ -53,7 +53,6 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
-from plant_models.hybrid.requirements import within_bounds
 
 
 class _Group(NamedTuple):
@@ -147,6 +146,7 @@ class WindTurbineDiagnosis(HybridSystem):
     description = "Faults of a wind turbine: sensors, converter, pitch actuators, efficiency of the drive train"
     source = "Omar 2012, sections 7.5-7.8; thresholds ours"
     internal_step = 1e-2  # nothing flows
+    bounded_parameters = "all"
     states = (
         memory("samples", "1", 0.0, "Samples since the start"),
         memory("repeated", "1", 0.0, "Samples at which no reading of speeds and torque was a new one"),
@@ -231,7 +231,7 @@ class WindTurbineDiagnosis(HybridSystem):
             f"{name} must be above zero: any reading would be a fault": np.where(getattr(p, name) > 0.0, 1.0, 0.0)
             for name, *_ in _LIMITS
         }
-        return within_bounds(self.parameters, p) | dict(limits) | grid_requirements(p) | period_requirements(p)
+        return super().requirements(p) | dict(limits) | grid_requirements(p) | period_requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""

@@ -31,7 +31,6 @@ from plant_models.hybrid import (
     parameter,
 )
 from plant_models.hybrid.missing import is_there, or_else
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.traction.motor_equations import AXES, MOTOR_PARAMETERS, TRACTION_200_KW
 
 STATES = (
@@ -62,6 +61,7 @@ class MotorFilter(HybridSystem):
     """
 
     internal_step = 1e-2  # nothing flows between samples
+    bounded_parameters = "all"
 
     def __init__(self, frame: str, known_load: bool, start_variance: Sequence[float], **options: Any) -> None:
         self.frame, self.known_load = frame, known_load
@@ -142,9 +142,6 @@ class MotorFilter(HybridSystem):
             "nis": x.held_nis,
             "innovation_likelihood": x.log_likelihood,
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)
 
     def start_requirements(self, x: Any, p: Any) -> dict[str, Array]:
         """The covariance of the first estimate is one."""

@@ -24,7 +24,6 @@ from plant_models.hybrid import (
     state,
     vector,
 )
-from plant_models.hybrid.requirements import within_bounds
 
 BLADES = 3
 
@@ -63,6 +62,7 @@ class WindTurbine(HybridSystem):
     description = "Wind turbine of the benchmark on fault detection, with two sensors for each speed and pitch"
     source = "Omar 2012, (7.3.1)-(7.3.5); Odgaard, Stoustrup, Kinnaert 2009; power coefficient: Heier, stand-in"
     internal_step = 1e-2  # the shaft swings with 28 rad/s; with this step its damping is 0.6 % too strong
+    bounded_parameters = "all"
     states = (
         state("rotor_turning", "rad/s", 1.1, "Speed of the rotor"),
         state("generator_turning", "rad/s", 104.5, "Speed of the generator"),
@@ -206,9 +206,6 @@ class WindTurbine(HybridSystem):
             **{f"measured_{name}": getattr(x, f"held_{name}") for name, *_ in _MEASURED},
             "drive_train_unstable": 1.0 - stable[0] * stable[1] * stable[2],
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)
 
 
 def _rotor(p: Any) -> Rotor:

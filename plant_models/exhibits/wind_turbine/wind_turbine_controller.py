@@ -10,7 +10,6 @@ import numpy as np
 
 from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.hybrid.requirements import within_bounds
 
 LEAST_SPEED = 1.0  # [rad/s]; a generator that stands would be asked for an infinite torque
 
@@ -33,6 +32,7 @@ class WindTurbineController(HybridSystem):
     description = "Controller of a wind turbine: measured generator speed and power in, torque and pitch out"
     source = "Omar 2012, section 7.2.2; Odgaard, Stoustrup, Kinnaert 2009"
     internal_step = 1e-2  # nothing flows
+    bounded_parameters = "all"
     states = (
         memory("strong_wind", "1", 0.0, "1 in zone 3, 0 in zone 2"),
         memory("held_pitch", "deg", 0.0, "Pitch reference"),
@@ -86,4 +86,4 @@ class WindTurbineController(HybridSystem):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and the limits of the pitch are in order."""
         ordered = np.where(p.most_pitch >= p.least_pitch, 1.0, 0.0)
-        return {**within_bounds(self.parameters, p), "most_pitch must not lie below least_pitch": ordered}
+        return {**super().requirements(p), "most_pitch must not lie below least_pitch": ordered}

@@ -23,7 +23,6 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.network.loss import loss_threshold
 from plant_models.railway.network.protocols import smallest, try_once_discard
 
@@ -63,6 +62,7 @@ class NetworkProtocol(HybridSystem):
     description = "Network: signals in, values last received out, one node at a time, delayed"
     source = "Hann 2014, section 1.1.3, (2.3) to (2.7); loss is ours"
     internal_step = 1e-2  # nothing flows
+    bounded_parameters = "all"
     purpose = Purpose.NETWORK
     events = (
         PeriodicEvent(
@@ -143,7 +143,7 @@ class NetworkProtocol(HybridSystem):
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds; every signal has a node, and every node its turn."""
-        needed = dict(within_bounds(self.parameters, p))
+        needed = super().requirements(p)
         if self.protocol == "periodic":
             for node in range(1, self.nodes + 1):
                 times = sum(np.where(p.order[i] == float(node), 1.0, 0.0) for i in range(self.turns))

@@ -22,7 +22,6 @@ from plant_models.hybrid import (
     state,
 )
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 
 CountFrom = Literal["wheel_speed", "wheel_distance"]
@@ -57,6 +56,7 @@ class PulseOdometer(HybridSystem):
     description = "Toothed wheel odometer: counted pulses, sampled at 50 ms and aggregated at 200 ms"
     source = "Aguiar Cota 2019, section 2.1.2; teeth and radius are ours"
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
+    bounded_parameters = "all"
     outputs = (
         output_signal(
             "reading", "m/s", "Speed over the last aggregation period", variability="discrete", display_unit="km/h"
@@ -137,7 +137,7 @@ class PulseOdometer(HybridSystem):
         off = np.abs(samples - np.floor(samples + 0.5))
         whole = "aggregation_period must be a whole multiple of sample_period"
         return {
-            **within_bounds(self.parameters, p),
+            **super().requirements(p),
             whole: np.where(samples > 0.5, np.where(off < 1e-6, 1.0, 0.0), 0.0),
         }
 

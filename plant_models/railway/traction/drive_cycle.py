@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, output_signal, parameter
-from plant_models.hybrid.requirements import within_bounds
 
 RPM_1000 = 1000.0 * 2.0 * float(np.pi) / 60.0
 RPM_100 = 0.1 * RPM_1000
@@ -31,6 +30,7 @@ class DriveCycle(HybridSystem):
     description = "Speed reference and load torque of a drive, in steps"
     source = "Allaoui 2024, section III.3, Figs. 3.10, 4.16-4.18; speeds are ours"
     internal_step = 1e-2  # nothing flows
+    bounded_parameters = "all"
     outputs = (
         output_signal("speed_reference", "rad/s", "Speed asked for", display_unit="rpm", variability="discrete"),
         output_signal("load_torque", "N.m", "Torque of the load against the rotation", variability="discrete"),
@@ -59,6 +59,3 @@ class DriveCycle(HybridSystem):
             "speed_reference": p.speed * np.where(turns, 1.0 - 2.0 * odd, 1.0),
             "load_torque": np.where(loaded, p.load_torque_after, p.load_torque_before) + 0.0 * t,
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)

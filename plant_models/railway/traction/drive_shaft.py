@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
-from plant_models.hybrid.requirements import within_bounds
 
 
 class DriveShaft(HybridSystem):
@@ -28,6 +27,7 @@ class DriveShaft(HybridSystem):
     description = "Elastic drive shaft with gear between traction motors and wheels"
     source = "ours"
     internal_step = 1e-3
+    bounded_parameters = "all"
     states = (state("twist", "rad", 0.0, "Twist of the shaft, side of the motor"),)
     inputs = (
         input_signal("motor_speed", "rad/s", 0.0, "Speed of the motor's shaft", display_unit="rpm"),
@@ -66,9 +66,6 @@ class DriveShaft(HybridSystem):
             "estimated_wheel_speed": u.estimated_motor_speed * p.wheel_radius / p.gear_ratio,
             "torque_reference": u.wanted_effort * p.wheel_radius / (p.motors * p.gear_ratio),
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)
 
 
 def _slip(u: Any, p: Any) -> Array:

@@ -9,7 +9,6 @@ import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
 from plant_models.railway.traction.transforms import to_rotor, to_stator
 
@@ -41,6 +40,7 @@ class FieldOrientedControl(HybridSystem):
     description = "Field-oriented control of a synchronous motor, speed and currents"
     source = "Allaoui 2024, section IV.2.3.8, Fig. 4.15; gains and limits are ours"
     internal_step = 1e-2  # nothing flows
+    bounded_parameters = "all"
     states = (
         memory("speed_integral", "A", 0.0, "Integral of the speed control"),
         memory("integral_d", "V", 0.0, "Integral of the current control along d"),
@@ -144,9 +144,6 @@ class FieldOrientedControl(HybridSystem):
             "voltage_beta": beta,
             "current_reference": x.held_reference,
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)
 
 
 def _limited(asked: Array, limit: Array) -> Array:

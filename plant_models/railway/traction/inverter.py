@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.traction.transforms import clarke, inverse_clarke
 
 
@@ -28,6 +27,7 @@ class Inverter(HybridSystem):
     description = "Voltage-source inverter with space-vector modulation, averaged"
     source = "standard averaged model; Allaoui 2024, Fig. 4.15, names one"
     internal_step = 1e-2  # nothing flows
+    bounded_parameters = "all"
     inputs = (
         input_signal("wanted_voltage_alpha", "V", 0.0, "Voltage asked for along alpha"),
         input_signal("wanted_voltage_beta", "V", 0.0, "Voltage asked for along beta"),
@@ -56,6 +56,3 @@ class Inverter(HybridSystem):
             **{f"duty_{phase}": duty for phase, duty in zip("abc", duties, strict=True)},
             "direct_current": power / p.direct_voltage,
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)

@@ -7,7 +7,6 @@ from typing import Any, ClassVar, Literal
 
 from plant_models.hybrid import Array, HybridSystem, Signal, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.traction.motor_equations import (
     AXES,
     FRAMES,
@@ -57,6 +56,7 @@ class SynchronousMotor(HybridSystem):
     description = "Permanent-magnet synchronous motor in the rotor frame, continuous"
     source = "Allaoui 2024, (4.27)-(4.38), Annex C"
     internal_step = 1e-4
+    bounded_parameters = "all"
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(state)
     parameters: tuple[Signal, ...] = MOTOR_PARAMETERS
     presets: Mapping[str, Mapping[str, Any]] = {"exact": {}, "traction_200kw": TRACTION_200_KW}
@@ -114,6 +114,3 @@ class SynchronousMotor(HybridSystem):
     def _moving(x: Any) -> State:
         """Currents along d and q [A], speed [rad/s] and angle [rad]."""
         return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.railway.traction.motor_equations import MOTOR_PARAMETERS
 from plant_models.railway.traction.transforms import park
 
@@ -32,6 +31,7 @@ class ThreePhaseMotor(HybridSystem):
     description = "Permanent-magnet synchronous motor in its three phases"
     source = "Allaoui 2024, (4.22)-(4.26)"
     internal_step = 1e-4
+    bounded_parameters = "all"
     states = (
         state("phase_current_a", "A", 0.0, "Current of phase a"),
         state("phase_current_b", "A", 0.0, "Current of phase b"),
@@ -85,9 +85,6 @@ class ThreePhaseMotor(HybridSystem):
             "angle": x.electrical_angle,
             "torque": _torque(currents, _flux_slopes(x.electrical_angle, p), p),
         }
-
-    def requirements(self, p: Any) -> dict[str, Array]:
-        return within_bounds(self.parameters, p)
 
 
 def _currents(x: Any) -> tuple[Array, Array, Array]:
