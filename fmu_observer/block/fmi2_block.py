@@ -108,54 +108,30 @@ class FMI2Block(FMIInterface, FMU2Slave):
 
     @refused
     def getReal(self, vr: Sequence[int]) -> list[float]:
-        """Values of Real variables.
-
-        Args:
-            vr: value references.
-        """
+        """Values of Real variables."""
         return self.instance.get(vr)
 
     @refused
     def setReal(self, vr: Sequence[int], value: Sequence[float]) -> None:
-        """Set Real variables.
-
-        Args:
-            vr: value references.
-        """
+        """Set Real variables."""
         self.instance.set(vr, value)
 
     @refused
     def getInteger(self, vr: Sequence[int]) -> list[int]:
-        """Values of event counts, integer outputs, counts of outcomes and the late policy.
-
-        Args:
-            vr: value references.
-        """
+        """Values of event counts, integer outputs, counts of outcomes and the late policy."""
         return self.instance.get_whole(vr, WHOLE)
 
     @refused
     def setInteger(self, vr: Sequence[int], value: Sequence[int]) -> None:
-        """Set event counts, or the late policy.
-
-        Args:
-            vr: value references.
-        """
+        """Set event counts, or the late policy."""
         self.instance.set_whole(vr, value, WHOLE)
 
     def fmi2SetReal(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float]) -> None:
-        """The low-level setter used by fmpy's `Input`.
-
-        Args:
-            vr: value references.
-        """
+        """The low-level setter used by fmpy's `Input`."""
         self.setReal(list(vr), list(values))
 
     def fmi2SetInteger(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[int]) -> None:
-        """The low-level setter used by fmpy's `Input`.
-
-        Args:
-            vr: value references.
-        """
+        """The low-level setter used by fmpy's `Input`."""
         self.setInteger(list(vr), list(values))
 
     @refused

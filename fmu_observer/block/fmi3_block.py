@@ -103,22 +103,14 @@ class FMI3Block(FMIInterface, FMU3Slave):
 
     @allowed_in("event")
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
-        """Activate triggered input clocks; the events happen in `updateDiscreteStates`.
-
-        Args:
-            vr: value references.
-        """
+        """Activate triggered input clocks; the events happen in `updateDiscreteStates`."""
         active = self.instance.events.active
         for number, value in zip(list(map(self.instance.variables.clock_number, vr)), values, strict=True):
             (active.add if value else active.discard)(number)
 
     @allowed_in(*ALIVE)
     def getClock(self, vr: Sequence[int]) -> list[bool]:
-        """Whether clocks are active.
-
-        Args:
-            vr: value references.
-        """
+        """Whether clocks are active."""
         return [self.instance.variables.clock_number(reference) in self.instance.events.active for reference in vr]
 
     @refused
@@ -165,17 +157,13 @@ class FMI3Block(FMIInterface, FMU3Slave):
         """Values of Float64 variables.
 
         Args:
-            vr: value references. nValues: how many values are expected; None for one a reference.
+            nValues: how many values are expected; None for one a reference.
         """
         return self.instance.get(vr)
 
     @refused
     def setFloat64(self, vr: Sequence[int], values: Sequence[float]) -> None:
-        """Set Float64 variables.
-
-        Args:
-            vr: value references.
-        """
+        """Set Float64 variables."""
         self.instance.set(vr, values)
 
     @refused
@@ -183,17 +171,13 @@ class FMI3Block(FMIInterface, FMU3Slave):
         """Values of event counts, integer outputs and counts of outcomes.
 
         Args:
-            vr: value references. nValues: how many values are expected; None for one a reference.
+            nValues: how many values are expected; None for one a reference.
         """
         return self.instance.get_whole(vr, INT32)
 
     @refused
     def setInt32(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set event counts.
-
-        Args:
-            vr: value references.
-        """
+        """Set event counts."""
         self.instance.set_whole(vr, values, INT32)
 
     @refused
@@ -201,27 +185,19 @@ class FMI3Block(FMIInterface, FMU3Slave):
         """The number of the late policy.
 
         Args:
-            vr: value references. nValues: how many values are expected; None for one a reference.
+            nValues: how many values are expected; None for one a reference.
         """
         return self.instance.get_whole(vr, INT64)
 
     @refused
     def setInt64(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set the late policy by its number.
-
-        Args:
-            vr: value references.
-        """
+        """Set the late policy by its number."""
         self.instance.set_whole(vr, values, INT64)
 
     def fmi3SetFloat64(
         self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int
     ) -> None:
-        """The low-level setter used by fmpy's `Input`.
-
-        Args:
-            vr: value references.
-        """
+        """The low-level setter used by fmpy's `Input`."""
         self.setFloat64(list(vr), list(values))
 
     @refused

@@ -70,7 +70,6 @@ def recovery_bounds(
     Args:
         drifts: ``A_1``, ``A_2`` of speed, disturbance and its rate, shape (2, 3, 3). gains: ``K_1``, ``K_2``, shape (2,
             3, 1).
-        p: parameters of the observer, as in `HybridSystem.flow`.
         onset_error: bound of the speed error at the onset of a fault, e_0 [m/s].
         disturbance_error: bound of the error of the disturbance when the speed is last set to the odometer [m/s2].
         rate_error: bound of the error of its rate then [m/s3].

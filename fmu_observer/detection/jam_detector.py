@@ -35,7 +35,7 @@ def verdict(rules: Rules, m: Any, p: Any) -> dict[str, Array]:
     """Values of `FAULT_OUTPUTS`.
 
     Args:
-        rules: that judge. m: named tuple with their `memory`. p: parameters, as in `HybridSystem.flow`.
+        rules: that judge. m: named tuple with their `memory`.
     """
     return {
         "odometer_fault": rules.fault(m),
@@ -54,11 +54,7 @@ def stated_bounds(rules: Rules) -> dict[str, str]:
 
 
 def noise_warnings(p: Any) -> list[str]:
-    """What a user should read before a run where faults are judged by noise and not by the threshold, in words.
-
-    Args:
-        p: parameters of a system with the rules.
-    """
+    """What a user should read before a run where faults are judged by noise and not by the threshold, in words."""
     if not hasattr(p, NOISE) or doubt_limit(p) <= p.threshold:
         return []
     half, sure = float(doubt_limit(p) / p.residual_gain), float(certain_fault(p))
@@ -118,11 +114,7 @@ class JamDetector(HybridSystem):
         super().__init__(rules=rules)
 
     def working_point(self, p: Any) -> list[str]:
-        """Which faults cannot be told from the noise of a reading, in words; nothing where the threshold is beyond it.
-
-        Args:
-            p: parameters, as in `HybridSystem.flow`.
-        """
+        """Which faults are hidden by the noise of a reading, in words; nothing where the threshold is beyond it."""
         return noise_warnings(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

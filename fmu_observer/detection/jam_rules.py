@@ -96,14 +96,14 @@ class Rules(Protocol):
         """Judge an odometer sample.
 
         Args:
-            m: named tuple with the `memory`. reading: the sample. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. reading: the sample.
         """
 
     def at_balise(self, m: Any, passing: Passing, p: Any) -> Judgement:
         """Judge the way between two balises; nothing follows where the rules know no balises.
 
         Args:
-            m: named tuple with the `memory`. passing: the way. p: parameters, as in `HybridSystem.flow`.
+            m: named tuple with the `memory`. passing: the way.
         """
         return Judgement({})
 
@@ -133,14 +133,14 @@ class Rules(Protocol):
         """Residual at which the verdict changes [m/s].
 
         Args:
-            m: named tuple with the `memory`. p: parameters.
+            m: named tuple with the `memory`.
         """
 
     def settled_time(self, m: Any, p: Any) -> Array:
         """Time that counts towards judging faults at all [s].
 
         Args:
-            m: named tuple with the `memory`. p: parameters.
+            m: named tuple with the `memory`.
         """
 
 
@@ -402,7 +402,7 @@ def agreement_limit(hold_time: Array, p: Any) -> Array:
     """Residual within which a held odometer agrees [m/s]: ``eps' + M delta T``.
 
     Args:
-        hold_time: for which the model has run alone, T [s]. p: parameters.
+        hold_time: for which the model has run alone, T [s].
     """
     return doubt_limit(p) + p.residual_gain * p.disturbance_bound * hold_time
 
@@ -418,11 +418,7 @@ def _noise_residual(p: Any) -> Array:
 
 
 def doubt_limit(p: Any) -> Array:
-    """Residual beyond which an odometer is doubted [m/s]: eps, or what noise explains where that is more.
-
-    Args:
-        p: parameters.
-    """
+    """Residual beyond which an odometer is doubted [m/s]: eps, or what noise explains where that is more."""
     return np.maximum(p.threshold, _noise_residual(p))
 
 
@@ -430,9 +426,6 @@ def settled_limit(p: Any) -> Array:
     """Residual of an estimate that has settled, at most [m/s]: eps / 2, or what noise explains where that is more.
 
     It is asked of all samples of a time, up to `trust_time`, so that noise must not be beyond it.
-
-    Args:
-        p: parameters.
     """
     return np.maximum(0.5 * p.threshold, _noise_residual(p))
 
@@ -440,9 +433,6 @@ def settled_limit(p: Any) -> Array:
 def certain_fault(p: Any) -> Array:
     """Error of a reading beyond which it is doubted whatever its noise, where the estimate is right [m/s]:
     ``eps' / M + nu``. At ``eps' / M`` one in two is.
-
-    Args:
-        p: parameters.
     """
     return doubt_limit(p) / p.residual_gain + p.odometer_noise
 

@@ -120,7 +120,7 @@ def traction_share(window: MotionWindow, previous: Array, step: Array, mass: Arr
     Told where traction alone changes the speed by `least_excitation`, and the brake by less than a fifth of that.
 
     Args:
-        window: means. previous: share found last [1]. step: of the window [s]. mass: [kg]. p: parameters.
+        window: means. previous: share found last [1]. step: of the window [s]. mass: [kg].
     """
     drive, brake, other = between(window.drive), between(window.demanded), between(window.other)
     pulled, braked = step * sum(drive), step * sum(brake)
@@ -140,7 +140,7 @@ def brake_share(
 
     Args:
         decelerations: by the pressure, measured or demanded [m/s2], M of them. window: means. previous: share found
-            last [1]. step: of the window [s]. mass: [kg]. p: parameters.
+            last [1]. step: of the window [s]. mass: [kg].
     """
     drive, brake, other = between(window.drive), between(decelerations), between(window.other)
     pulled, braked = step * sum(drive), step * sum(between(window.demanded))
@@ -161,6 +161,6 @@ def moving(window: MotionWindow, p: Any) -> Array:
     """1 where the train moved faster than `least_speed` at both ends of the window, else 0.
 
     Args:
-        window: means. p: parameters.
+        window: means.
     """
     return np.where(np.minimum(window.speed[0], window.speed[-1]) > p.least_speed, 1.0, 0.0)

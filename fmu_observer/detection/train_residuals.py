@@ -45,11 +45,7 @@ def there(value: Array) -> Array:
 
 
 def readings(u: Any) -> Readings:
-    """What the sensors read.
-
-    Args:
-        u: inputs of the diagnosis.
-    """
+    """What the sensors read."""
     fitted = [there(u.odometer_1), there(u.odometer_2), there(u.radar)]
     speeds = [np.where(f > 0.0, s, 0.0) for f, s in zip(fitted, (u.odometer_1, u.odometer_2, u.radar), strict=True)]
     has_gps, has_pressure = there(u.gps_position), there(u.cylinder_pressure)
@@ -73,7 +69,7 @@ def speed_ratios(x: Any, read: Readings, speed: Array, p: Any) -> tuple[list[Arr
     lead of the position over the way may not change.
 
     Args:
-        x: states of the diagnosis. read: of the sensors. speed: of the train [m/s]. p: parameters.
+        read: of the sensors. speed: of the train [m/s].
 
     Returns:
         Ratios in the order of the first six residuals of `MOTION`, and new values of states by name.

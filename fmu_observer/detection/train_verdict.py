@@ -100,7 +100,7 @@ def alarms_after(x: Any, t: Array, ratios: Sequence[Array], p: Any) -> dict[str,
     """Raise and clear the alarms of a sample; those of balises and shares follow at once.
 
     Args:
-        x: states of the diagnosis. t: time [s]. ratios: of all residuals. p: parameters.
+        ratios: of all residuals.
 
     Returns:
         New values of states by name.
@@ -119,7 +119,7 @@ def wheels(x: Any, u: Any, brake_force: Array, p: Any) -> tuple[Wheels, dict[str
     """Whether an effort acts, or acted until `release_time` ago, that can jam or spin a wheel.
 
     Args:
-        x: states of the diagnosis. u: inputs. brake_force: of the whole train [N]. p: parameters.
+        brake_force: of the whole train [N].
 
     Returns:
         What a wheel may do, and new values of states by name.
@@ -136,7 +136,7 @@ def contradicted_wheels(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[
     """For each odometer 1 where it is off for so long that no wheel explains it: the sensor is at fault.
 
     Args:
-        x: states of the diagnosis. read: of the sensors. wheel: what wheels may do. p: parameters.
+        read: of the sensors. wheel: what wheels may do.
 
     Returns:
         One for each, and new values of states by name.
@@ -165,7 +165,7 @@ def stuck_sensors(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[list[A
     A wheel that is locked reads zero: that is no sensor that stands still while the brake may lock it.
 
     Args:
-        x: states of the diagnosis. read: of the sensors. wheel: what wheels may do. p: parameters.
+        read: of the sensors. wheel: what wheels may do.
 
     Returns:
         One for each, and new values of states by name.
@@ -195,8 +195,8 @@ def codes_after(
     slip of all wheels.
 
     Args:
-        x: states of the diagnosis. t: time [s]. can: what there can be. wrong: odometers that no wheel explains.
-        stuck: sensors that stand still. before: alarms of the sample before. p: parameters.
+        can: what there can be. wrong: odometers that no wheel explains.
+        stuck: sensors that stand still. before: alarms of the sample before.
 
     Returns:
         New values of states by name.

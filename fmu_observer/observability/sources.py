@@ -33,7 +33,7 @@ def measured_plant(
     Args:
         system: a traceable hybrid system, a plant or an observer; events do not enter.
         x0, u0: states and inputs of the point. continuous, sampled: names of outputs measured at all times, or at
-            instants. preset, parameters, memory: of the system. scales: typical sizes of states by name. t: time [s].
+            instants. preset, parameters, memory: of the system. scales: typical sizes of states by name.
 
     Raises:
         ValueError: a name is unknown, nothing is measured, or nothing in the system is continuous.

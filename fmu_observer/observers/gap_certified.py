@@ -26,11 +26,7 @@ class GapCertified(HybridSystem):
     """A hybrid system with a certificate for sampling gaps; a subclass writes `error_certificate`."""
 
     def sampled_events(self, p: Any) -> tuple[str, ...]:
-        """Events between which the gaps lie that the certificate is about: all that are told from outside.
-
-        Args:
-            p: parameters, as in `HybridSystem.flow`.
-        """
+        """Events between which the gaps lie that the certificate is about: all that are told from outside."""
         return tuple(event.name for event in self.triggered_events)
 
     @abstractmethod

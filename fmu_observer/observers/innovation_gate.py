@@ -178,7 +178,6 @@ def _granted_error(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
 
     Args:
         before: memory of the gate before the telegram. report: the telegram and what the observer knows then.
-        p: parameters, as in `HybridSystem.flow`.
     """
     drift = np.maximum(p.gate_drift, p.gate_creep)
     seen = np.clip(p.gate_spread * before.share, p.gate_creep, drift)
@@ -200,7 +199,6 @@ def gate_limit(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
 
     Args:
         before: memory of the gate before the telegram. report: the telegram and what the observer knows then.
-        p: parameters, as in `HybridSystem.flow`.
     """
     return p.gate_floor + known_accuracy(report.accuracy) + _granted_error(before, report, p)
 

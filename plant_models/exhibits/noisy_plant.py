@@ -21,19 +21,11 @@ class NoisyPlant(HybridSystem):
     plain_outputs: tuple[Signal, ...] = ()
 
     def measured(self, x: Any, p: Any) -> tuple[Array, ...]:
-        """What is measured without noise, one scalar a measurement.
-
-        Args:
-            x: states by name. p: parameters.
-        """
+        """What is measured without noise, one scalar a measurement."""
         raise NotImplementedError
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
-        """Values of `plain_outputs` by name.
-
-        Args:
-            x: states by name. p: parameters.
-        """
+        """Values of `plain_outputs` by name."""
         raise NotImplementedError
 
     def declare(self, measurements: Sequence[Signal], parameters: Sequence[Signal], period: float) -> None:

@@ -49,11 +49,7 @@ class FaultSystem(HybridSystem):
         super().__init__(**options)
 
     def healthy(self, u: Any) -> Sequence[Array]:
-        """The signals without their faults.
-
-        Args:
-            u: inputs by name.
-        """
+        """The signals without their faults."""
         raise NotImplementedError(f"{type(self).__name__} does not say which signals it passes on; write healthy(u).")
 
     def faulty(self, t: Array, x: Any, u: Any, p: Any) -> tuple[Sequence[Array], Fault]:

@@ -51,7 +51,7 @@ def effective_flow(
     the friction that holds it, up to the full one: the set-valued Coulomb law.
 
     Args:
-        t: time [s]. x: state, shape (n,). u: inputs, shape (m,). p: parameters, shape (k,).
+        x: state, shape (n,). u: inputs, shape (m,). p: parameters, shape (k,).
         sign: signs of the states with friction at the start of the step, shape (nf,), or None without friction.
         switches: of the system at the start of the step, shape (ns,); None for those that hold now.
 

@@ -104,7 +104,7 @@ class HybridSystem(Declarations):
         they do, else 0.
 
         Args:
-            x: states with which time would begin, before any event. p: named tuple of all parameters.
+            x: states with which time would begin, before any event.
         """
         return {}
 

@@ -57,7 +57,7 @@ def operating_point(
             sought.
         hold: states that keep their value of `x0`. drift: states that may change with time. find: inputs that are
             sought; the others keep their value of `u0`. outputs: wanted values.
-        preset, parameters, memory: see `to_nonlinear_io`. t: time [s].
+        preset, parameters, memory: see `to_nonlinear_io`.
 
     Raises:
         ValueError: a name is unknown, or there are not as many unknowns as equations.

@@ -91,11 +91,7 @@ def _labels(part: ContinuousPart) -> dict[str, Any]:
 def jacobians(
     part: ContinuousPart, x: np.ndarray, u: np.ndarray, t: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Exact A, B, C, D of a continuous part at states `x` of shape (nc,) and inputs `u` of shape (m,).
-
-    Args:
-        t: time [s].
-    """
+    """Exact A, B, C, D of a continuous part at states `x` of shape (nc,) and inputs `u` of shape (m,)."""
     system = part.system
     state, inputs, p = part.whole(x, u, part.parameters)
     signs = np.sign(state[system.friction_indices()])

@@ -22,6 +22,9 @@ MODULES = [
     if not name.endswith("__main__")  # importing it runs the program
 ]
 
+CONTRACT = {"self", "cls", "t", "x", "u", "p", "vr"}
+"""Parameters that mean everywhere what they mean in `HybridSystem.flow` and in FMI; said where they mean more."""
+
 
 def room_of(module: str) -> str:
     return ".".join(module.split(".")[:2])
@@ -101,7 +104,7 @@ def unnamed(thing: Any) -> list[str]:
     said = "\n".join(text for text in texts if text)
     if texts and texts[0] and inspect.cleandoc(texts[0]).startswith("See `"):  # documented there
         return []
-    names = [n for n in inspect.signature(function).parameters if n not in ("self", "cls") and not n.startswith("_")]
+    names = [n for n in inspect.signature(function).parameters if n not in CONTRACT and not n.startswith("_")]
     return [n for n in names if not re.search(rf"(?<![A-Za-z_]){n}\b", said)]
 
 

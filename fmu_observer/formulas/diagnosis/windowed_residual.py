@@ -54,7 +54,7 @@ def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, cle
     """One sample of an alarm: raised after so many samples in a row above the threshold, cleared after so many below.
 
     Args:
-        before: what the last sample left. t: time [s]. exceeds: 1 where the residual is above its threshold, else 0.
+        before: what the last sample left. exceeds: 1 where the residual is above its threshold, else 0.
         raise_after: samples in a row until it is raised, at least 1 [1].
         clear_after: samples in a row until it is cleared, at least 1 [1].
 

@@ -154,7 +154,7 @@ class ReactionSignature(SignatureObserver):
         which J_r is the sum of squares, shape (N_O, c).
 
         Args:
-            window: samples of y, shape (N_O,). p: parameters.
+            window: samples of y, shape (N_O,).
         """
 
         def candidate(_carry: Any, row: Any, shared: Any) -> Any:

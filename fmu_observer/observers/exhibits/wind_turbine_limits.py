@@ -106,7 +106,7 @@ def repeats(m: Any, u: Any, starts: Array) -> Array:
     """1 where a sample brings no new reading of first rotor speed, first generator speed and torque.
 
     Args:
-        m: named tuple with `DRIVE_MEMORY`, as it was before. u: inputs of the diagnosis.
+        m: named tuple with `DRIVE_MEMORY`, as it was before.
         starts: 1 at the first sample, else 0.
     """
     pairs = (
@@ -124,7 +124,7 @@ def warned(m: Any, p: Any) -> dict[str, Array]:
     """Values of `WARNINGS` by name.
 
     Args:
-        m: states of the diagnosis. p: its parameters.
+        m: states of the diagnosis.
     """
     return {
         "efficiency_unknown": np.where(m.full_blocks > BLOCKS + 0.5, 0.0, 1.0),

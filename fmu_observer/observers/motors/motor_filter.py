@@ -93,7 +93,7 @@ class MotorFilter(HybridSystem):
         """Estimate one period later, shape (n,), and the Jacobian of that step, shape (n, n).
 
         Args:
-            estimate: shape (n,). u: inputs, voltages of the period. p: parameters.
+            estimate: shape (n,). u: inputs, voltages of the period.
         """
 
     @abstractmethod
@@ -101,7 +101,7 @@ class MotorFilter(HybridSystem):
         """Measurement less its prediction [A], shape (2,), and the Jacobian of the prediction, shape (2, n).
 
         Args:
-            estimate: prediction, shape (n,). u: inputs with the measured currents. p: parameters.
+            estimate: prediction, shape (n,). u: inputs with the measured currents.
         """
 
     # -- what follows -----------------------------------------------------------------------------------------------

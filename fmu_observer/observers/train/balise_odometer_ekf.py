@@ -242,20 +242,12 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         }
 
     def covariance_now(self, t: Array, x: Any, u: Any, p: Any) -> Array:
-        """The covariance a time after the last event, shape (4, 4).
-
-        Args:
-            t: [s]. x: states. u: inputs. p: parameters.
-        """
+        """The covariance a time after the last event, shape (4, 4)."""
         moved = transition(t - x.last_time, x.estimated_speed, u.effort, p)
         return predicted_covariance(x.estimate_covariance, moved.F, moved.QN)
 
     def reading(self, t: Array, x: Any, u: Any, p: Any) -> Array:
-        """The reading of the odometer, brought from its age to now [m/s].
-
-        Args:
-            t: [s]. x: states. u: inputs. p: parameters.
-        """
+        """The reading of the odometer, brought from its age to now [m/s]."""
         rate = _free_acceleration(x, u, p) - self.friction(t, x, u, p)[0]
         return u.odometer + p.reading_age * np.where(x.estimated_speed > 0.0, rate, 0.0)
 
@@ -314,7 +306,7 @@ def transition(elapsed: Array, speed: Array, effort: Array, p: Any) -> Transitio
     and no reading says anything of position, disturbance and creep.
 
     Args:
-        elapsed: time since the last event [s]. speed: [m/s]. effort: [N]. p: parameters of `BaliseOdometerEkf`.
+        elapsed: time since the last event [s]. speed: [m/s]. effort: [N].
     """
     moves, fade = _moves(speed, p), np.exp(-elapsed * _fading(speed, p))
     return Transition(_error_transition(elapsed, speed, moves, fade, p), _noise(elapsed, speed, effort, moves, fade, p))
@@ -389,11 +381,7 @@ def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple
 
 
 def estimate_of(x: Any) -> Array:
-    """The estimates, shape (4,).
-
-    Args:
-        x: states.
-    """
+    """The estimates, shape (4,)."""
     return vector(x.estimated_position, x.estimated_speed, x.estimated_disturbance, x.estimated_creep)
 
 
@@ -414,8 +402,7 @@ def moving_speed(speed: Array, before: Array, u: Any, p: Any) -> Array:
     A speed above zero, however small, would be friction's to stop, and would move the position on the way.
 
     Args:
-        speed: after a correction [m/s]. before: the one before it [m/s]. u: inputs.
-        p: parameters of `BaliseOdometerEkf`.
+        speed: after a correction [m/s]. before: the one before it [m/s].
     """
     noise = SIGMAS * p.odometer_deviation
     forward = np.where(u.odometer < -noise, speed, np.maximum(speed, 0.0))

@@ -19,7 +19,7 @@ def first_gain(z: Array, p: Any) -> Array:
     """``gain[1] + gain_schedule (b + c z) / m`` [1/s].
 
     Args:
-        z: speed that schedules it [m/s]. p: parameters, as in `HybridSystem.flow`.
+        z: speed that schedules it [m/s].
     """
     return p.gain[0] + p.gain_schedule * (p.davis_b + p.davis_c * z) / p.mass
 
@@ -28,7 +28,7 @@ def error_matrix(a11: float, p: Any) -> np.ndarray:
     """``A - K C`` of speed, disturbance and its rate, shape (3, 3).
 
     Args:
-        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+        a11: entry 11 [1/s], see `error_slopes`.
     """
     return np.array([[a11, -1.0, 0.0], [-float(p.gain[1]), 0.0, 1.0], [-float(p.gain[2]), 0.0, 0.0]])
 
@@ -37,7 +37,7 @@ def gain_level(p: Any, *speeds: Array) -> Array:
     """Largest level of the gain at scheduling speeds, and between them, for it is convex [1/s].
 
     Args:
-        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
+        speeds: those speeds [m/s].
     """
     return _largest_root([level_squared(p.lyapunov_matrix, first_gain(z, p), p.gain[1], p.gain[2]) for z in speeds])
 
@@ -46,7 +46,7 @@ def gain_norm(p: Any, *speeds: Array) -> Array:
     """Largest Euclidean norm of the gain at scheduling speeds, and between them, for it is convex [1/s].
 
     Args:
-        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
+        speeds: those speeds [m/s].
     """
     return _largest_root([first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2 for z in speeds])
 
@@ -59,7 +59,7 @@ def proven(a11: Array, p: Any) -> Array:
     """1 where the matrix proves the decay for an entry 11 of the error matrix, else 0.
 
     Args:
-        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+        a11: entry 11 [1/s], see `error_slopes`.
     """
     return decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay)
 
@@ -68,7 +68,7 @@ def position_error(a11: float, p: Any) -> ImpulsiveError:
     """Error of position, speed, disturbance and its rate, of which a balise ends the first.
 
     Args:
-        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+        a11: entry 11 [1/s], see `error_slopes`.
     """
     generator = np.zeros((4, 4))
     generator[0, 1] = 1.0

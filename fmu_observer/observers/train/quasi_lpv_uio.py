@@ -251,11 +251,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         )
 
     def working_point(self, p: Any) -> list[str]:
-        """What to know of noise before a run, in words: faults that cannot be told from it, gains that make more of it.
-
-        Args:
-            p: parameters, as in `HybridSystem.flow`.
-        """
+        """What to know of noise before a run, in words: faults that it hides, gains that make more of it."""
         noise = estimate_noise(*speed_errors(p), p)
         noisy = f"its gains make the estimate {noise:.3g} times as noisy as a reading; its rules take 1 for the most."
         return [*noise_warnings(p), *([noisy] if noise > 1.0 else [])]
@@ -337,9 +333,6 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:
     """``A_i`` of speed, disturbance and its rate at both vertices, shape (2, 3, 3), and ``K_i``, shape (2, 3, 1):
     (3.45).
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`.
     """
     mass = float(p.mass)
     drifts = quasi_lpv_vertices(

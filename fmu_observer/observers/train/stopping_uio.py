@@ -202,8 +202,7 @@ class StoppingUio(GatedObserver, GapCertified):
         """Certificate of the error of speed, disturbance and its rate, exact for an innovation held between samples.
 
         Args:
-            max_gap: longest gap between two balises [s]; they end the position error and act on nothing else. p:
-                parameters, as in `HybridSystem.flow`.
+            max_gap: longest gap between two balises [s]; they end the position error and act on nothing else.
         """
         period = float(p.sample_period)
         transition = sampled_error(float(p.davis_b) / float(p.mass), np.asarray(p.observer_gain, dtype=float), period)

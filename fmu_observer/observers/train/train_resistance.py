@@ -24,8 +24,5 @@ def drag_slope_range(p: Any, slowest: float, fastest: float) -> tuple[float, flo
 
     Not a linearisation: ``c (w^2 - v^2) = 2 c m (w - v)`` with m the mean of the two speeds, so the range holds for
     errors of any size as long as that mean stays within the speeds given.
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`.
     """
     return (p.davis_b + 2.0 * p.davis_c * slowest) / p.mass, (p.davis_b + 2.0 * p.davis_c * fastest) / p.mass

@@ -34,34 +34,22 @@ class WheelStage:
     stability_parameters: tuple[str, ...] = ()
 
     def adhesion(self, x: Any, u: Any, p: Any) -> Array:
-        """Adhesion force [N].
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
+        """Adhesion force [N]."""
         return u.effort
 
     def flow(self, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """Derivatives of the stage's states.
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
-        """
+        """Derivatives of the stage's states."""
         return {}
 
     def sampled(self, x: Any, u: Any) -> dict[str, Array]:
-        """The states that an odometer sample changes.
-
-        Args:
-            x: states of the observer. u: inputs, as in `HybridSystem.flow`.
-        """
+        """The states that an odometer sample changes."""
         return {}
 
     def judged(self, certificate: Certificate, p: Any) -> Certificate:
         """The certificate of the second stage, where the first one holds too.
 
         Args:
-            certificate: of the second stage. p: parameters, as in `HybridSystem.flow`.
+            certificate: of the second stage.
         """
         return certificate
 

@@ -81,7 +81,7 @@ class Odometer(HybridSystem):
         """How far a reading is from the wheel's speed at most, see `pulses.reading_bound` [m/s].
 
         Args:
-            output: its name; the distance has no such bound. p: parameters, as in `HybridSystem.flow`.
+            output: its name; the distance has no such bound.
         """
         bound = reading_bound(p.noise_std, p.teeth, p.wheel_radius, p.sample_period)
         return np.where(output == "reading", bound, 0.0)

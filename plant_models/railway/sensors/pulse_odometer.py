@@ -122,7 +122,7 @@ class PulseOdometer(HybridSystem):
         """How far a reading is from the mean speed of the wheel at most, see `pulses.reading_bound` [m/s].
 
         Args:
-            output: its name; the distance has no such bound. p: parameters, as in `HybridSystem.flow`.
+            output: its name; the distance has no such bound.
         """
         period = {"reading": p.aggregation_period, "sampled_reading": p.sample_period}.get(output, np.inf)
         return np.where(output == "distance", 0.0, reading_bound(p.noise_std, p.teeth, p.wheel_radius, period))

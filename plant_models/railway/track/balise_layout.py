@@ -32,15 +32,12 @@ class BaliseLayout(Protocol):
         """Number of balises passed from one position to another [m] in a direction.
 
         Args:
-            before, after: positions [m]. direction: 1 forwards, -1 backwards. p: parameters of the plant.
+            before, after: positions [m]. direction: 1 forwards, -1 backwards.
         """
 
     def next(self, position: Array, direction: Array, p: Any) -> Array:
         """Position of the first balise beyond a position [m] in a direction; `UNUSED` or more, by magnitude, where none
         is.
-
-        Args:
-            p: parameters of the plant.
         """
 
 

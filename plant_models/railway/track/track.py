@@ -66,7 +66,7 @@ class Track:
         """How far beyond each of the `edges` [m], or for how long [s].
 
         Args:
-            t: time [s]. position: on the track [m], a scalar or shape (members,). p: the plant's parameters.
+            position: on the track [m], a scalar or shape (members,).
         """
         at = position if self.zones == "position" else t + 0.0 * position
         return [at - ends[i] for ends in (p.zone_from, p.zone_to) for i in range(self.zone_count)]
@@ -84,11 +84,7 @@ class Track:
         return inside
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """What the ends of the zones must fulfil, see `HybridSystem.requirements`.
-
-        Args:
-            p: parameters of the plant.
-        """
+        """What the ends of the zones must fulfil, see `HybridSystem.requirements`."""
         starts, ends, zones = p.zone_from, p.zone_to, range(self.zone_count)
         used = [np.where(starts[i] == 0.0, np.where(ends[i] == 0.0, 0.0, 1.0), 1.0) for i in zones]
         needed: dict[str, Array] = {}
@@ -107,11 +103,7 @@ class Track:
         return needed
 
     def gradient(self, position: Array, p: Any) -> Array:
-        """Sine of the slope angle at the position [m], positive uphill [1].
-
-        Args:
-            p: parameters of the plant.
-        """
+        """Sine of the slope angle at the position [m], positive uphill [1]."""
         read = piecewise_linear if self.gradient_shape == "linear" else piecewise_constant
         return read(position, p.gradient_position, p.gradient)
 

@@ -97,19 +97,11 @@ class BrakePipe:
         self.event = PeriodicEvent("brake_reading", period, period, description="The brake demand is read")
 
     def shifted(self, readings: Array, integral: Array, p: Any) -> Array:
-        """The register after a new reading: of a demand with this integral [s] over the last period.
-
-        Args:
-            p: parameters of the train.
-        """
+        """The register after a new reading: of a demand with this integral [s] over the last period."""
         return vector(integral / p.brake_sample_period, *readings[:-1])
 
     def pressure(self, demand: Array, readings: Array, vehicle: int, p: Any) -> Array:
-        """Pressure in the pipe [Pa] at a vehicle, 0 is the first one, for the demand [1] at the first one now.
-
-        Args:
-            p: parameters of the train.
-        """
+        """Pressure in the pipe [Pa] at a vehicle, 0 is the first one, for the demand [1] at the first one now."""
         there = limited(demand) if vehicle == 0 else readings[vehicle * self.delay_samples - 1]
         return p.pipe_pressure_released - there * p.pipe_depression_full
 

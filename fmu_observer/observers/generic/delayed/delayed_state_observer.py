@@ -261,7 +261,7 @@ class DelayedStateObserver(HighGainSampled):
         of its equations.
 
         Args:
-            drift: Jacobian of the model, shape (n, n). p: parameters, as in `HybridSystem.flow`.
+            drift: Jacobian of the model, shape (n, n).
             turns: measurements in each packet of a round, from 0.
         """
         n, q = self.model.order, self.outputs_count
@@ -361,7 +361,7 @@ class DelayedStateObserver(HighGainSampled):
         """Generator of the errors of the estimate and of the kept outputs, shape (n + q, n + q).
 
         Args:
-            drift: Jacobian of the model, shape (n, n). p: parameters, as in `HybridSystem.flow`.
+            drift: Jacobian of the model, shape (n, n).
         """
         gain, C, q = self.gain_matrices(p)[0], self.model.C, self.outputs_count
         rates = C @ drift if self.predicts_output else 0.0 * C

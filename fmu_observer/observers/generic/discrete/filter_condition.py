@@ -88,7 +88,7 @@ def within_steps(model: FilterModel, p: Any) -> dict[str, Array]:
     """That the period is none in which steps are longer than those of the system that a model comes from.
 
     Args:
-        model: the model. p: parameters of the filter.
+        model: the model.
 
     Returns:
         By text: 1 where it is fulfilled, else 0; nothing for a model of any period.

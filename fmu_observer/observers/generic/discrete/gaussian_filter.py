@@ -135,7 +135,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
 
         Args:
             belief: before. known: time, inputs and parameters of the model. period: [s].
-            noise: covariance of the process noise in that period, shape (r, r). p: all parameters.
+            noise: covariance of the process noise in that period, shape (r, r).
         """
 
     @abstractmethod
@@ -146,14 +146,14 @@ class GaussianFilter(GatedObserver, JudgedObserver):
 
         Args:
             belief: before. known: time, inputs and parameters of the model. y: the measurements, shape (len(rows),).
-            rows: which they are. noise: covariance of all measurement noise, shape (s, s). p: all parameters.
+            rows: which they are. noise: covariance of all measurement noise, shape (s, s).
         """
 
     def unmoved(self, belief: Belief, p: Any) -> Belief:
         """The belief as a prediction hands it on, where there is nothing to predict yet.
 
         Args:
-            belief: at the start. p: all parameters.
+            belief: at the start.
         """
         return belief
 
@@ -165,27 +165,15 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         return self.form == "square_root"
 
     def known(self, t: Array, u: Any, p: Any) -> Known:
-        """Time, inputs and parameters of the model.
-
-        Args:
-            t: [s]. u: inputs of the filter. p: its parameters.
-        """
+        """Time, inputs and parameters of the model."""
         return Known(t, stacked_of(u, self.model.inputs), self.known_parameters(p))
 
     def known_parameters(self, p: Any) -> Array:
-        """Parameters of the model, shape (k,).
-
-        Args:
-            p: parameters of the filter.
-        """
+        """Parameters of the model, shape (k,)."""
         return stacked_of(p, self.model.parameters)
 
     def belief(self, x: Any) -> Belief:
-        """What the filter believes.
-
-        Args:
-            x: states by name.
-        """
+        """What the filter believes."""
         return Belief(stacked_of(x, self.model.states, "estimated_"), getattr(x, self._spread))
 
     def covariance_of(self, spread: Array) -> Array:
@@ -208,7 +196,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         """Covariance of the measurement noise with a balise reported so accurately, shape (s, s).
 
         Args:
-            accuracy: of its place [m]. p: all parameters.
+            accuracy: of its place [m].
         """
         s = self.model.reading_noise_count
         noise = as_matrix(p.measurement_covariance, s, s)
@@ -301,11 +289,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         return {text: np.where(np.max(np.abs(spread)) < _LARGEST_ENTRY, 1.0, 0.0)}
 
     def condition_of(self, p: Any) -> Condition:
-        """Whether the filter linearised at the start of the estimates has a stable steady state.
-
-        Args:
-            p: all parameters.
-        """
+        """Whether the filter linearised at the start of the estimates has a stable steady state."""
         start, period = self.model.start, float(p.sample_period)
         inputs = self.model.start_inputs
         known = Known(0.0, inputs, np.asarray(self.known(0.0, _Starts(self.model.inputs), p).p, dtype=float))

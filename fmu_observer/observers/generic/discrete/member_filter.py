@@ -140,25 +140,20 @@ class MemberFilter(JudgedObserver):
         """What a sample makes of the members; where all of it is missing they stay as they are.
 
         Args:
-            members: predictions, shape (n, M). x: states. sample: what was measured, and what each member measures.
-            u: inputs. p: parameters.
+            members: predictions, shape (n, M). sample: what was measured, and what each member measures.
         """
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def known(self, t: Array, u: Any, p: Any) -> Known:
-        """Time, inputs and parameters of the model.
-
-        Args:
-            t: [s]. u: inputs of the filter. p: its parameters.
-        """
+        """Time, inputs and parameters of the model."""
         return Known(t, stacked_of(u, self.model.inputs), stacked_of(p, self.model.parameters))
 
     def spread(self, members: Array, p: Any) -> Array:
         """The members before a correction, shape (n, M).
 
         Args:
-            members: predictions, shape (n, M). p: parameters.
+            members: predictions, shape (n, M).
         """
         return members
 
@@ -167,7 +162,6 @@ class MemberFilter(JudgedObserver):
 
         Args:
             members: shape (n, M). y: measurements, shape (q,). known: time, inputs and parameters of the model.
-            p: parameters.
         """
         none, q, there = self.model.no_reading_noise(), y.shape[0], is_there(y)
         seen = np.stack([self.model.measured(members[:, i], none, known) for i in range(self.members)], axis=1)

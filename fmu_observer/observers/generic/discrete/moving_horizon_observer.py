@@ -153,11 +153,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         return needed
 
     def condition_of(self, p: Any) -> Condition:
-        """That of the filter behind the arrival cost, and which states the rows of a window tell on their own.
-
-        Args:
-            p: all parameters.
-        """
+        """That of the filter behind the arrival cost, and which states the rows of a window tell on their own."""
         steady, model = super().condition_of(p), self.model
         inputs = stacked(tuple(float(s.start_values[0]) for s in model.inputs))
         known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))

@@ -124,16 +124,12 @@ class SignatureObserver(HybridSystem):
         """State at the oldest sample of the window.
 
         Args:
-            past: samples of each measurement, the oldest first, shape (N_O,) each. x: memory before, by name. p:
-                parameters.
+            past: samples of each measurement, the oldest first, shape (N_O,) each. x: memory before, by name.
         """
 
     def table_errors(self, p: Any) -> dict[str, Array]:
         """Largest difference of each table from what the parameters make of it, by its name, over what it may be off: 1
         and less is legal. At some of its places: a parameter that matters moves nearly all.
-
-        Args:
-            p: parameters.
         """
         return {}
 
@@ -149,7 +145,7 @@ class SignatureObserver(HybridSystem):
         """The state of the signature, brought to now, with what is measured at once put in; shape (n,).
 
         Args:
-            now: shape (n,). u: inputs.
+            now: shape (n,).
         """
         return now
 
