@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-from plant_models.disk_cache.description import OWN_PACKAGES
 from plant_models.disk_cache.files import file_digest
+from plant_models.disk_cache.identity import OWN_PACKAGES
 
 ROOT = Path(__file__).parents[1]
 TIMES = Path(__file__).with_name("measured_times.json")

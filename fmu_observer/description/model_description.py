@@ -9,7 +9,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable
+from typing import Any
 
+import numpy as np
 from fmpy.model_description import (
     BaseUnit,
     Category,
@@ -23,11 +25,13 @@ from fmpy.model_description import (
     Unknown,
 )
 
-from fmu_observer.description.dependencies import traced_facts, unknowns, while_running
-from fmu_observer.description.variable_table import VariableTable, referenced
+from fmu_observer.description.variable_table import VariableTable, exposed_inputs, referenced
 from fmu_observer.description.variables import FmiVersion, late_policy_type, model_variables
 from fmu_observer.event_protocol import EventProtocol
-from plant_models.hybrid import HybridSystem
+from plant_models import hybrid
+from plant_models.disk_cache.entries import remembered
+from plant_models.disk_cache.identity import identity
+from plant_models.hybrid import HybridSystem, width
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 from plant_models.user_file import option_files, split_name
 
@@ -110,14 +114,14 @@ def _without_structure(
 
 def _add_structure(system: HybridSystem, description: ModelDescription) -> None:
     """What depends on what, and the token, which follows from it."""
-    table, facts, variables = VariableTable.of(system), traced_facts(system), description.modelVariables
-    outputs = unknowns(variables, table.outputs, facts["output"])
-    derivatives = unknowns(variables, table.derivatives, facts["derivative"])
+    table, facts, variables = VariableTable.of(system), _traced_facts(system), description.modelVariables
+    outputs = _unknowns(variables, table.outputs, facts["output"])
+    derivatives = _unknowns(variables, table.derivatives, facts["derivative"])
     # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
     # are none.
     description.initialUnknowns = [*outputs, *derivatives]
     description.outputs, description.derivatives = (
-        [while_running(system, u) for u in group] for group in (outputs, derivatives)
+        [_while_running(system, u) for u in group] for group in (outputs, derivatives)
     )
     indicators = referenced(variables, table.indicators, len(system.frictions) + len(system.switchings))
     description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
@@ -197,3 +201,64 @@ def _token(system: HybridSystem, description: ModelDescription, equations: str) 
     content += [equations]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+
+
+def _unknowns(variables: list[ModelVariable], first: int, dependencies: list[list[int]]) -> list[Unknown]:
+    """Outputs or derivatives at initialisation: each with the time, inputs, start values and parameters that it depends
+    on.
+    """
+    found = []
+    for variable, references in zip(referenced(variables, first, len(dependencies)), dependencies, strict=True):
+        known = [known for reference in references for known in referenced(variables, reference)]
+        found.append(_unknown(variable, known))
+    return found
+
+
+def _while_running(system: HybridSystem, unknown: Unknown) -> Unknown:
+    """The same once time runs: what it depends on among time, inputs and continuous states."""
+    table = VariableTable.of(system)
+    last = table.states + system.continuous_count
+    known = (
+        v for v in unknown.dependencies if v.valueReference < table.outputs or table.states <= v.valueReference < last
+    )
+    return _unknown(unknown.variable, list(known))
+
+
+def _unknown(variable: ModelVariable, known: list[ModelVariable]) -> Unknown:
+    kinds = ["dependent"] * len(known)
+    return Unknown(index=variable.valueReference, variable=variable, dependencies=known, dependenciesKind=kinds)
+
+
+def _traced_facts(system: HybridSystem) -> dict[str, Any]:
+    """What only the traced equations tell, remembered: ``output`` and ``derivative``, the value references that each
+    row depends on, all of them where it cannot be traced; ``equations``, their digest, or the class.
+    """
+    return dict(remembered("description", identity(system, code=("fmu_observer",)), lambda: _traced_facts(system)))
+
+
+def _traced_facts(system: HybridSystem) -> dict[str, Any]:
+    return {
+        "output": _traced_dependencies(system, "output", width(system.outputs)),
+        "derivative": _traced_dependencies(system, "derivative", system.continuous_count),
+        "equations": hybrid.traced_once(system).digest() if system.traceable else type(system).__qualname__,
+    }
+
+
+def _traced_dependencies(system: HybridSystem, function: str, count: int) -> list[list[int]]:
+    table = VariableTable.of(system)
+    inputs, parameters = width(exposed_inputs(system)), width(system.parameter_signals)
+    groups = (
+        ("t", table.time, 1),
+        ("u", table.inputs, inputs),
+        ("x", table.states, system.state_count),
+        ("p", table.parameters, parameters),
+    )
+    rows: list[list[int]] = [[] for _ in range(count)]
+    traced = hybrid.traced_once(system) if system.traceable and count else None
+    for group, first, width_ in groups:
+        pattern = np.ones((count, width_), dtype=bool)
+        if traced is not None and width_:
+            pattern = traced.dependencies(function, group)[:, :width_]
+        for row in range(count):
+            rows[row] += [first + int(column) for column in np.flatnonzero(pattern[row])]
+    return rows

@@ -16,10 +16,10 @@ from scipy.linalg import expm
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import rounded_down
-from fmu_observer.design.noise_amplification import noise_amplification
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver
 from fmu_observer.observers.train.gains.gap_aware import (
     GainDesign,
+    _noise_amplification,
     balise_gaps,
     design_adaptive,
     design_high_gain,
@@ -142,7 +142,7 @@ def test_the_amplification_is_that_of_a_simulated_error(gap: float) -> None:
         found.append(course)
         e = course[-1]
     expected = np.std(found, axis=0).max(axis=0)
-    amplification = noise_amplification([(error, gap)])
+    amplification = _noise_amplification([(error, gap)])
     assert (amplification.position, amplification.speed) == pytest.approx(expected, rel=0.03)
     assert amplification.slip == 0.0
 
@@ -150,7 +150,7 @@ def test_the_amplification_is_that_of_a_simulated_error(gap: float) -> None:
 def test_the_amplification_scales_with_the_gain() -> None:
     """In units of 1 / theta nothing changes: position alike, speed as theta."""
     found = [
-        noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (2.0 * k, k * k), 2.0 * k), 3.0 / k)])
+        _noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (2.0 * k, k * k), 2.0 * k), 3.0 / k)])
         for k in (1.0, 8.0)
     ]
     assert found[1].position == pytest.approx(found[0].position)
@@ -159,7 +159,7 @@ def test_the_amplification_scales_with_the_gain() -> None:
 
 def test_an_unstable_gap_has_no_amplification() -> None:
     with pytest.raises(ValueError, match=r"the error grows at a constant gap of 0\.7 s"):
-        noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (16.0, 64.0), 16.0), 0.7)])
+        _noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (16.0, 64.0), 16.0), 0.7)])
 
 
 # -- input

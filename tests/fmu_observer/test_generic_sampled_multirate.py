@@ -10,10 +10,14 @@ from sampled_runner import chain
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from fmu_observer.design.sylvester import sylvester_design, sylvester_residual, sylvester_transformation
 from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observers.generic.sampled import MultirateSylvester
+from fmu_observer.observers.generic.sampled.multirate_sylvester import (
+    _sylvester_design,
+    _sylvester_residual,
+    _sylvester_transformation,
+)
 from plant_models.hybrid import NumpyKernel, Runtime, TracedSystem
 
 MODEL = inverted_pendulum_cart()
@@ -58,7 +62,7 @@ def joint_errors(ends: tuple[float, ...], position_gap: float, angle_gap: float,
 
 
 def test_the_sylvester_equation_is_solved_to_rounding() -> None:
-    design = sylvester_design(MODEL.A, 2, [-2.0, -2.5])
+    design = _sylvester_design(MODEL.A, 2, [-2.0, -2.5])
     r = len(design.A)
     error = design.T @ MODEL.A - design.A @ design.T - np.hstack([np.zeros((r, r)), design.B])
     # independently measured 4e-16 on another plant; here entries of 10 are subtracted
@@ -75,14 +79,14 @@ def test_any_stable_filter_with_any_gain_has_its_transformation(seed: int, r: in
     F = numbers.normal(size=(r + m, r + m))
     A = -np.diag(4.0 + numbers.uniform(0.0, 2.0, r)) - 4.0 * np.eye(r)
     B = numbers.normal(size=(r, m))
-    assert sylvester_residual(F, A, B, sylvester_transformation(F, A, B)) < 1e-10
+    assert _sylvester_residual(F, A, B, _sylvester_transformation(F, A, B)) < 1e-10
 
 
 def test_a_filter_that_shares_an_eigenvalue_with_the_plant_is_refused() -> None:
     with pytest.raises(ValueError, match="shares an eigenvalue"):
-        sylvester_transformation(np.diag([-1.0, 2.0]), np.array([[-1.0]]), np.array([[1.0]]))
+        _sylvester_transformation(np.diag([-1.0, 2.0]), np.array([[-1.0]]), np.array([[1.0]]))
     with pytest.raises(ValueError, match="do not fit"):
-        sylvester_transformation(np.eye(3), np.eye(2), np.ones((2, 2)))
+        _sylvester_transformation(np.eye(3), np.eye(2), np.ones((2, 2)))
 
 
 def test_the_error_dies_on_an_unstable_plant() -> None:

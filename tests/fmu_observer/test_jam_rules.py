@@ -15,7 +15,7 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 
 from fmu_observer.design.jam_recovery import estimate_noise, held_position_error, recovery_bounds
 from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1
-from fmu_observer.detection.jam_detector import RULES, JamDetector
+from fmu_observer.detection.jam_detector import RULES, JamDetector, _PrintedRules
 from fmu_observer.detection.jam_rules import (
     HELD,
     TRUSTED,
@@ -26,7 +26,6 @@ from fmu_observer.detection.jam_rules import (
     agreement_limit,
     certain_fault,
 )
-from fmu_observer.detection.printed_jam_rules import PrintedRules
 from fmu_observer.observers.train import QuasiLpvUio
 from fmu_observer.observers.train.quasi_lpv_uio import speed_errors
 from plant_models.hybrid import Runtime
@@ -35,7 +34,7 @@ SHARED = {"odometer_period": PERIOD, "threshold": 0.9, "residual_gain": 2.3, "ar
 PRINTED = SimpleNamespace(**SHARED, rule_4=0.0, rule_delay=1.0)
 P = SimpleNamespace(**SHARED, **{s.name: s.start for s in RepairedRules.parameters})
 RuleMemory: Any = namedtuple("RuleMemory", [s.name for s in RepairedRules.memory])
-PrintedMemory: Any = namedtuple("PrintedMemory", [s.name for s in PrintedRules.memory])
+PrintedMemory: Any = namedtuple("PrintedMemory", [s.name for s in _PrintedRules.memory])
 ARMED = RuleMemory(TRUSTED, 0.0, 0.0, 9.0, 0.0, 20.0, 9.0, 0.0, 99.0, -99.0, 0.0, 20.0)  # while braking
 THETA = 0.9 / 2.3
 
@@ -47,10 +46,10 @@ def after(before: Any, judged: Any) -> Any:
 
 def printed(readings: list[float], speed: float, p: Any = PRINTED) -> list[tuple[float, float]]:
     """(F, R) in force at each sample beside an estimate that stays."""
-    memory = PrintedMemory(*(0.0 for _ in PrintedRules.memory))
+    memory = PrintedMemory(*(0.0 for _ in _PrintedRules.memory))
     found = []
     for y in readings:
-        memory = after(memory, PrintedRules().at_sample(memory, Reading(y, speed, 2.3 * (y - speed), -1.0), p)).memory
+        memory = after(memory, _PrintedRules().at_sample(memory, Reading(y, speed, 2.3 * (y - speed), -1.0), p)).memory
         found.append((float(memory.fault_state), float(memory.recovering_state)))
     return found
 
@@ -86,13 +85,13 @@ def test_rule_4_calls_a_rise_a_fault_and_rule_5_a_standing_wheel() -> None:
     assert (1.0, 1.0) not in printed(rising, 19.9)
     assert (1.0, 1.0) in printed(rising, 19.9, SimpleNamespace(**SHARED, rule_4=1.0, rule_delay=1.0))
     memory = PrintedMemory(1.0, 1.0, 1.0, 1.0, 0.5, 9.0)  # rule 3 and rule 5 at once: the later one counts
-    judged = PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED)
+    judged = _PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED)
     assert judged.memory["next_fault_state"] == 1.0
 
 
 def test_the_printed_rules_know_no_balises() -> None:
-    memory = PrintedMemory(*(0.5 for _ in PrintedRules.memory))
-    assert PrintedRules().at_balise(memory, Passing(4.0, 200.0, 9.0, 200.0, 0.0, 0.0, 1.0), PRINTED).memory == {}
+    memory = PrintedMemory(*(0.5 for _ in _PrintedRules.memory))
+    assert _PrintedRules().at_balise(memory, Passing(4.0, 200.0, 9.0, 200.0, 0.0, 0.0, 1.0), PRINTED).memory == {}
 
 
 # -- repaired, sample by sample

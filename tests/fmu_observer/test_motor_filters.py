@@ -10,8 +10,8 @@ import pytest
 
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.motors import MotorEkf, MotorEkfStator
+from fmu_observer.observers.motors.motor_ekf import ROWS
 from fmu_observer.observers.motors.motor_filter import MotorFilter
-from fmu_observer.observers.motors.motor_filter_presets import ROWS
 from plant_models.hybrid import Runtime, scalar_names
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.railway.traction import to_stator

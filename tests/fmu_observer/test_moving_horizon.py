@@ -26,8 +26,7 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import contradicte
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
 from fmu_observer.models.filter_models import Known, filter_model
 from fmu_observer.models.known_models import find_model
-from fmu_observer.observability.window_observability import window_observability
-from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
+from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver, window_observability
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
 from plant_models.hybrid import Runtime, scalar_names, vector
 from plant_models.hybrid.scan import enclosed, scan_table

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 from fmu_observer import OBSERVERS
 from fmu_observer.formulas.signatures import inversion
-from fmu_observer.formulas.signatures.blending import blended
 from fmu_observer.formulas.signatures.class_distance import class_distance, envelope_numbers, line_slopes
 from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.formulas.signatures.envelope import best_envelope
 from fmu_observer.formulas.signatures.envelope_distance import line_distance
 from fmu_observer.observers.exhibits import CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature
-from fmu_observer.observers.generic.signature.signature_observer import SignatureObserver
+from fmu_observer.observers.generic.signature.signature_observer import SignatureObserver, _blended
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 ROUNDING = 1e-12
@@ -26,8 +25,8 @@ RNG = np.random.default_rng(4)
 
 @pytest.mark.parametrize(("gain", "weight"), [(0.01, 0.0099), (0.1, 0.0909), (0.2, 0.1667), (0.3, 0.2308)])
 def test_the_weights_of_the_blend_are_those_of_the_specification(gain: float, weight: float) -> None:
-    assert abs(blended(np.zeros(1), np.ones(1), gain)[0] - weight) < 5e-5  # printed in four digits
-    assert blended(np.array([2.0]), np.ones(1), gain, 0.0)[0] == 2.0
+    assert abs(_blended(np.zeros(1), np.ones(1), gain)[0] - weight) < 5e-5  # printed in four digits
+    assert _blended(np.array([2.0]), np.ones(1), gain, 0.0)[0] == 2.0
 
 
 @given(st.floats(-3.0, 5.0), st.booleans())

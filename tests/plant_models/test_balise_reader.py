@@ -19,7 +19,7 @@ from cosim.balises.hermite import HermiteStep
 from cosim.balises.layout import by_positions, by_spacing
 from plant_models import BaliseReader
 from plant_models.hybrid import NumpyKernel, Runtime
-from plant_models.railway.sensors.hermite_cubic import HermiteCubic
+from plant_models.railway.sensors.balise_reader import _HermiteCubic
 from plant_models.railway.track.balise_layout import Spacing
 
 Motion = Callable[[float], tuple[float, float]]  # time [s] -> position [m], speed [m/s]
@@ -423,7 +423,7 @@ def test_a_wrong_option_is_refused(options: dict[str, Any], message: str) -> Non
 
 
 def test_the_cubic_takes_the_values_and_slopes_it_was_made_of() -> None:
-    cubic = HermiteCubic.of(0.5, 3.0, 4.0, 7.0, -2.0)
+    cubic = _HermiteCubic.of(0.5, 3.0, 4.0, 7.0, -2.0)
     assert (cubic.rise(0.0), cubic.rise(1.0)) == (0.0, 4.0)
     assert (cubic.rate(0.0), cubic.rate(1.0)) == (4.0 * 0.5, -2.0 * 0.5)
     assert 0.0 < cubic.turn() < 1.0

@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plant_models.railway.control import Mission
-from plant_models.railway.control.trapezoid import Trapezoid
+from plant_models.railway.control.mission import _Trapezoid
 
 JOURNEYS = st.builds(
-    Trapezoid, st.floats(1.0, 40.0), st.floats(0.05, 1.5), st.floats(0.05, 1.5), st.floats(5.0, 5000.0)
+    _Trapezoid, st.floats(1.0, 40.0), st.floats(0.05, 1.5), st.floats(0.05, 1.5), st.floats(5.0, 5000.0)
 )
 
 
 @given(journey=JOURNEYS)
-def test_the_journey_covers_its_distance_at_no_more_than_its_top_speed(journey: Trapezoid) -> None:
+def test_the_journey_covers_its_distance_at_no_more_than_its_top_speed(journey: _Trapezoid) -> None:
     corners = np.cumsum([0.0, *journey.durations])
     speeds = [float(journey.speed(t)) for t in corners]
     covered = np.trapezoid(speeds, corners)  # exact: the speed is a broken line through its corners
@@ -29,7 +29,7 @@ def test_the_journey_covers_its_distance_at_no_more_than_its_top_speed(journey: 
 
 
 @given(journey=JOURNEYS, share=st.floats(0.0, 1.0))
-def test_position_is_the_integral_of_speed(journey: Trapezoid, share: float) -> None:
+def test_position_is_the_integral_of_speed(journey: _Trapezoid, share: float) -> None:
     end = sum(journey.durations)
     grid = np.unique(
         [*np.linspace(0.0, share * end, 2001), *[c for c in np.cumsum(journey.durations) if c < share * end]]

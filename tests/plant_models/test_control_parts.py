@@ -10,10 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models.railway.control import MdpeController
-from plant_models.railway.control.available_adhesion import next_available_effort
 from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
-from plant_models.railway.control.coupler_protection import coupler_headroom, effort_steps
 from plant_models.railway.control.effort_limits import electric_brake_limit, stepped_towards, traction_limit
+from plant_models.railway.control.mdpe_controller import _coupler_headroom, _effort_steps, _next_available_effort
 from plant_models.railway.control.mode_switch import Situation, next_level, next_mode
 from plant_models.railway.control.sampled_regulator import pole_placement, tracking_integral, wanted_force
 
@@ -86,14 +85,14 @@ def test_air_builds_up_quickly_and_is_released_slowly() -> None:
 
 def test_the_headroom_of_a_coupler_falls_from_its_soft_limit_through_zero_at_the_limit() -> None:
     loads = [-50e3, 0.0, 150e3, 200e3, 250e3, 300e3, 500e3]
-    assert [coupler_headroom(load, 150e3, 250e3) for load in loads] == pytest.approx(
+    assert [_coupler_headroom(load, 150e3, 250e3) for load in loads] == pytest.approx(
         [1.0, 1.0, 1.0, 0.5, 0.0, -0.5, -1.0]
     )
 
 
 @given(effort=FORCES, coupler=st.floats(-600e3, 600e3), wanted=st.one_of(st.just(0.0), FORCES))
 def test_a_loaded_coupler_is_not_loaded_further(effort: float, coupler: float, wanted: float) -> None:
-    down, up = effort_steps(effort, coupler, 6.8e3, 150e3, 250e3)
+    down, up = _effort_steps(effort, coupler, 6.8e3, 150e3, 250e3)
     after = stepped_towards(effort, wanted, down, up)
     assert abs(after - effort) <= 6.8e3 + 1e-6
     if coupler >= 250e3:
@@ -113,7 +112,7 @@ def test_a_loaded_coupler_is_not_loaded_further(effort: float, coupler: float, w
 
 
 def available(before: float, force: float, sliding: float = 0.0, newly: float = 0.0) -> float:
-    return float(next_available_effort(before, force, sliding, newly, 500.0, margin=0.85, floor=10e3, limit=350e3))
+    return float(_next_available_effort(before, force, sliding, newly, 500.0, margin=0.85, floor=10e3, limit=350e3))
 
 
 def test_the_available_effort_is_cut_in_slip_and_probed_upwards() -> None:

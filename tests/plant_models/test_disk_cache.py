@@ -20,9 +20,8 @@ import pytest
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.disk_cache import files, identity
-from plant_models.disk_cache.description import Description, NoIdentityError
 from plant_models.disk_cache.entries import entry_path, recall, remembered
-from plant_models.disk_cache.identity import folder_digest
+from plant_models.disk_cache.identity import _Description, _NoIdentityError, folder_digest
 from plant_models.hybrid import HybridSystem, Signal, kernel, parameter
 
 KEY = "0" * 64
@@ -141,7 +140,7 @@ def test_what_is_not_equal_has_another_identity() -> None:
         np.zeros(1, int), np.float64(0), signal, dataclasses.replace(signal, description="other"), Signal, parameter,
         partial(parameter, 1), partial(parameter, 2), PLANTS["odometer"](), PLANTS["driver"](),
     ]  # fmt: skip
-    texts = [Description().text(value) for value in values]
+    texts = [_Description().text(value) for value in values]
     assert len(set(texts)) == len(values)
     options = [{}, {"spacing": "learnt"}] if "spacing" in OBSERVERS["adaptive_gain_cdo"].option_choices else [{}]
     assert len({identity.identity(OBSERVERS["adaptive_gain_cdo"](**o)) for o in options}) == len(options)
@@ -149,23 +148,23 @@ def test_what_is_not_equal_has_another_identity() -> None:
 
 def test_an_attribute_more_or_of_another_value_counts() -> None:
     system: Any = PLANTS["driver"]()
-    texts = {Description().text(system)}
+    texts = {_Description().text(system)}
     for value in (1, 2, 2.0):
         system.of_this_test = value
-        texts.add(Description().text(system))
+        texts.add(_Description().text(system))
     assert len(texts) == 4
 
 
 def test_describing_a_system_takes_few_calls() -> None:
     system, calls = PLANTS["locomotive"](), Counter[str]()
-    Description().text(system)  # names of attributes are found once for each class
+    _Description().text(system)  # names of attributes are found once for each class
 
     def count(_frame: FrameType, event: str, _: Any) -> None:
         calls[event] += 1
 
     sys.setprofile(count)
     try:
-        Description().text(system)
+        _Description().text(system)
     finally:
         sys.setprofile(None)
     assert calls["call"] < 700  # 425 were counted; with a call for each plain value 1760
@@ -253,5 +252,5 @@ def test_a_kernel_from_the_cache_is_the_traced_one(name: str, monkeypatch: pytes
 
 @pytest.mark.parametrize("name", ["no_such_package_anywhere", "__future__"])
 def test_what_is_no_folder_on_disk_has_no_digest(name: str) -> None:
-    with pytest.raises(NoIdentityError, match=f"files of {name} are not on disk"):
+    with pytest.raises(_NoIdentityError, match=f"files of {name} are not on disk"):
         folder_digest(name)

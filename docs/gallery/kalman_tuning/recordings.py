@@ -13,7 +13,7 @@ import numpy as np
 import cosim
 from cosim.run.outcome import Outcome
 from cosim.studies.replay import Replay
-from fmu_observer.observers.motors.motor_filter_presets import ROWS
+from fmu_observer.observers.motors.motor_ekf import ROWS
 
 SEEDS = tuple(range(10))
 STATES = ("current_d", "current_q", "speed", "angle")

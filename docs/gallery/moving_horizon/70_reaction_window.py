@@ -7,8 +7,7 @@ import numpy as np
 from shared.sheet import Sheet
 
 from fmu_observer.models.filter_models import Known
-from fmu_observer.observability.window_observability import window_observability
-from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
+from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver, window_observability
 from plant_models.hybrid import Runtime, scalar_names
 
 WINDOW, NOISE, RATE = 11, 1e-3, 0.15

@@ -4,20 +4,57 @@ NumPy.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any, Unpack
 
 import numpy as np
 
-from fmu_observer.design.cone_solver import RecomputedDesign, first_proven, largest_feasible
-from fmu_observer.design.theorem7.theorem7_inequalities import Theorem7Options, Theorem7Problem, margins
-from fmu_observer.design.theorem7.theorem7_solver import Gains, Theorem7Candidate, candidates
+from fmu_observer.design.cone_solver import (
+    Attempt,
+    RecomputedDesign,
+    attempts,
+    first_proven,
+    largest_feasible,
+    load_cvxpy,
+    symmetric_value,
+)
+from fmu_observer.design.theorem7.theorem7_inequalities import (
+    Theorem7Options,
+    Theorem7Problem,
+    Unknowns,
+    inequalities,
+    margins,
+)
 from fmu_observer.models.checks import checked_matrix
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
+
+_Gains = tuple[np.ndarray, np.ndarray]
+# strictness asked of every inequality where gamma is minimised, and the solver's tolerances
+_ATTEMPTS: tuple[Attempt, ...] = (
+    (1e-6, {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "tol_ktratio": 1e-6}),
+    (1e-6, {}),
+    (1e-6, {"static_regularization_constant": 1e-6}),  # for states that differ by decades
+    (1e-4, {"static_regularization_constant": 1e-6}),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Theorem7Candidate:
+    """What the solver returned, in scaled coordinates.
+
+    Attributes:
+        unknowns: numbers. sampled_gain, continuous_gain: shape (N, n, q). status: the solver's word for it.
+    """
+
+    unknowns: Unknowns
+    sampled_gain: np.ndarray
+    continuous_gain: np.ndarray
+    status: str
+
 
 _DEFAULTS = {"disturbance": True, "scaling": None, "two_vertex": False}
 _BISECTIONS = 7
@@ -85,7 +122,7 @@ def design_theorem7(
     gap: float,
     eta: float,
     *,
-    gains: Gains | None = None,
+    gains: _Gains | None = None,
     performance: bool = True,
     **options: Unpack[Theorem7Options],
 ) -> Theorem7Design:
@@ -115,7 +152,7 @@ def design_theorem7(
 
 
 def _designed(
-    model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains | None, options: Mapping[str, Any]
+    model: TakagiSugenoModel, problem: Theorem7Problem, gains: _Gains | None, options: Mapping[str, Any]
 ) -> Theorem7Design:
     """The design in the model's own states, of gains in scaled coordinates or free ones."""
     performance = bool(options["performance"])
@@ -144,14 +181,14 @@ def _designed(
 
 
 def _proven(
-    problem: Theorem7Problem, performance: bool, gains: Gains | None
-) -> tuple[Theorem7Candidate, dict[str, float]] | None:
+    problem: Theorem7Problem, performance: bool, gains: _Gains | None
+) -> tuple[_Theorem7Candidate, dict[str, float]] | None:
     """A candidate whose inequalities all hold when recomputed, or None."""
-    found = candidates(problem, performance, gains)
+    found = _candidates(problem, performance, gains)
     return first_proven(found, lambda candidate: margins(problem, candidate.unknowns, performance))
 
 
-def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains) -> Gains:
+def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: _Gains) -> _Gains:
     wanted = [(model.vertices, model.order, len(C)) for C in (model.C_sampled, model.C_continuous)]
     if len(gains) != len(wanted):
         raise ValueError(
@@ -209,7 +246,7 @@ def search_eta(
     return designs
 
 
-def _largest(problem: Theorem7Problem, name: str, most: float, gains: Gains | None) -> float | None:
+def _largest(problem: Theorem7Problem, name: str, most: float, gains: _Gains | None) -> float | None:
     """Largest value of a field of the problem at which the decay is feasible, between a thousandth of `most` and
     `most`.
     """
@@ -221,7 +258,7 @@ def _largest(problem: Theorem7Problem, name: str, most: float, gains: Gains | No
 
 
 def _infeasible(
-    model: TakagiSugenoModel, problem: Theorem7Problem, performance: bool, gains: Gains | None
+    model: TakagiSugenoModel, problem: Theorem7Problem, performance: bool, gains: _Gains | None
 ) -> InfeasibleDesign:
     require_detectable_vertices(model, "Theorem 7")
     eta, gap = _largest(problem, "eta", problem.eta, gains), _largest(problem, "gap", problem.gap, gains)
@@ -237,3 +274,71 @@ def _infeasible(
         near_gap = f"no gap down to {_SMALLEST * problem.gap:.3g} s" if gap is None else f"gaps up to {gap:.3g} s"
         advice = f"Nearest found feasible: {near_eta} at this gap; {near_gap} at this eta."
     return InfeasibleDesign(f"Theorem 7 has no solution for {model.name} with {', '.join(tried)}. {advice}", eta, gap)
+
+
+def _candidates(
+    problem: Theorem7Problem, performance: bool, gains: _Gains | None = None
+) -> Iterator[_Theorem7Candidate]:
+    """Seek values for the unknowns, once with every setting in `_ATTEMPTS`; take the first that proves what is asked.
+
+    Yields:
+        What the solver returned, where it is usable.
+    """
+    cp = load_cvxpy("Design by Theorem 7")
+    unknowns = _unknowns(cp, problem, gains)
+    margin, strict = cp.Variable(), cp.Parameter()
+    matrices = [cp.bmat(rows) for rows in inequalities(problem, unknowns, performance).values()]
+    unit = np.eye(problem.order)
+    constraints = [matrix << -margin * np.eye(matrix.shape[0]) for matrix in matrices]
+    constraints += [unknowns.P >> margin * unit, unknowns.Q >> margin * unit]
+    if performance:
+        question = cp.Problem(cp.Minimize(unknowns.gamma2), [*constraints, margin == strict])
+    else:
+        question = cp.Problem(cp.Maximize(margin), [*constraints, cp.trace(unknowns.P) == problem.order])
+    for status in attempts(cp, question, strict, _ATTEMPTS if performance else _ATTEMPTS[:1]):
+        candidate = _candidate(unknowns, gains, status)
+        if candidate is not None:
+            yield candidate
+
+
+def _unknowns(cp: Any, problem: Theorem7Problem, gains: _Gains | None) -> Unknowns:
+    n, vertices = problem.order, range(len(problem.A))
+    M = cp.Variable((n, n))
+    if gains is None:
+        w1 = [cp.Variable((n, len(problem.C1))) for _ in vertices]
+        w2 = [cp.Variable((n, len(problem.C2))) if len(problem.C2) else None for _ in vertices]
+    else:
+        w1, w2 = [M.T @ K for K in gains[0]], [M.T @ K if K.size else None for K in gains[1]]
+    shapes = ((n, n), (n, n), (n, n), *(((problem.noises, n),) if problem.noises else ()))
+    N = [[cp.Variable(shape) for shape in shapes] for _ in vertices]
+    symmetric = {"symmetric": True}
+    return Unknowns(
+        cp.Variable((n, n), **symmetric), cp.Variable((n, n), **symmetric), M, N, w1, w2, cp.Variable(), cp.Variable()
+    )
+
+
+def _candidate(unknowns: Unknowns, gains: _Gains | None, status: str) -> _Theorem7Candidate | None:
+    M = np.asarray(unknowns.M.value)
+    if not np.all(np.isfinite(M)) or np.linalg.cond(M) > 1e14:
+        return None
+    if gains is None:
+        K1 = np.stack([np.linalg.solve(M.T, w.value) for w in unknowns.w1])
+        K2 = np.stack([np.zeros((len(M), 0)) if w is None else np.linalg.solve(M.T, w.value) for w in unknowns.w2])
+    else:
+        K1, K2 = gains
+    numbers = Unknowns(
+        P=symmetric_value(unknowns.P),
+        Q=symmetric_value(unknowns.Q),
+        M=M,
+        N=[[_value(block) for block in blocks] for blocks in unknowns.N],
+        w1=[M.T @ K for K in K1],
+        w2=[M.T @ K for K in K2],
+        gamma2=float(_value(unknowns.gamma2)),
+        inverse_sigma=float(_value(unknowns.inverse_sigma)),
+    )
+    return _Theorem7Candidate(numbers, K1, K2, status)
+
+
+def _value(variable: Any) -> np.ndarray:
+    """Its number, zero for an unknown that appears nowhere."""
+    return np.zeros(variable.shape) if variable.value is None else np.asarray(variable.value)

@@ -22,16 +22,16 @@ from fmu_observer.formulas.adaptation.adaptation_at_samples import (
     since_flow,
     state_covariance,
 )
-from fmu_observer.formulas.adaptation.adaptive_law import learnt_constants, smallest_eigenvalue
+from fmu_observer.formulas.adaptation.adaptive_law import Sizes, learnt_constants, smallest_eigenvalue
 from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
-from fmu_observer.observers.train.adaptive_davis_states import FIRST_GAIN, SCALE, SIZES, STATES
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
 from fmu_observer.observers.train.train_signals import (
     BALISE,
     INNOVATION_OUTPUT,
+    LAST_INNOVATION,
     ODOMETER,
     ODOMETER_READ,
     POSITION,
@@ -39,7 +39,43 @@ from fmu_observer.observers.train.train_signals import (
     SPEED,
     SPEED_OUTPUT,
 )
-from plant_models.hybrid import Array, Signal, input_signal, matrix, output_signal, parameter, vector
+from plant_models.hybrid import Array, Signal, input_signal, matrix, memory, output_signal, parameter, state, vector
+
+_SIZES = Sizes(2, 3, 2, sampled=True)
+_SCALE = 30.0  # [m/s]: constants are what each term of the resistance is at this speed [m/s2]
+_FIRST_GAIN = 1.0  # [ours], of R
+_PRIOR = (100.0, 5.0, 0.02, 0.02, 0.02)  # standard deviations at the start [m], [m/s], [m/s2] three times [ours]
+_FIRST = np.diag([*np.square(_PRIOR), *([0.0] * _SIZES.q)])  # where c and lambda are zero
+_UPPER = "upper triangle row by row"
+
+
+def _symmetric(size: int) -> dict[str, Any]:
+    return {"shape": (size, size), "symmetric": True}
+
+
+_STATES = (
+    POSITION,
+    SPEED,
+    state("sensitivity", "1", 0.0, "Sensitivity lambda of position and speed, row by row", shape=(2, 3)),
+    state("inverse_s", "1", np.eye(2), f"Inverse of S, {_UPPER}", **_symmetric(2)),
+    state("elapsed", "s", 0.0, "Time since the last sample"),
+    state("decay", "1", np.eye(2), "What is left of a sampled innovation, row by row", shape=(2, 2)),
+    state("fade", "s", 0.0, f"Integral of its Gramian, {_UPPER}", **_symmetric(2)),
+    state("own_transition", "1", (0.0, 1.0), "Transition of an error of speed since the last sample", size=2),
+    state("forced_transition", "1", 0.0, "Transition of a sampled innovation, row by row", shape=(2, 2)),
+    state("gathered_noise", "1", 0.0, "Covariance of noise since the last sample, upper triangle", **_symmetric(2)),
+    memory("corrections", "m/s2", 0.0, f"Corrections of a, b, c, at {_SCALE:g} m/s", size=3),
+    memory("sampled_innovation", "m/s", 0.0, "Innovation of balise (weighed) and odometer", size=2),
+    memory("adaptation_gain", "1", _FIRST_GAIN * np.eye(3), f"Adaptation gain R, {_UPPER}", **_symmetric(3)),
+    memory("seen_sensitivity", "1", 0.0, "Sensitivity chi of the innovation, row by row", shape=(2, 3)),
+    memory("mean_excitation", "1", 0.0, "Mean Gramian of the excitation, upper triangle", **_symmetric(3)),
+    memory("error_covariance", "1", _FIRST, f"Covariance of the errors, {_UPPER}", **_symmetric(_SIZES.error)),
+    memory("learnt", "1", 0.0, "1 for each coefficient that is learnt until the next sample", size=3),
+    memory("samples_used", "1", 0.0, "Balises and readings used so far", size=2),
+    LAST_INNOVATION,
+    memory("last_reading", "m/s", 0.0, "Last reading of the odometer that was not missing"),
+)
+
 
 _BALISE_WEIGHT = 0.1  # [1/m] [ours]: a metre of a balise counts as 0.1 m/s of the odometer
 C = np.array([[_BALISE_WEIGHT, 0.0], [0.0, 1.0]])
@@ -48,14 +84,14 @@ MU, FORGETTING = 0.2, 0.0  # [1/s] [ours]
 QUICKEST = 50.0  # [1/s]: no sample moves constants faster [ours]
 NAMES = ("davis_a_per_mass", "davis_b_per_mass", "davis_c_per_mass")
 UNITS = ("m/s2", "1/s", "1/m")
-POWERS = np.array([1.0, SCALE, SCALE**2])
+POWERS = np.array([1.0, _SCALE, _SCALE**2])
 ADAPTIVE = (
     parameter("mu", "1/s", MU, "Rate at which position and speed forget measurements", min=1e-9),
     parameter("forgetting", "1/s", FORGETTING, "Rate at which the coefficients forget measurements", min=0.0),
     parameter("gain_floor", "1", 0.0, "One over the largest adaptation gain; 0 for no limit", min=0.0),
     parameter("least_excitation", "1", 1e-4, "Mean excitation below which a coefficient is held", min=0.0),
     parameter("excitation_time", "s", 120.0, "Window of that mean", min=1e-9),
-    parameter("first_gain", "1", FIRST_GAIN, "Adaptation gain R at the first reading", min=0.0),
+    parameter("first_gain", "1", _FIRST_GAIN, "Adaptation gain R at the first reading", min=0.0),
     parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise, at least", min=0.0),
     parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
     parameter("odometer_period", "s", 0.2, "Time between two readings", min=1e-4),
@@ -91,7 +127,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     weighing = "itself"
     bounded_parameters = ADAPTIVE
     frictions = ("estimated_speed",)
-    states = STATES
+    states = _STATES
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort that acts at the wheel rim: traction positive, brake negative"),
         ODOMETER,
@@ -172,9 +208,9 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         R = gain_now(known, since, p.forgetting, p.gain_floor)
         if row == 1:
             R = np.where(first > 0.0, p.first_gain * np.eye(3), R)
-        before = covariance_now(known, since, now.by_innovation, SIZES)
-        moved = covariance_at_sample(before, gain * C, row, reads, (weight * deviation) ** 2, SIZES)
-        begun = covariance_at_first(before, row, row, deviation**2, SIZES)
+        before = covariance_now(known, since, now.by_innovation, _SIZES)
+        moved = covariance_at_sample(before, gain * C, row, reads, (weight * deviation) ** 2, _SIZES)
+        begun = covariance_at_first(before, row, row, deviation**2, _SIZES)
         excitation = excitation_now(known, since, p.excitation_time)
         return {
             **named_as((POSITION, SPEED), estimate),
@@ -241,8 +277,8 @@ class AdaptiveDavis(GatedObserver, GapCertified):
 
     def _covariance(self, x: Any, known: AtSample, since: Since, now: Constants) -> Array:
         """Of position, speed and corrections, shape (5, 5)."""
-        V_now = covariance_now(known, since, now.by_innovation, SIZES)
-        return state_covariance(V_now, x.sensitivity, SIZES)
+        V_now = covariance_now(known, since, now.by_innovation, _SIZES)
+        return state_covariance(V_now, x.sensitivity, _SIZES)
 
     def _learnt(self, excitation: Array, speed: Array, p: Any) -> Array:
         return np.where(speed > p.minimum_speed, 1.0, 0.0) * learnt_constants(excitation, p.least_excitation, 3)
@@ -269,7 +305,7 @@ DISTURBED = np.array([[0.0, 0.0], [0.0, 1.0]])
 
 
 def _regressor(speed: Array) -> tuple[Array, Array, Array]:
-    share = speed / SCALE
+    share = speed / _SCALE
     return 1.0, share, share * share
 
 

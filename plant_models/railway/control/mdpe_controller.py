@@ -12,9 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.railway.control.available_adhesion import next_available_effort
 from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
-from plant_models.railway.control.coupler_protection import effort_steps
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import electric_brake_limit, stepped_towards, traction_limit
 from plant_models.railway.control.logic import either, every, holds, some
@@ -263,7 +261,7 @@ def _sliding(u: Any, p: Any) -> Array:
 def _available(x: Any, u: Any, p: Any, level: Array, sliding: Array) -> Array:
     degraded = holds(level > 1.5)
     recovery = p.control_period * either(degraded, p.recovery_degraded, p.recovery_nominal)
-    return next_available_effort(
+    return _next_available_effort(
         x.available_effort,
         u.adhesion_force,
         sliding,
@@ -278,7 +276,7 @@ def _available(x: Any, u: Any, p: Any, level: Array, sliding: Array) -> Array:
 def _limits(x: Any, u: Any, p: Any, available: Array) -> _Limits:
     electric = electric_brake_limit(u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end)
     largest = p.effort_rate * p.control_period
-    down, up = effort_steps(x.held_effort, u.coupler_force, largest, p.coupler_soft_limit, p.coupler_limit)
+    down, up = _effort_steps(x.held_effort, u.coupler_force, largest, p.coupler_soft_limit, p.coupler_limit)
     return _Limits(
         np.minimum(traction_limit(u.odometer, p.effort_limit, p.power_limit), available),
         np.minimum(electric, available),
@@ -329,3 +327,50 @@ def _share(x: Any, mode: Array, target: Array, standing: Array, limits: _Limits,
     wanted = either(holds(mode == TRACTION), target, electric_part(braked, x.built_up_brake, limits.electric))
     effort = stepped_towards(x.held_effort, wanted, limits.down, limits.up)
     return np.minimum(np.maximum(effort, -limits.electric), limits.traction), demand
+
+
+def _coupler_headroom(load: Array, soft_limit: Array, limit: Array) -> Array:
+    """Share of the effort's rate that may load the coupler further [1]: 1 up to the soft limit, 0 at the limit, then
+    negative.
+
+    Beyond the limit the sign is that of a forced step back, -1 at and beyond ``2 limit - soft_limit``.
+    """
+    return np.clip((limit - load) / np.maximum(limit - soft_limit, 1.0), -1.0, 1.0)
+
+
+def _effort_steps(
+    effort: Array, coupler_force: Array, largest_step: Array, soft_limit: Array, limit: Array
+) -> tuple[Array, Array]:
+    """Largest steps down and up of the effort in one period [N]; a negative one is a step the other way that must be
+    made.
+
+    More traction (or less brake) pulls at the coupler, less traction (or more brake) pushes into it. Traction and brake
+    may always go back to zero at the full rate: else a pressed coupler would keep the traction on under a brake. And
+    what must be made goes to zero at most: a tension that others cause is no reason to brake the locomotive.
+    """
+    down = largest_step * _coupler_headroom(-coupler_force, soft_limit, limit)
+    up = largest_step * _coupler_headroom(coupler_force, soft_limit, limit)
+    return np.maximum(down, np.minimum(effort, largest_step)), np.maximum(up, np.minimum(-effort, largest_step))
+
+
+def _next_available_effort(
+    available: Array,
+    adhesion_force: Array,
+    sliding: Array,
+    newly_degraded: Array,
+    recovery: Array,
+    *,
+    margin: Array,
+    floor: Array,
+    limit: Array,
+) -> Array:
+    """Available effort [N] after one period.
+
+    A wheel that slides turns with ``J dw = r (F - F_ad)``: only an effort below the adhesion force of this moment
+    brings it back. So in slip the available effort falls to `margin` times that force at once. Where the adhesion has
+    just been judged degraded, without slip beyond the limit, it falls to the force itself. Otherwise it rises by
+    `recovery`.
+    """
+    transmitted = np.abs(adhesion_force) * either(sliding, margin, 1.0)
+    cut = np.minimum(available, np.maximum(transmitted, floor))
+    return either(some(sliding, newly_degraded), cut, np.minimum(available + recovery, limit))

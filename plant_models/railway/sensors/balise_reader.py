@@ -22,8 +22,77 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.railway.sensors.hermite_cubic import HermiteCubic
 from plant_models.railway.track.balise_layout import BaliseLayout, Positions, Spacing
+
+_HALVINGS = 6  # bring the bracket to 1/64 of the step
+_PARABOLAS = 5  # each triples the digits
+
+
+class _HermiteCubic(NamedTuple):
+    """``p(s) = p0 + s (slope + s (square + s cubic))`` over a step, with s from 0 to 1.
+
+    Args:
+        p0: position at the start [m]. slope, square, cubic: coefficients [m].
+    """
+
+    p0: Array
+    slope: Array
+    square: Array
+    cubic: Array
+
+    @classmethod
+    def of(cls, h: Array, p0: Array, v0: Array, p1: Array, v1: Array) -> _HermiteCubic:
+        """From positions [m] and speeds [m/s] at both ends of a step of length `h` [s].
+
+        Args:
+            h: length of the step [s]. p0, v0: position [m] and speed [m/s] at its start. p1, v1: at its end.
+        """
+        rise = p1 - p0
+        return cls(p0, h * v0, 3.0 * rise - h * (2.0 * v0 + v1), h * (v0 + v1) - 2.0 * rise)
+
+    def rise(self, s: Array) -> Array:
+        """Position minus `p0` [m]."""
+        return s * (self.slope + s * (self.square + s * self.cubic))
+
+    def rate(self, s: Array) -> Array:
+        """Derivative of the position by s [m]."""
+        return self.slope + s * (2.0 * self.square + 3.0 * self.cubic * s)
+
+    def turn(self) -> Array:
+        """Where the train turns: s in (0, 1) if it moves one way at the start and the other way at the end, else 1."""
+        a, b, c = 3.0 * self.cubic, 2.0 * self.square, self.slope
+        root = np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0))
+        divisor = np.where(c > 0.0, root, -root) - b
+        turns = self.slope * self.rate(1.0) < 0.0
+        return np.where(turns, np.clip(2.0 * c / np.where(turns, divisor, 1.0), 0.0, 1.0), 1.0)
+
+    def crossing(self, target: Array, direction: Array, low: Array, high: Array) -> Array:
+        """Where the position reaches a target: s in ``[low, high]``.
+
+        Bisection first, then steps to the zero of the parabola that touches the cubic (Cauchy's method), clipped to the
+        bracket that shrinks with them. Newton's tangents would need 25 steps where a train comes to rest on the target,
+        a double zero; the parabola has it at once, and everything under constant acceleration.
+
+        Args:
+            target: position [m], reached between the ends of the bracket. direction: 1 where it is reached upwards, -1
+                downwards. low, high: the bracket.
+        """
+        distance = target - self.p0
+        s = 0.5 * (low + high)
+        for i in range(_HALVINGS + _PARABOLAS):
+            excess = direction * (self.rise(s) - distance)
+            high, low = np.where(excess >= 0.0, s, high), np.where(excess >= 0.0, low, s)
+            middle = 0.5 * (low + high)
+            s = middle if i < _HALVINGS else self._improved(s, excess, direction, low, high)
+        return s
+
+    def _improved(self, s: Array, excess: Array, direction: Array, low: Array, high: Array) -> Array:
+        rate, curvature = direction * self.rate(s), direction * (2.0 * self.square + 6.0 * self.cubic * s)
+        divisor = rate + np.sqrt(np.maximum(rate * rate - 2.0 * excess * curvature, 0.0))
+        usable = divisor > 0.0  # else the cubic stands here, or runs backwards
+        zero = s - 2.0 * excess / np.where(usable, divisor, 1.0)
+        return np.where(usable, np.clip(zero, low, high), 0.5 * (low + high))
+
 
 LayoutShape = Literal["spacing", "positions"]
 
@@ -134,7 +203,7 @@ class BaliseReader(HybridSystem):
         h = np.where(known, np.maximum(instant - t0, 0.0), 0.0)
         # A second sample at one instant replaces the first: the train did not move in no time.
         before = np.where(h > 0.0, x.sample_position, u.position)
-        cubic = HermiteCubic.of(h, before, x.sample_speed, u.position, u.speed)
+        cubic = _HermiteCubic.of(h, before, x.sample_speed, u.position, u.speed)
         segments = self._segments(cubic, u.position, p)
         places, fractions = self._crossings(cubic, segments, p)
         found = segments[0].count + segments[1].count
@@ -148,7 +217,7 @@ class BaliseReader(HybridSystem):
         passed = {"balise_time": x.announced_time, "balise_position": x.announced_position}
         return {"balise_count": x.announced, **passed, "lost_count": x.lost}
 
-    def _segments(self, cubic: HermiteCubic, after: Array, p: Any) -> tuple[_Segment, _Segment]:
+    def _segments(self, cubic: _HermiteCubic, after: Array, p: Any) -> tuple[_Segment, _Segment]:
         """The step, divided where the train turns; the second segment is empty where it does not."""
         turn = cubic.turn()
         place = np.where(turn < 1.0, cubic.p0 + cubic.rise(turn), after)
@@ -159,7 +228,7 @@ class BaliseReader(HybridSystem):
         )
 
     def _crossings(
-        self, cubic: HermiteCubic, segments: tuple[_Segment, _Segment], p: Any
+        self, cubic: _HermiteCubic, segments: tuple[_Segment, _Segment], p: Any
     ) -> tuple[list[Array], list[Array]]:
         """Places [m] and fractions of the step of the first crossings; what lies beyond their number means nothing."""
         one, two = segments

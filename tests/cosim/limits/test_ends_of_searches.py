@@ -19,7 +19,7 @@ from fmu_observer.certificates.bounds import bound_text
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.observers.generic.adaptive.adaptive_certificate import SHORTEST, _longest_kept
+from fmu_observer.observers.generic.adaptive.adaptive_observer import SHORTEST, _longest_kept
 from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from fmu_observer.observers.parameter_values import parameter_values
 

@@ -10,7 +10,7 @@ import pytest
 import cosim
 from cosim.run.outcome import Outcome
 from cosim.studies.replay import Replay, ReplayError
-from fmu_observer.observers.motors.motor_filter_presets import ROWS
+from fmu_observer.observers.motors.motor_ekf import ROWS
 
 pytestmark = pytest.mark.compiler
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,9 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
-from fmu_observer.models.filter_models import Known
+from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.models.observer_model import named_as, stacked, stacked_of
 from fmu_observer.models.traced_system_model import Source
-from fmu_observer.observability.window_observability import window_observability
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
@@ -37,6 +36,41 @@ from plant_models.hybrid import Array, Signal, parameter, vector
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
+
+_TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not told
+_PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it
+
+
+class _WindowObservability(NamedTuple):
+    """What a window tells of the state in its first row.
+
+    Attributes:
+        measured: what the rows measure of it, shape (N * q, n). rank: independent directions that are told.
+        unseen: orthonormal basis of those that are not, shape (n, n - rank). states: names of the states.
+    """
+
+    measured: np.ndarray
+    rank: int
+    unseen: np.ndarray
+    states: tuple[str, ...]
+
+    def explain(self) -> str:
+        """In words, with a window as the subject: it tells every state, or which directions it does not."""
+        if not self.unseen.shape[1]:
+            return "tells all of them without the arrival cost"
+        directions = "; ".join(self._direction(column) for column in self.unseen.T)
+        return (
+            f"tells {self.rank} without the arrival cost; it does not tell {directions}, which is known only from what "
+            "was measured before. A longer window may tell it"
+        )
+
+    def _direction(self, column: np.ndarray) -> str:
+        largest = column[np.argmax(np.abs(column))]
+        parts = [(name, v) for name, v in zip(self.states, column / largest, strict=True) if abs(v) > _PART]
+        if len(parts) == 1:
+            return parts[0][0]
+        return "the combination " + " ".join(f"{value:+.3g} {name}" for name, value in parts)
+
 
 WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
 _UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
@@ -319,3 +353,19 @@ def _losses(who: str, loss: Loss | Sequence[Loss], count: int) -> tuple[Loss, ..
 def _loss_scale(losses: Sequence[Loss]) -> Any:
     robust = next(loss for loss in losses if loss != "squares")
     return parameter("loss_scale", "1", SCALES[robust], "Deviations at which the loss begins to doubt", min=1e-3)
+
+
+def window_observability(model: FilterModel, known: Known, period: float, rows: int) -> _WindowObservability:
+    """What a number of full rows tell of the state in the first of them, along the model's own way without noise."""
+    x, passage, seen = model.start, np.eye(model.order), []
+    for i in range(rows):
+        now = known._replace(t=known.t + i * period)
+        H, _ = model.measurement_jacobians(x, now)
+        F, _ = model.transition_jacobians(x, now, period)
+        seen.append(np.asarray(H) @ passage)
+        passage = np.asarray(F) @ passage
+        x = np.asarray(model.moved(x, model.no_noise(), now, period), dtype=float)
+    measured = np.vstack(seen)
+    _, values, directions = np.linalg.svd(measured)
+    rank = int(np.sum(values > _TOLERANCE * values[0])) if values[0] > 0.0 else 0
+    return _WindowObservability(measured, rank, directions[rank:].T, tuple(s.name for s in model.states))

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+import scipy
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
-from fmu_observer.design.sylvester import sylvester_design, sylvester_residual
+from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observers.gap_certified import GapCertified
@@ -22,6 +23,21 @@ from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import estimate_outputs, matrix_parameter, measured_inputs
 from plant_models.hybrid import Array, Signal, TriggeredEvent, state
 from plant_models.hybrid.option import require_whole
+
+
+@dataclass(frozen=True)
+class _SylvesterDesign:
+    """Matrices of ``dz = A z + B_c y_c + B_d w + T G u`` with z standing for ``T x``.
+
+    Attributes:
+        A: Hurwitz, shape (r, r). B: ``[B_c B_d]``, shape (r, n - r). T: ``[T_R T_c T_d]``, shape (r, n), with T_R
+        invertible.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    T: np.ndarray
+
 
 _MULTIRATE_MODELS: dict[str, Callable[[], ObserverModel]] = {"inverted_pendulum_cart": inverted_pendulum_cart}
 
@@ -43,7 +59,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
         model: linear, its measurements the last states in their order; or the name of one in `_MULTIRATE_MODELS`.
         continuous: how many of the measurements, the first ones, are there always.
 
-    Default A: real poles from -2 1/s on; B such that T_R = I (`sylvester_design`) [ours, the thesis prints none].
+    Default A: real poles from -2 1/s on; B such that T_R = I (`_sylvester_design`) [ours, the thesis prints none].
 
     Raises:
         ValueError: the model is unknown, not linear, not in that order, or its unmeasured part cannot be observed.
@@ -64,7 +80,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
             -SPEED * (1.0 + 0.25 * np.arange(self.hidden)),
             tuple(s.name for s in self.model.states[: self.hidden]),
         )
-        design = sylvester_design(self.model.A, self.hidden, poles, names, f"{self.name} of {self.model.name}")
+        design = _sylvester_design(self.model.A, self.hidden, poles, names, f"{self.name} of {self.model.name}")
         self.parameters = (
             matrix_parameter("filter_matrix", design.A, "Matrix A of the filter, Hurwitz, row by row [1/s]"),
             matrix_parameter("filter_gain", design.B, "Gain [B_c B_d] of the filter, row by row"),
@@ -119,7 +135,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
     def condition_of(self, p: Any) -> Condition:
         """(1.46) by its residual, A Hurwitz by its abscissa, T_R invertible by its condition number."""
         r, A, B, T = self._numbers(p)
-        residual = sylvester_residual(self.model.A, A, B, T)
+        residual = _sylvester_residual(self.model.A, A, B, T)
         abscissa, spread = float(np.linalg.eigvals(A).real.max()), float(np.linalg.cond(T[:, :r]))
         return Condition(
             holds=residual < RESIDUAL and abscissa < 0.0 and spread < 1.0 / RESIDUAL,
@@ -136,7 +152,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
         _, B_d, read, own = self.error_matrices(p)
         generator = np.block([[A, B_d], [read, own]])
         reset = np.diag(np.r_[np.ones(r), np.zeros(count)])
-        residual = sylvester_residual(self.model.A, A, B, T)
+        residual = _sylvester_residual(self.model.A, A, B, T)
         left_out = "noise and model errors are left out"
         model = f"error equations of the model {self.model.name!r}, exact if it is linear; {left_out}"
         found = certify_sampled_error((ImpulsiveError.of(generator, reset),), max_gap, model)
@@ -192,3 +208,46 @@ def _find(model: str | ObserverModel) -> ObserverModel:
         known = ", ".join(_MULTIRATE_MODELS)
         raise ValueError(f"Unknown multirate model {model!r}; known are: {known}. Or give an ObserverModel.")
     return _MULTIRATE_MODELS[model]()
+
+
+def _sylvester_transformation(F: np.ndarray, A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """T of ``T F = A T + [0 B]``: Bouchama 2024, (1.46)."""
+    r, n = len(A), len(F)
+    if np.shape(A) != (r, r) or np.shape(F) != (n, n) or np.shape(B) != (r, n - r):
+        raise ValueError(
+            f"Sylvester equation: A {np.shape(A)}, F {np.shape(F)} and B {np.shape(B)} do not fit; expected (r, r), "
+            f"(n, n) and "
+            f"(r, n - r), here {(r, n - r)}."
+        )
+    distance = np.abs(np.linalg.eigvals(A)[:, None] - np.linalg.eigvals(F)[None, :]).min()
+    if distance < 1e-9 * max(1.0, float(np.abs(F).max())):
+        raise ValueError(
+            "Sylvester equation: A shares an eigenvalue with the plant, there is no unique T; move the poles of A."
+        )
+    return np.asarray(scipy.linalg.solve_sylvester(-A, F, np.hstack([np.zeros((r, r)), B])))
+
+
+def _sylvester_residual(F: np.ndarray, A: np.ndarray, B: np.ndarray, T: np.ndarray) -> float:
+    """Largest entry of ``T F - A T - [0 B]``, relative to the largest of ``T F``."""
+    r = len(A)
+    left = T @ F
+    error = left - A @ T - np.hstack([np.zeros((r, r)), B])
+    return float(np.abs(error).max() / max(float(np.abs(left).max()), 1e-300))
+
+
+def _sylvester_design(
+    F: np.ndarray, unmeasured: int, poles: Sequence[float] | np.ndarray, states: Sequence[str] = (), name: str = ""
+) -> _SylvesterDesign:
+    """A and B for given poles by the reduced-order observer, and T from the Sylvester equation [ours].
+
+    With L placing the poles of ``A = F_11 - L F_21`` the unmeasured part less L times the measured one is such a
+    filter, with ``B = F_12 - L F_22 + A L``; the equation then gives ``T = [I, -L]``, so that T_R is as well
+    conditioned as can be.
+    """
+    r = unmeasured
+    F11, F12, F21, F22 = F[:r, :r], F[:r, r:], F[r:, :r], F[r:, r:]
+    names = tuple(states) or tuple(f"x{i + 1}" for i in range(r))
+    L = observer_gain(F11, F21, poles, names, name or "Sylvester design")
+    A = F11 - L @ F21
+    B = F12 - L @ F22 + A @ L
+    return _SylvesterDesign(A, B, _sylvester_transformation(F, A, B))

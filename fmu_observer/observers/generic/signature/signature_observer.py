@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.formulas.signatures.blending import blended
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -219,7 +218,7 @@ class SignatureObserver(HybridSystem):
         long = np.where(windows > _RECENT, np.where(share > 0.5, 1.0, x.long_outside), x.long_outside)
         kept = (np.where(full > 0.5, new, old) for new, old in zip(found.own, own, strict=True))
         return {
-            **named_as(self._named, blended(ahead, now, p.gain, full), "estimated_"),
+            **named_as(self._named, _blended(ahead, now, p.gain, full), "estimated_"),
             **named_as(self._named, np.where(full > 0.5, now, ahead), "looked_up_"),
             **{f"past_{name}": samples for name, samples in past.items()},
             "samples_held": count,
@@ -305,3 +304,12 @@ def _window_outputs(named: Sequence[Signal]) -> tuple[Signal, ...]:
         discrete_output("outside_count", "1", "Full windows beyond the table so far"),
         discrete_output("mostly_outside", "1", "1 where most windows were beyond the table", warning=_MOSTLY),
     )
+
+
+def _blended(predicted: Array, estimate: Array, gain: Array, ready: Array = 1.0) -> Array:
+    """``(x_m + q x_s) / (1 + q)``, the filter (4.6.8) and (4.7.9) of Omar 2012.
+
+    The estimate enters with the weight q / (1 + q): 0.0099 for q = 0.01, 0.0909 for 0.1, 0.1667 for 0.2, 0.2308 for
+    0.3. q = 0 leaves the model to itself.
+    """
+    return np.where(ready > 0.5, (predicted + gain * estimate) / (1.0 + gain), predicted)

@@ -10,13 +10,13 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
-from fmu_observer.formulas.signatures.printed_recursion import PRINTED_MEMORY, next_printed
 from fmu_observer.formulas.signatures.tip_recursion import CYCLES, TIP_MEMORY, next_tips
 from plant_models.hybrid import (
     Array,
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
+    Signal,
     discrete_output,
     input_signal,
     memory,
@@ -25,6 +25,24 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
+
+_TOLERANCE = 0.01
+"""Of the ordinate, as printed."""
+_FLAT = -1e9  # below every second difference
+_PRINTED_MEMORY: tuple[Signal, ...] = (
+    memory("ordinate_before", "1", 0.0, "Ordinate of the long signature one sample ago"),
+    memory("tip_ordinate", "1", 0.0, "Ordinate of the last tip, y*"),
+    memory("near", "1", 0.0, "Smallest abscissa at that ordinate since the last tip"),
+    memory("near_before", "1", 0.0, "Smallest abscissa at the tip's ordinate between the last two tips"),
+    memory("short_abscissa", "1", 0.0, "Abscissa of the short signature one sample ago"),
+    memory("short_ordinate", "1", 0.0, "Ordinate of the short signature one sample ago"),
+    memory("short_earlier", "1", 0.0, "Ordinate of the short signature two samples ago"),
+    memory("bend", "1", _FLAT, "Largest second difference of the short ordinates since the last tip"),
+    memory("bend_at", "1", 0.0, "Abscissa there"),
+    memory("bend_before", "1", _FLAT, "Largest second difference between the last two tips"),
+    memory("bend_at_before", "1", 0.0, "Abscissa there"),
+)
+
 
 Reading = Literal["repaired", "as_published"]
 LONG, SHORT = 100, 50  # orders of the properties that ship
@@ -120,7 +138,7 @@ class SignatureTrack(HybridSystem):
             memory("samples", "1", 0.0, "The last samples, the oldest first", size=long_order),
             memory("taken", "1", 0.0, "Samples taken, counted as far as is needed"),
             *TIP_MEMORY,
-            *(PRINTED_MEMORY if reading == "as_published" else ()),
+            *(_PRINTED_MEMORY if reading == "as_published" else ()),
         )
         super().__init__(
             long_order=long_order,
@@ -154,7 +172,7 @@ class SignatureTrack(HybridSystem):
             found = next_tips(x, long_point[0], short_point[0], patience)
         else:
             points = ((long_point[0], long_point[1]), (short_point[0], short_point[1]))
-            found = next_printed(x, *points, patience)
+            found = _next_printed(x, *points, patience)
         full = x.taken > count - 0.5
         return {
             "samples": np.hstack([past[1:], vector(u.signal)]),
@@ -188,3 +206,45 @@ class SignatureTrack(HybridSystem):
             "p2_changed": ready * np.where(second, 1.0, 0.0),
             "p3_changed": ready * np.where(third, 1.0, 0.0),
         }
+
+
+def _next_printed(
+    x: Any, long_point: tuple[Array, Array], short_point: tuple[Array, Array], patience: Array
+) -> dict[str, Array]:
+    """Memory after a sample, with the properties by the printed formulas.
+
+    ``|S_y - y*| < 0.01`` asks for the ordinate of a tip that is still to come; here it is that of the last one.
+    """
+    tips = next_tips(x, long_point[0], short_point[0], patience)
+    tip = tips["since_tip"] < 0.5
+    near = np.where(np.abs(long_point[1] - x.tip_ordinate) < _TOLERANCE, np.minimum(x.near, long_point[0]), x.near)
+    bend = short_point[1] - 2.0 * x.short_ordinate + x.short_earlier
+    sharper = bend > x.bend
+    best, best_at = np.where(sharper, bend, x.bend), np.where(sharper, x.short_abscissa, x.bend_at)
+    at_bend = np.where(best > x.bend_before, best_at, x.bend_at_before)
+    return tips | {
+        "ordinate_before": long_point[1],
+        "tip_ordinate": np.where(tip, x.ordinate_before, x.tip_ordinate),
+        "near": np.where(tip, x.abscissa_before, near),
+        "near_before": np.where(tip, near, x.near_before),
+        "short_abscissa": short_point[0],
+        "short_ordinate": short_point[1],
+        "short_earlier": x.short_ordinate,
+        "bend": np.where(tip, _FLAT, best),
+        "bend_at": np.where(tip, x.short_abscissa, best_at),
+        "bend_before": np.where(tip, best, x.bend_before),
+        "bend_at_before": np.where(tip, best_at, x.bend_at_before),
+        **_properties(x, tip, near, at_bend),
+    }
+
+
+def _properties(x: Any, tip: Array, near: Array, at_bend: Array) -> dict[str, Array]:
+    """Properties, new at a tip, by the smallest abscissa at its ordinate and the abscissa of the sharpest bend."""
+    top = np.maximum(x.abscissa_before, x.last_tip)
+    nearest = np.minimum(near, x.near_before)
+    low = np.minimum(x.lowest, x.lowest_before)
+    return {
+        "held_length": np.where(tip, 0.5 * (top + nearest) - low, x.held_length),
+        "held_short_tip": np.where(tip, at_bend, x.held_short_tip),
+        "held_gap": np.where(tip, top - nearest, x.held_gap),
+    }

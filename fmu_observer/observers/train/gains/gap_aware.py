@@ -14,14 +14,39 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+import scipy
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import RATIOS, SHARES, Gains, balise_family, certified_gains, rounded_down
-from fmu_observer.design.noise_amplification import NoiseAmplification, noise_amplification
 from fmu_observer.observers.train.adaptive_gain_cdo import AdaptiveGainCdo
 from fmu_observer.observers.train.differentiator_cdo import DifferentiatorCdo
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo
+
+_POINTS = 16  # of time in a gap at which the error is judged
+
+
+@dataclass(frozen=True)
+class _NoiseAmplification:
+    """Standard deviations of the estimate's error, at their largest over the gaps judged.
+
+    Attributes:
+        position: of the position [m], speed: of the speed [m/s], for balise positions with independent errors of 1 m.
+        slip: error of the speed [m/s] for an odometer that is constantly 1 m/s off.
+    """
+
+    position: float
+    speed: float
+    slip: float
+
+    def explain(self) -> str:
+        """One sentence for the user."""
+        return (
+            f"Noise of 1 m in the balise positions becomes {self.position:.3g} m in position and {self.speed:.3g} m/s "
+            f"in speed, "
+            f"1 m/s of odometer slip {self.slip:.3g} m/s."
+        )
+
 
 if TYPE_CHECKING:
     from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
@@ -76,7 +101,7 @@ class GainDesign:
     gaps: _BaliseGaps
     certificate: Certificate
     margin: float
-    noise: NoiseAmplification
+    noise: _NoiseAmplification
 
     def explain(self) -> str:
         """Two or three sentences for the user."""
@@ -243,7 +268,7 @@ def _design(
         raise ValueError(f"{observer.name}: the gains of the design are not certified. {certificate.explain()}")
     judged = [(error(gap), gap) for gap in map(float, np.linspace(gaps.shortest, gaps.longest, 5))]
     margin = certificate.aperiodic_limit / gaps.longest - 1.0
-    return GainDesign(observer.name, parameters, gaps, certificate, margin, noise_amplification(judged, odometer_gain))
+    return GainDesign(observer.name, parameters, gaps, certificate, margin, _noise_amplification(judged, odometer_gain))
 
 
 def _with_margin(gaps: _BaliseGaps, margin: float) -> float:
@@ -268,3 +293,30 @@ def _distances(positions: Sequence[float]) -> list[float]:
                 f"at {place:g} m."
             )
     return [following - place for place, following in pairwise(positions)]
+
+
+def _noise_amplification(
+    errors: Sequence[tuple[SampledError, float]], odometer_gain: tuple[float, float] = (0.0, 0.0)
+) -> _NoiseAmplification:
+    """Amplification at constant gaps, in the long run."""
+    found = [_at(error, gap, np.asarray(odometer_gain, dtype=float)) for error, gap in errors]
+    return _NoiseAmplification(*map(float, np.max(found, axis=0)))
+
+
+def _at(error: SampledError, gap: float, odometer_gain: np.ndarray) -> tuple[float, float, float]:
+    """Position and speed by balise noise, speed by slip, at one gap."""
+    n = error.size
+    generator = np.zeros((n + 2, n + 2))  # error, decaying innovation, constant odometer error
+    generator[: n + 1, : n + 1] = error.generator
+    generator[:n, n + 1] = odometer_gain
+    if error.spectral_radius(gap) >= 1.0:
+        raise ValueError(f"Noise amplification: the error grows at a constant gap of {gap:.4g} s.")
+    moved = [scipy.linalg.expm(generator * t)[:n] for t in np.linspace(0.0, gap, _POINTS)]
+    # the innovation starts as the first error component
+    closed = [m[:, :n] + np.outer(m[:, n], np.eye(n)[0]) for m in moved]
+    at_balises = scipy.linalg.solve_discrete_lyapunov(closed[-1], np.outer(moved[-1][:, n], moved[-1][:, n]))
+    offset = np.linalg.solve(np.eye(n) - closed[-1], moved[-1][:, n + 1])
+    variances = [np.diag(c @ at_balises @ c.T) + m[:, n] ** 2 for c, m in zip(closed, moved, strict=True)]
+    slip = max(abs(float((c @ offset + m[:, n + 1])[1])) for c, m in zip(closed, moved, strict=True))
+    position, speed = np.sqrt(np.max(variances, axis=0))[:2]
+    return float(position), float(speed), slip
