@@ -356,7 +356,12 @@ def _loss_scale(losses: Sequence[Loss]) -> Any:
 
 
 def window_observability(model: FilterModel, known: Known, period: float, rows: int) -> _WindowObservability:
-    """What a number of full rows tell of the state in the first of them, along the model's own way without noise."""
+    """What a number of full rows show of the state in the first of them, along the model's own way without noise.
+
+    Args:
+        model: the model, from its start. known: time, inputs held, and parameters. period: from row to row [s].
+        rows: N.
+    """
     x, passage, seen = model.start, np.eye(model.order), []
     for i in range(rows):
         now = known._replace(t=known.t + i * period)
