@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,21 +17,22 @@ from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
 from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
-from cosim.cli.baseline_text import print_change, print_comparison, print_header
-from cosim.cli.output import print_json, print_paths, print_warning
+from cosim.cli.baseline_text import change_output, header_parts
+from cosim.cli.output import print_warning
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
+from cosim.comparison.comparison_text import comparison_parts
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
-from cosim.errors import BaselineError
+from cosim.errors import BaselineError, OutputError
 from cosim.results.load_result import load_result
 from fmus.cli.commands import Action, Actions, Argument, ArgumentGroup, Execute, argument
+from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline, Regression
-    from cosim.baselines.subject import Subject
-    from cosim.comparison.tolerance import Tolerances
+    from cosim.baselines.update import Update
 
 DONE, DIFFERS = 0, 1
 EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
@@ -40,7 +41,6 @@ EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
 FILE = argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
 FORCE = argument("--force", action="store_true", help="replace a baseline that is there already")
 ALLOWED = ArgumentGroup(TOLERANCES, "tolerances", "those in the baseline, or the usual ones, where not given")
-_OUTPUT = (argument("--json", action="store_true", help="print JSON instead of text"), QUIET)
 _MAKE = (
     argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"),
     FILE,
@@ -86,13 +86,13 @@ _EXTRACT = (
 )
 
 
-def _make(options: argparse.Namespace) -> int:
+def _make(options: argparse.Namespace) -> Output:
     path = _free(baseline_path(options.file), options.force)
     tolerances = chosen_tolerances(options, asked_tolerances(options), Tolerances())
     subject = _subject(options)
     given = subject.outcome or subject.result
     update = plan_update(given, path, tolerances, recipe=subject.recipe, signals=options.signals, every=options.every)
-    return _write(update, path, options)
+    return _written(update, path)
 
 
 def _subject(options: argparse.Namespace) -> Subject:
@@ -127,17 +127,16 @@ def _values(options: argparse.Namespace) -> dict[str, Any]:
     return {"inputs": options.inputs or held, "parameters": values}
 
 
-def _check(options: argparse.Namespace) -> int:
+def _check(options: argparse.Namespace) -> Output:
     asked = asked_tolerances(options)
     found = [_check_one(baseline, asked, options) for baseline in _baselines(options)]
-    if options.json:
-        print_json([one.to_dict() for one in found] if len(found) > 1 else found[0].to_dict())
-    else:
-        for one in found:
-            print_comparison(one, options.verbose)
-    if options.plots:
-        _draw(found, options)
-    return DONE if all(one.equal for one in found) else DIFFERS
+    data = [one.to_dict() for one in found] if len(found) > 1 else found[0].to_dict()
+    output = Output(
+        [part for one in found for part in comparison_parts(one, options.verbose)],
+        data,
+        code=DONE if all(one.equal for one in found) else DIFFERS,
+    )
+    return output if options.plots is None else _drawn(output, found, Path(options.plots))
 
 
 def _baselines(options: argparse.Namespace) -> list[Baseline]:
@@ -161,24 +160,28 @@ def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) ->
     )
 
 
-def _draw(found: list[Regression], options: argparse.Namespace) -> None:
+def _drawn(output: Output, found: Sequence[Regression], folder: Path) -> Output:
+    """The same with the pages; what was found is kept where one cannot be written."""
     from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - matplotlib only for those who draw
 
-    for one in found:
-        folder = Path(options.plots) / one.reference if len(found) > 1 else Path(options.plots)
-        print_paths(write_comparison(one, folder), sys.stderr if options.json else sys.stdout)
+    files: dict[str, Path] = {}
+    try:
+        for one in found:
+            several = len(found) > 1
+            paths = write_comparison(one, folder / one.reference if several else folder)
+            files |= {f"{kind} of {one.reference}" if several else kind: path for kind, path in paths.items()}
+    except OutputError as error:
+        return replace(output, files=files, error=error)
+    return replace(output, files=files)
 
 
-def _show(options: argparse.Namespace) -> int:
+def _show(options: argparse.Namespace) -> Output:
     baseline = read_baseline(options.file)
-    if options.json:
-        print_json(header_data(baseline.header, baseline.path.parent) | {"notes": list(baseline.notes)})
-    else:
-        print_header(baseline)
-    return DONE
+    data = header_data(baseline.header, baseline.path.parent) | {"notes": list(baseline.notes)}
+    return Output(header_parts(baseline), data)
 
 
-def _update(options: argparse.Namespace) -> int:
+def _update(options: argparse.Namespace) -> Output:
     baseline = read_baseline(options.file)
     tolerances = chosen_tolerances(options, asked_tolerances(options), baseline.tolerances)
     with _progress(options) as bar:
@@ -192,33 +195,24 @@ def _update(options: argparse.Namespace) -> int:
         signals=header.selection,
         every=header.every,
     )
-    return _write(update, baseline.path, options)
+    return _written(update, baseline.path)
 
 
-def _write(update: Any, path: Path, options: argparse.Namespace) -> int:
+def _written(update: Update, path: Path) -> Output:
     if update.texts:
         write_texts(update.texts, path)
-    print_change(update, path, options.json)
-    return DONE
+    return change_output(update, path)
 
 
-def _embed(options: argparse.Namespace) -> int:
+def _embed(options: argparse.Namespace) -> Output:
     target = embed_baseline(read_baseline(options.file), options.fmu, options.output, options.name)
-    if options.json:
-        print_json({"file": str(target)})
-    else:
-        print(f"{target} holds {options.name or Path(options.file).stem}.")
-    return DONE
+    return Output([f"{target} holds {options.name or Path(options.file).stem}."], {"file": str(target)})
 
 
-def _extract(options: argparse.Namespace) -> int:
+def _extract(options: argparse.Namespace) -> Output:
     path = _free(baseline_path(options.file), options.force)
     extract_reference(options.fmu, path, options.reference)
-    if options.json:
-        print_json({"file": str(path)})
-    else:
-        print(f"{path} written.")
-    return DONE
+    return Output([f"{path} written."], {"file": str(path)})
 
 
 def _free(path: Path, force: bool) -> Path:
@@ -240,9 +234,11 @@ def _progress(options: argparse.Namespace) -> ProgressBar:
 
 def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | ArgumentGroup]) -> Action:
     words = {"help": text, "description": f"{text[0].upper()}{text[1:]}."}
-    return Action(name, execute, words, (*_OUTPUT, *arguments))
+    return Action(name, execute, words, (QUIET, *arguments))
 
 
+GROUP = "Compare"
+HELP = "make, check and update baselines"
 PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
 ARGUMENTS = (
     Actions(

@@ -1,4 +1,4 @@
-"""What ``cosim baseline`` prints: a baseline, a comparison, a change. Prints only."""
+"""What ``cosim baseline`` says of a baseline and of a change of one."""
 
 from __future__ import annotations
 
@@ -7,63 +7,56 @@ from typing import TYPE_CHECKING
 
 from cosim.baselines.call import Call
 from cosim.baselines.draft import value_range
-from cosim.cli.output import print_json
-from cosim.comparison.comparison_text import comparison_text
-from fmus.text_table import text_table
+from fmus.cli.output import Output
+from fmus.tables.table import Parts, Table, name_column, text_column
 
 if TYPE_CHECKING:
-    from cosim.baselines import Baseline, Regression
+    from cosim.baselines import Baseline
     from cosim.baselines.update import Update
 
-
-def print_comparison(found: Regression, verbose: bool) -> None:
-    """Print a comparison.
-
-    Args:
-        found: what the check found. verbose: all signals, not only those that differ.
-    """
-    print(comparison_text(found, verbose=verbose))
+_COLUMNS = (
+    name_column("signal"),
+    text_column("allowed", meaning="How far a value may differ", write="+- {:.3g}".format),
+    text_column("unit"),
+    text_column("description"),
+)
 
 
-def print_change(update: Update, path: Path, as_json: bool) -> None:
-    """Print what was written.
+def change_output(update: Update, path: Path) -> Output:
+    """What was written.
 
     Args:
-        update: what was changed. path: of the baseline. as_json: print JSON.
+        update: what was changed. path: of the baseline.
     """
-    worst = Call.worst(update.before) if update.before is not None else []
-    if as_json:
-        print_json({"file": str(path), "change": update.change, "notes": [*update.notes, *worst]})
-        return
+    notes = [*update.notes, *(Call.worst(update.before) if update.before is not None else [])]
     rows = update.after.baseline.header.rows if update.after.baseline is not None else 0
-    print(f"{path}: {update.change}, {len(update.after.signals)} signals, {rows} rows.")
-    for line in (*update.notes, *worst):
-        print(f"  {line}")
+    line = f"{path}: {update.change}, {len(update.after.signals)} signals, {rows} rows."
+    data = {"file": str(path), "change": update.change, "notes": notes}
+    return Output(["\n".join([line, *(f"  {note}" for note in notes)])], data)
 
 
-def print_header(baseline: Baseline) -> None:
-    """Print what a baseline is of."""
+def header_parts(baseline: Baseline) -> Parts:
+    """What a baseline is of."""
     header = baseline.header
     span = header.span
     telegrams = "" if header.events is None else f", {header.events} telegrams"
-    print(f"{baseline.path}: {header.title}")
-    print(f"  {span['start']:g} to {span['stop']:g} s at {span['step']:g} s steps; {header.rows} rows{telegrams}")
-    print(f"  run again from: {header.recipe.source or 'nothing (made from a result)'}")
+    lines = [
+        f"{baseline.path}: {header.title}",
+        f"  {span['start']:g} to {span['stop']:g} s at {span['step']:g} s steps; {header.rows} rows{telegrams}",
+        f"  run again from: {header.recipe.source or 'nothing (made from a result)'}",
+    ]
     for entry in header.components:
         file = f", {entry.file}" if entry.file else ""
-        print(f"  {entry.name}: model {entry.model}, FMI {entry.fmi_version}, GUID {entry.guid}{file}")
-        for name, value in entry.parameters.items():
-            print(f"    {name} = {value}")
-    print("  made with: " + (", ".join(f"{name} {value}" for name, value in header.versions.items()) or "not known"))
+        lines.append(f"  {entry.name}: model {entry.model}, FMI {entry.fmi_version}, GUID {entry.guid}{file}")
+        lines += [f"    {name} = {value}" for name, value in entry.parameters.items()]
+    versions = ", ".join(f"{name} {value}" for name, value in header.versions.items()) or "not known"
+    remarks = [f"ignored: {pattern}" for pattern in header.tolerances.ignore]
+    remarks += [f"note: {note}" for note in baseline.notes]
     rows = [[info.name, _allowed(baseline, info.name), info.unit, info.description] for info in header.signals]
-    for line in text_table(rows, left=range(4)):
-        print(f"  {line}")
-    for pattern in header.tolerances.ignore:
-        print(f"  ignored: {pattern}")
-    for note in baseline.notes:
-        print(f"  note: {note}")
+    text = "\n".join([*lines, f"  made with: {versions}"])
+    return [text, Table("allowed", _COLUMNS, rows), "\n".join(f"  {remark}" for remark in remarks)]
 
 
-def _allowed(baseline: Baseline, name: str) -> str:
-    allowed = baseline.tolerances.for_signal(name).value_for(value_range(baseline.result.table[name]))
-    return f"+- {allowed:.3g}"
+def _allowed(baseline: Baseline, name: str) -> float:
+    """Largest error of a signal that is allowed, in its unit."""
+    return baseline.tolerances.for_signal(name).value_for(value_range(baseline.result.table[name]))

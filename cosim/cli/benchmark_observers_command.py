@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from cosim.cli.arguments import JSON_NOT_TABLE, QUIET, positive, scenario_arguments
-from cosim.cli.output import print_json, print_paths, print_warning, texts_of
+from cosim.cli.arguments import QUIET, positive, scenario_arguments
+from cosim.cli.output import print_warning
 from cosim.cli.scenarios import load_scenario
 from cosim.observer_benchmark.benchmark import benchmark_observers
 from cosim.results.results_folder import check_writable
 from fmus.cli.commands import argument, one_of
+from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
-
-if TYPE_CHECKING:
-    from cosim.observer_benchmark.benchmark import ObserverBenchmark
 
 DONE, NOT_AS_ASKED = 0, 1
 
@@ -27,6 +23,8 @@ def _names(text: str) -> list[str]:
     return names
 
 
+GROUP = "Observers"
+HELP = "compare observers on one recorded run"
 PARSER = {
     "description": (
         "Run the plant side of a scenario once, play it back to several observers, each alone, and compare errors,"
@@ -54,17 +52,12 @@ ARGUMENTS = (
         "--repeat", type=positive, default=1, metavar="N", help="runs of each observer, for the cost (default: 1)"
     ),
     argument("--out", metavar="DIR", help="also write page, picture and data to this folder"),
-    JSON_NOT_TABLE,
     QUIET,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Compare, print and write.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Compare, and write where that is asked for."""
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)
@@ -82,15 +75,10 @@ def execute(options: argparse.Namespace) -> int:
     finally:
         bar.close()
     paths = benchmark.write(options.out) if options.out is not None else {}
-    _print(benchmark, paths, as_json=options.json)
-    if benchmark.interrupted:
-        raise KeyboardInterrupt  # all there is has been printed
-    return NOT_AS_ASKED if benchmark.failed else DONE
-
-
-def _print(benchmark: ObserverBenchmark, paths: dict[str, Path], *, as_json: bool) -> None:
-    if as_json:
-        print_json(benchmark.to_data() | {"files": texts_of(paths)})
-        return
-    print(benchmark.text())
-    print_paths(paths)
+    return Output(
+        [benchmark.table(), benchmark.errors(), "\n".join(benchmark.remarks())],
+        benchmark.to_data(),
+        paths,
+        NOT_AS_ASKED if benchmark.failed else DONE,
+        error=KeyboardInterrupt() if benchmark.interrupted else None,
+    )

@@ -18,6 +18,8 @@ KEPT, _EXCEEDED = 0, 1
 KINDS = ("carried", "exact")
 """What a limit may rest on; what is printed in the thesis is no bound."""
 
+GROUP = "Observers"
+HELP = "bounds of an observer's error between samples"
 PARSER = {
     "description": (
         "Bounds of the error of an observer whose measurement is held between samples: just before the next "

@@ -20,6 +20,8 @@ from fmus.cli.commands import argument
 
 DONE, NOT_IDENTIFIED = 0, 1
 
+GROUP = "Study"
+HELP = "fit parameters of an FMU or a scenario to a recording"
 PARSER = {
     "description": (
         "Fit parameters of an FMU or a scenario to a recording by least squares, with confidence intervals, and tell "

@@ -11,14 +11,14 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from cosim.baselines import check, is_baseline, read_baseline
-from cosim.cli.output import print_json
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import compare_results
-from cosim.comparison.comparison_text import comparison_text
+from cosim.comparison.comparison_text import comparison_parts
 from cosim.comparison.tolerance import Tolerances
-from cosim.errors import ComparisonError, nearest
+from cosim.errors import ComparisonError, OutputError, nearest
 from cosim.results.load_result import load_result
 from fmus.cli.commands import ArgumentGroup, argument, one_of
+from fmus.cli.output import Output
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline
@@ -36,6 +36,8 @@ EPILOG = (
 )
 
 KINDS = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
+GROUP = "Compare"
+HELP = "compare a result with a reference"
 PARSER = {
     "description": "Compare a result with a reference: signals in tolerance tubes, telegrams as events.",
     "epilog": EPILOG,
@@ -59,7 +61,6 @@ ARGUMENTS = (
     ),
     ArgumentGroup(
         (
-            argument("--json", action="store_true", help="print the comparison as JSON instead of text"),
             argument("--html", metavar="FILE", help="write a page with pictures of the signals that differ"),
             argument("--plots", metavar="DIR", help="write these pictures as PNG files"),
             one_of(
@@ -72,16 +73,14 @@ ARGUMENTS = (
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Compare, print, and write what was asked for.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Compare, and write what was asked for."""
     asked = asked_tolerances(options)  # before anything is read: a mistake in them is named at once
     comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
-    _print(comparison, options)
-    return EQUAL if comparison.equal else _DIFFERENT
+    parts = comparison_parts(comparison, verbose=options.verbose)
+    code = EQUAL if comparison.equal else _DIFFERENT
+    found = Output(parts[:1] if options.quiet else parts, comparison.to_dict(), code=code)
+    return _drawn(found, comparison, options) if options.html or options.plots else found
 
 
 def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
@@ -135,22 +134,17 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
     )
 
 
-def _print(comparison: Comparison, options: argparse.Namespace) -> None:
-    """Text or JSON first, so that it is seen also where a file cannot be written."""
-    if options.json:
-        print_json(comparison.to_dict())
-    else:
-        text = comparison_text(comparison, verbose=options.verbose)
-        print(text.splitlines()[0] if options.quiet else text)
-    if not (options.html or options.plots):
-        return
+def _drawn(found: Output, comparison: Comparison, options: argparse.Namespace) -> Output:
+    """The same with page and pictures, as they were asked for; what was found is kept where one cannot be written."""
     from cosim.report.page.comparison import write_page, write_pictures  # noqa: PLC0415 - matplotlib only for those who look
 
-    lines = [f"{'page':>10}: {write_page(comparison, options.html)}"] if options.html else []
-    if options.plots:
-        drawn = write_pictures(comparison, options.plots)
-        lines += [f"{'picture':>10}: {path}" for path in drawn.values()] or [
-            "no pictures: nothing that differs can be drawn"
-        ]
-    if not (options.json or options.quiet):
-        print("", *lines, sep="\n")
+    try:
+        files = {"page": write_page(comparison, options.html)} if options.html else {}
+        drawn = write_pictures(comparison, options.plots) if options.plots else {}
+    except OutputError as error:
+        return replace(found, error=error)
+    none = ["no pictures: nothing that differs can be drawn"] if options.plots and not drawn else []
+    if options.quiet:
+        return found
+    pictures = {f"picture of {name}": path for name, path in drawn.items()}
+    return replace(found, parts=[*found.parts, *none], files=files | pictures)

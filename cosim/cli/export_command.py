@@ -1,27 +1,89 @@
-"""``cosim export SCENARIO FILE.ssp``: a scenario as a system structure package for other tools."""
+"""``cosim export SOURCE TARGET``: a scenario as SSP, a result in another format, the trajectory behind a recording."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from cosim.cli.arguments import scenario_arguments
+from cosim.cli.arguments import settings_argument
 from cosim.cli.scenarios import load_scenario
-from fmus.cli.commands import argument
+from cosim.cli.trajectory import TRAJECTORY, export_trajectory
+from cosim.errors import OutputError, ScenarioError
+from cosim.results.formats.known_formats import format_of
+from cosim.results.load_result import load_result
+from cosim.results.save import save_result
+from cosim.results.selection import selected
+from cosim.scenario.package_names import is_package
+from fmus.cli.commands import ArgumentGroup, argument
+from fmus.cli.output import Output
 
-PARSER = {"description": "Write a scenario as a system structure package (SSP) for other tools."}
+GROUP = "Models and files"
+HELP = "write a scenario as SSP, a result in another format, the trajectory behind a recording"
+FORMER = {"convert": "cosim export SOURCE TARGET", "reference": "cosim export SOURCE TARGET --trajectory"}
+PARSER = {
+    "description": (
+        "Write for other tools. TARGET.ssp: SOURCE is a scenario, written as a system structure package. Any other "
+        "TARGET: SOURCE is a results folder or a table of any tool, in the format that the ending says, such as "
+        ".csv, .mat (MATLAB), .modelica.mat (Dymola, OpenModelica), .npy, .parquet, .h5; with --trajectory the "
+        "trajectory that it was most likely made on."
+    ),
+    "epilog": "Exit codes: 0 written, 2 error.",
+}
 ARGUMENTS = (
-    *scenario_arguments(default=None),
-    argument("file", type=Path, help="the package to write, ending in .ssp"),
-    argument("--ssp-version", choices=("1.0", "2.0"), default="2.0", help="version of SSP (default: 2.0)"),
+    argument("scenario", metavar="SOURCE", help="a scenario, by name or file; or a results folder or table"),
+    argument("target", type=Path, metavar="TARGET", help="file to write"),
+    ArgumentGroup(
+        (
+            settings_argument(),
+            argument("--ssp-version", choices=("1.0", "2.0"), help="version of SSP (default: 2.0)"),
+        ),
+        "a scenario",
+    ),
+    ArgumentGroup(
+        (
+            argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="these only, e.g. 'train.*'"),
+            argument("--no-units", action="store_true", help="CSV headings without units"),
+        ),
+        "a result",
+    ),
+    TRAJECTORY,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Write the package.
+def execute(options: argparse.Namespace) -> Output:
+    """Read, choose, write; what was written and what the format does not keep."""
+    if is_package(str(options.target)):
+        _refuse(options, "a scenario", "signals", "no_units", "trajectory")
+        path = load_scenario(options).export_ssp(options.target, options.ssp_version or "2.0")
+        return Output([str(path)], {"file": str(path)})
+    _refuse(options, "a result", "settings", "ssp_version")
+    if options.trajectory:
+        return export_trajectory(options)
+    return _export_result(options.scenario, options)
 
-    Args:
-        options: of the command line.
+
+def _refuse(options: argparse.Namespace, source: str, *others: str) -> None:
+    """Refuse options that are of another kind of source.
+
+    Raises:
+        ScenarioError: one is given.
     """
-    print(load_scenario(options).export_ssp(options.file, options.ssp_version))
-    return 0
+    for name in others:
+        if getattr(options, name):
+            flag = "set" if name == "settings" else name.replace("_", "-")
+            raise ScenarioError(f"--{flag} does not go with {source}, which {options.target} is written from.")
+
+
+def _export_result(source: str, options: argparse.Namespace) -> Output:
+    target, wanted = options.target, format_of(options.target)
+    if target.exists() and Path(source).exists() and target.samefile(source):
+        raise OutputError(f"{target} is the source itself. Choose another name.")
+    result = load_result(source)
+    if options.signals:
+        result = selected(result, options.signals)
+    written = save_result(result, target, units=not options.no_units)
+    counts = {"rows": len(result.table), "signals": len(result.signals), "telegrams": len(result.events)}
+    lines = [f"{', '.join(f'{number} {what}' for what, number in counts.items())}: {', '.join(map(str, written))}"]
+    if wanted.name == "npy" and any(signal.unit != "1" for signal in result.signals):
+        lines.append("A NumPy file keeps no units; .parquet, .h5, .mat and .csv do.")
+    return Output(["\n".join(lines)], counts | {"written": written, "remarks": lines[1:]})

@@ -211,6 +211,8 @@ def _estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
     return {"coefficients": coefficients, "remarks": list(estimate.remarks)} | {k: getattr(estimate, k) for k in keys}
 
 
+GROUP = "Study"
+HELP = "identify parameters of a train from a measured run"
 PARSER = {"description": "Identify parameters of a train from a measured run."}
 ARGUMENTS = (
     Actions(

@@ -5,7 +5,7 @@ package, or what a model declares.
 from __future__ import annotations
 
 import argparse
-import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,21 @@ import fmpy
 from fmpy.model_description import ModelVariable
 
 from cosim import ssp
-from cosim.cli.arguments import PLAIN_JSON
 from cosim.components.description import read_description, runs_here
 from cosim.scenario.package_names import is_package
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 from fmus.fmi.capabilities import read_capabilities
-from fmus.text_table import text_table
+from fmus.tables.table import Table, name_column, pairs_table, text_column
 from plant_models.user_file import names_a_file, names_code
 
+_VARIABLE_COLUMNS = (
+    name_column("name"),
+    text_column("start", write=lambda value: "" if value is None else f"= {value}"),
+    *(text_column(key) for key in ("unit", "type", "description")),
+)
+GROUP = "Models and files"
+HELP = "describe an FMU, an SSP file, a plant or an observer"
 PARSER = {
     "description": (
         "Interfaces, platforms and variables of an FMU; the systems, components and connections in an SSP; or what"
@@ -33,42 +40,32 @@ ARGUMENTS = (
         metavar="WHAT",
         help="an .fmu or .ssp file, a name of 'cosim list', file.py:Class or package.module:Class",
     ),
-    PLAIN_JSON,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Print the description.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """The description."""
     if is_package(options.what):
-        return _execute_package(options)
+        package = ssp.describe_package(options.what)
+        return Output([ssp.text_of_package(package)], package)
     data = _described_model(options.what) if _names_a_model(options.what) else describe_file(Path(options.what))
-    if options.json:
-        print(json.dumps(data, indent=2))
-        return 0
-    variables = data.pop("variables")
-    rows = [[key, ", ".join(map(str, value)) if isinstance(value, list) else str(value)] for key, value in data.items()]
-    print("\n".join(text_table(rows, left=(0, 1))))
-    for causality in ("input", "output", "parameter", "local"):
-        chosen = [v for v in variables if v["causality"] == causality]
-        print(f"{causality}s ({len(chosen)}):")
-        for v in chosen:
-            start = "" if v["start"] is None else f" = {v['start']}"
-            kind = " ".join(filter(None, (v["type"], v["variability"])))
-            print(f"  {v['name']}{start} [{v['unit'] or '-'}] {kind}  {v['description'] or ''}".rstrip())
-    return 0
+    properties = {key: value for key, value in data.items() if key != "variables"}
+    tables = [_variables(data["variables"], causality) for causality in ("input", "output", "parameter", "local")]
+    return Output([pairs_table("properties", properties), *tables], data)
 
 
-def _execute_package(options: argparse.Namespace) -> int:
-    data = ssp.describe_package(options.what)
-    if options.json:
-        print(json.dumps(data, indent=2))
-    else:
-        print(ssp.text_of_package(data))
-    return 0
+def _variables(variables: Sequence[Mapping[str, Any]], causality: str) -> Table | str:
+    """The variables of a causality."""
+    rows = [
+        [
+            *(v["name"], v["start"], f"[{v['unit'] or '-'}]"),
+            *(" ".join(filter(None, (v["type"], v["variability"]))), v["description"] or ""),
+        ]
+        for v in variables
+        if v["causality"] == causality
+    ]
+    title = f"{causality}s ({len(rows)}):"
+    return Table("variables", _VARIABLE_COLUMNS, rows, title) if rows else title
 
 
 def _described_model(name: str) -> dict[str, Any]:

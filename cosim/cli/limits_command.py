@@ -18,6 +18,8 @@ from plant_models.hybrid import HybridSystem
 
 FEWEST = 4
 
+GROUP = "Observers"
+HELP = "gaps and delays that an observer survives"
 PARSER = {
     "description": (
         "How much an observer survives: every printed bound of its sampling period and delay beside the exact "

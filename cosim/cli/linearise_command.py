@@ -9,7 +9,6 @@ import fmu_observer
 import plant_models
 from cosim.cli.arguments import settings_argument
 from cosim.cli.model_info import in_own_words
-from cosim.cli.output import print_json
 from cosim.cli.scenarios import parse_setting, setting_number
 from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError, nearest
@@ -20,9 +19,12 @@ from cosim.fmu_model.sealed import declared_states
 from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 from plant_models.hybrid import HybridSystem
 from plant_models.user_file import names_code
 
+GROUP = "Models and files"
+HELP = "linearise an FMU or a model at a point"
 PARSER = {
     "description": (
         "Linearise an FMU, a plant or an observer at a point. Model exchange and models of ours give matrices of "
@@ -63,15 +65,11 @@ ARGUMENTS = (
         help="communication step of a co-simulation (default: 0.01)",
     ),
     argument("-o", "--output", type=Path, metavar="FILE", help="write .json, .npz or .mat"),
-    argument("--json", action="store_true", help="print the data as JSON instead of the tables"),
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Linearise, print and write.
-
-    Args:
-        options: of the command line.
+def execute(options: argparse.Namespace) -> Output:
+    """The linearisation, written where that is asked for.
 
     Raises:
         CosimError: the model cannot be linearised, or the file cannot be written.
@@ -83,11 +81,7 @@ def execute(options: argparse.Namespace) -> int:
     found = _of_fmu(options, settings) if is_file else _of_model(options, settings)
     if options.output is not None:
         found.save(options.output)
-    if options.json:
-        print_json(found.to_dict())
-    else:
-        print(found.text())
-    return 0
+    return Output(found.parts(), found.to_dict())
 
 
 def _of_fmu(options: argparse.Namespace, settings: dict[str, float]) -> Linearisation:

@@ -8,7 +8,10 @@ from pathlib import Path
 
 from cosim.starter.starter import write_starter
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 
+GROUP = "Models and files"
+HELP = "write a starter scenario for an FMU"
 PARSER = {
     "description": (
         "Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position, "
@@ -29,15 +32,9 @@ ARGUMENTS = (
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Write the file and say what was guessed.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Write the file; what was guessed."""
     target = options.out if options.out is not None else Path(f"{options.fmu.stem}.toml")
     made = write_starter(options.fmu, target, options.observer, force=options.force)
-    for remark in made.remarks:
-        print(remark)
-    print(f"written: {target}. Read the comments, then: cosim run {shlex.quote(str(target))}")
-    return 0
+    next_step = f"written: {target}. Read the comments, then: cosim run {shlex.quote(str(target))}"
+    return Output(["\n".join([*made.remarks, next_step])], {"file": target, "remarks": list(made.remarks)})

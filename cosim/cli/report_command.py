@@ -14,6 +14,7 @@ from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.report.overlay.overlaid_runs import make_runs
 from cosim.results.load_result import load_result
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 
 if TYPE_CHECKING:
     from cosim.evaluation.spec import ReportSpec
@@ -21,8 +22,9 @@ if TYPE_CHECKING:
 
 OVERLAY = "overlay.html"
 MOST_SIGNALS = 16  # figures on a page
-DONE = 0
 
+GROUP = "Compare"
+HELP = "report of results, or of several laid over each other"
 PARSER = {
     "description": (
         "Make the report of a results folder again, or lay several results over each other on one page: the first "
@@ -44,12 +46,8 @@ ARGUMENTS = (
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Read, draw and write; nothing in the results is changed.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Read, draw and write; nothing in the results is changed."""
     paths = [Path(text) for text in options.results]
     labels = _labels(options.labels, paths)
     results = [load_result(path) for path in paths]
@@ -60,8 +58,7 @@ def execute(options: argparse.Namespace) -> int:
     page = (
         _one(options, paths[0], results[0], specs[0]) if len(paths) == 1 else _several(options, results, specs, labels)
     )
-    print(f"report: {page}")
-    return DONE
+    return Output(data={}, files={"report": page})
 
 
 def _one(options: argparse.Namespace, path: Path, result: Result, spec: ReportSpec) -> Path:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from cosim.cli.arguments import QUIET, settings_argument
-from cosim.cli.output import ignore, print_json, print_notice, print_paths, print_warning
+from cosim.cli.output import ignore, print_notice, print_warning
 from cosim.cli.scenarios import parse_setting, simulated_time_bar
 from cosim.provenance import rerun
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 
 EQUAL, DIFFERS, ERROR = 0, 1, 2
 DESCRIPTION = (
@@ -30,6 +30,8 @@ def _share(text: str) -> float:
     return value
 
 
+GROUP = "Run"
+HELP = "run results again and compare"
 PARSER = {"description": DESCRIPTION}
 ARGUMENTS = (
     argument("directory", metavar="DIR", help="a results folder"),
@@ -42,17 +44,12 @@ ARGUMENTS = (
         help="how far a signal may differ, as a share of its range (default: 1e-4)",
     ),
     argument("--trust", action="store_true", help="go on where files of the folder were edited since"),
-    argument("--json", action="store_true", help="print the comparison as JSON"),
     QUIET,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Run, compare, print.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Run again and compare."""
     settings = dict(parse_setting(setting) for setting in options.settings)
     bar = simulated_time_bar(silent=options.quiet or options.json)
     out = None if options.out is None else Path(options.out).absolute()
@@ -69,12 +66,11 @@ def execute(options: argparse.Namespace) -> int:
         )
     finally:
         bar.close()
-    if options.json:
-        print_json(again.to_dict())
-    else:
-        print(again.text())
-        print_paths(again.paths)
-    if again.outcome.failure is not None and again.outcome.failure != again.stored_failure:
-        print(f"cosim: the new run ended early: {again.outcome.failure}", file=sys.stderr)
-        return ERROR
-    return EQUAL if again.equal else DIFFERS
+    failed = again.outcome.failure is not None and again.outcome.failure != again.stored_failure
+    return Output(
+        [again.text()],
+        again.to_dict(),
+        again.paths,
+        ERROR if failed else EQUAL if again.equal else DIFFERS,
+        [f"the new run ended early: {again.outcome.failure}"] if failed else [],
+    )

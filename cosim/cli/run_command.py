@@ -8,12 +8,13 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cosim import studies
 from cosim.cli.arguments import MANY_RUNS, QUIET, positive, scenario_arguments
-from cosim.cli.output import ignore, print_json, print_notice, print_paths, print_warning, texts_of
+from cosim.cli.output import ignore, print_notice, print_warning
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
 from cosim.evaluation.consistency import filter_consistency
@@ -29,13 +30,16 @@ from cosim.results.unfinished import SPARE
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from fmus.cli.commands import argument
-from fmus.plain import plain
+from fmus.cli.output import Output
+from fmus.tables.table import Table
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
 CALL_LOG = "calls.log"
 SEEDS = "seeds"
 """Folder of the sweep over seeds, among the results."""
 
+GROUP = "Run"
+HELP = "run a scenario"
 PARSER = {
     "description": "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP).",
     "epilog": (
@@ -61,7 +65,6 @@ ARGUMENTS = (
         help="also run the seeds 0 to N - 1, a sweep in the folder seeds, and report medians and quartiles",
     ),
     *MANY_RUNS,
-    argument("--json", action="store_true", help="print the summary as JSON instead of the table"),
     argument("--no-report", action="store_true", help="write result files only"),
     argument(
         "--strict", action="store_true", help="refuse an SSP of wrong form; exit with 1 when the run gave warnings"
@@ -82,18 +85,19 @@ ARGUMENTS = (
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Run and write; everything computed is written also when the run fails.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Run and write; everything computed is written also when the run fails."""
     scenario = load_scenario(options)
     directory = (Path(options.out) if options.out is not None else Path("results") / scenario.name).absolute()
     check_writable(directory, scenario.table().report.tables)
     call_log = _call_log(options, scenario, directory)
     results = _Results(directory, options)
-    _run(scenario, options, results, call_log)
+    try:
+        _run(scenario, options, results, call_log)
+    except OutputError as error:  # what the disk did not take is at least on the screen
+        if results.outcome is None:
+            raise
+        return replace(_output(results.outcome, None, {}, options), error=error)
     assert results.outcome is not None
     outcome, paths = results.outcome, results.paths
     study = None
@@ -101,12 +105,7 @@ def execute(options: argparse.Namespace) -> int:
         study = _study(scenario, options, directory / SEEDS)
         outcome = outcome.with_summary(seed_study=study.to_data())
         paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / SEEDS / "index.csv"}
-    _print(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
-    if outcome.failure is not None:
-        return ERROR
-    if study is not None and study.failures:
-        return NOT_AS_ASKED
-    return NOT_AS_ASKED if outcome.unmet or (options.strict and outcome.warnings) else DONE
+    return _output(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
 
 
 class _Results:
@@ -126,7 +125,7 @@ class _Results:
 
 
 def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, call_log: Path | None) -> None:
-    """Run; what the disk did not take is at least on the screen."""
+    """Run, with a bar."""
     directory = results.directory
     bar = simulated_time_bar(silent=options.quiet or options.json)
     try:
@@ -140,10 +139,6 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
                 spare=spare,
                 finished=results.write,
             )
-    except OutputError:
-        if results.outcome is not None:
-            _print(results.outcome, None, {}, options)
-        raise
     finally:
         bar.close()
 
@@ -193,39 +188,35 @@ def _study(scenario: Scenario, options: argparse.Namespace, directory: Path) -> 
     )
 
 
-def _print(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:
-    summary = outcome.result.summary
-    if options.json:
-        print_json(dict(summary) | {"failure": outcome.failure, "files": texts_of(paths)})
-        return
-    if outcome.failure is not None and summary["reached"] <= summary["start"]:
-        print(f"cosim: the run could not begin: {plain(outcome.failure)}", file=sys.stderr)
-        print_paths(paths)  # figures of a run that did not take a step would hide why
-        return
-    print(_headline(summary))
-    if outcome.result.table.size:
-        _print_tables(outcome)
-    print(cost_table(outcome.result).text(), end="\n\n")
-    if study is not None:
-        print(study.text())
-    if outcome.expectations:
-        print(outcome.expectations_text(), end="\n\n")
-    print_paths(paths)
-    if outcome.failure is not None:
-        print(f"cosim: the run ended early: {plain(outcome.failure)}", file=sys.stderr)
+def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> Output:
+    """What was found, and the exit code that follows from it."""
+    summary, failure = outcome.result.summary, outcome.failure
+    data = dict(summary) | {"failure": failure}
+    if failure is not None and summary["reached"] <= summary["start"]:
+        # figures of a run that did not take a step would hide why
+        return Output([], data, paths, ERROR, [f"the run could not begin: {failure}"])
+    failed_seeds = study is not None and study.failures
+    unmet = outcome.unmet or failed_seeds or (options.strict and outcome.warnings)
+    code = ERROR if failure is not None else NOT_AS_ASKED if unmet else DONE
+    parts = [
+        _headline(summary),
+        *(_tables(outcome) if outcome.result.table.size else []),
+        cost_table(outcome.result),
+        "" if study is None else study.text(),
+        outcome.expectations_text(),
+    ]
+    return Output(parts, data, paths, code, [] if failure is None else [f"the run ended early: {failure}"])
 
 
-def _print_tables(outcome: Outcome) -> None:
+def _tables(outcome: Outcome) -> list[Table]:
     """Errors, detected faults and consistency of filters, as far as there are any."""
-    metrics = [m for m in phase_metrics(outcome.result, outcome.spec) if m.speed or m.position]
-    if metrics:
-        print(error_table(metrics, outcome.spec).text())
-    for table in (
-        fault_table(fault_detection(outcome.result, outcome.spec), outcome.spec),
-        consistency_table(filter_consistency(outcome.result, outcome.spec), outcome.spec),
-    ):
-        if table:
-            print("\n" + table.text())
+    result, spec = outcome.result, outcome.spec
+    metrics = [m for m in phase_metrics(result, spec) if m.speed or m.position]
+    return [
+        error_table(metrics, spec),
+        fault_table(fault_detection(result, spec), spec),
+        consistency_table(filter_consistency(result, spec), spec),
+    ]
 
 
 def _headline(summary: Any) -> str:

@@ -3,35 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import shutil
-import sys
 from pathlib import Path
 
-from cosim.cli.arguments import PLAIN_JSON, scenario_arguments
-from cosim.cli.output import print_json
+from cosim.cli.arguments import scenario_arguments
 from cosim.cli.scenarios import load_scenario
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 
+GROUP = "Run"
+HELP = "show components, connections, order and loops"
 PARSER = {"description": "Components, connections, order and loops, without a run."}
 ARGUMENTS = (
     *scenario_arguments(),
     argument("--picture", metavar="FILE", type=Path, help="also draw it, to a .png, .svg or .pdf file"),
-    PLAIN_JSON,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Print, and draw where asked.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """The structure, drawn where that is asked for."""
     structure = load_scenario(options).structure()
-    if options.json:
-        print_json(structure.to_dict())
-    else:
-        print(structure.text(shutil.get_terminal_size().columns if sys.stdout.isatty() else None))
-    if options.picture is not None:
-        path = structure.draw(options.picture)
-        print(f"\npicture: {path}", file=sys.stderr if options.json else sys.stdout)
-    return 0
+    files = {} if options.picture is None else {"picture": structure.draw(options.picture)}
+    return Output(structure.tables(), structure.to_dict(), files)

@@ -27,6 +27,8 @@ SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
 _VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
 a range, with --samples"""  # noqa: E501
 
+GROUP = "Study"
+HELP = "run a scenario with varied values"
 PARSER = {
     "description": (
         "Run a scenario once for each combination of some values. A run that fails does not stop the others."

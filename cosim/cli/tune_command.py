@@ -35,6 +35,8 @@ def _seeds(text: str) -> list[int]:
     return found
 
 
+GROUP = "Study"
+HELP = "search parameters for the smallest cost over several seeds"
 PARSER = {
     "description": (
         "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and judge "

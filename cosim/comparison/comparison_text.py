@@ -3,20 +3,49 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from math import isnan
+from collections.abc import Mapping
+from math import isnan, nan
+from typing import Any
 
 from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
 
-HEAD = ("signal", "unit", "max error", "at [s]", "allowed", "shift [s]", "outside", "verdict")
+
+def _number(value: float, digits: int = 3) -> str:
+    return "" if isnan(value) else f"{value:.{digits}g}"
+
+
+def _percent(value: float) -> str:
+    return "" if isnan(value) else f"{value:.3g} %"
+
+
+_COLUMNS = (
+    name_column("signal", "signal"),
+    text_column("unit", "unit"),
+    Column("max_error", "max error", "", "Of result minus reference", write=_number),
+    Column("max_error_at", "at", "s", "Where it is largest", write=lambda value: _number(value, 7)),
+    Column("allowed", "allowed", "", "There", write=_number),
+    Column("max_shift", "shift", "s", "Largest, of instants", write=lambda value: f"{value:.3g}" if value else ""),
+    Column("share_outside", "outside", "", "Share of the time outside the tolerance", factor=100.0, write=_percent),
+    text_column("verdict", "verdict"),
+)
+_POINT_COLUMNS = (
+    Column("time", "time", "s", write="{:.9g}".format),
+    Column("reference", "reference", write="{:.8g}".format),
+    Column("result", "result", write="{:.8g}".format),
+    Column("error", "error", write="{:+.4g}".format),
+)
 SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
-_LONGEST_NAME = 48
 FINDINGS_SHOWN, EVENTS_SHOWN, _FAILED_SHOWN = 4, 10, 40
 
 
 def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
-    """A comparison for people.
+    """A comparison for people; see `comparison_parts`."""
+    return joined(comparison_parts(comparison, verbose))
+
+
+def comparison_parts(comparison: Comparison, verbose: bool = False) -> Parts:
+    """A comparison for people: the verdict in a line first.
 
     Args:
         comparison: what was found.
@@ -25,19 +54,14 @@ def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
     shared = _shared(comparison)
     shown = _shown(comparison, verbose, shared)
     limit = len(shown) if verbose else _FAILED_SHOWN
-    lines = [_headline(comparison)]
-    if shown:
-        lines += ["", *_table(shown[:limit])]
-    if len(shown) > limit:
-        lines.append(f"... and {len(shown) - limit} more signals that differ")
-    for text, count in shared.items():
-        lines += ["", f"  all {count} signals: {text}"]
+    more = [f"... and {len(shown) - limit} more signals that differ"] if len(shown) > limit else []
+    parts: list[Table | str] = [_headline(comparison)]
+    parts.append(Table("signals", _COLUMNS, [_row(signal) for signal in shown[:limit]], notes=more))
+    parts += [f"  all {count} signals: {text}" for text, count in shared.items()]
     for signal in shown[:limit]:
-        lines += _details(signal, verbose, shared)
-    lines += _events(comparison, verbose)
-    if comparison.notes:
-        lines += ["", *(f"note: {note}" for note in comparison.notes)]
-    return "\n".join(lines)
+        parts += _details(signal, verbose, shared)
+    parts += _events(comparison, verbose)
+    return [*parts, "\n".join(f"note: {note}" for note in comparison.notes)]
 
 
 def _shown(comparison: Comparison, verbose: bool, shared: Mapping[str, int]) -> list[SignalComparison]:
@@ -88,20 +112,11 @@ def _events_text(what: str, events: EventComparison) -> str:
     return f"{events.matched} {what} match"
 
 
-def _table(signals: Sequence[SignalComparison]) -> list[str]:
-    return text_table([HEAD, *(_row(signal) for signal in signals)], left=(0, 1, 7), heading=True)
-
-
-def _row(signal: SignalComparison) -> tuple[str, ...]:
-    name = signal.name if len(signal.name) <= _LONGEST_NAME else f"...{signal.name[3 - _LONGEST_NAME :]}"
-    share = "" if isnan(signal.max_error) else f"{100.0 * signal.share_outside:.3g} %"
-    shift = f"{signal.max_shift:.3g}" if signal.max_shift else ""
-    numbers = [
-        _number(signal.max_error, "3"),
-        _number(signal.max_error_at, "7") if signal.max_error else "",
-        _number(signal.allowed, "3"),
-    ]
-    return (name, signal.unit or "1", *numbers, shift, share, _verdict(signal))
+def _row(signal: SignalComparison) -> list[Any]:
+    at = signal.max_error_at if signal.max_error else nan
+    share = nan if isnan(signal.max_error) else signal.share_outside
+    numbers = [signal.max_error, at, signal.allowed, signal.max_shift, share]
+    return [signal.name, signal.unit or "1", *numbers, _verdict(signal)]
 
 
 def _verdict(signal: SignalComparison) -> str:
@@ -110,35 +125,27 @@ def _verdict(signal: SignalComparison) -> str:
     return "differs: " + ", ".join(dict.fromkeys(finding.kind.replace("_", " ") for finding in signal.findings))
 
 
-def _number(value: float, digits: str) -> str:
-    return "" if isnan(value) else f"{value:.{digits}g}"
-
-
-def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int]) -> list[str]:
+def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int]) -> Parts:
     if signal.status == "missing":
         near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
-        return ["", f"  {signal.name}: missing in the result{near}"]
+        return [f"  {signal.name}: missing in the result{near}"]
     findings = _own(signal, shared)
-    if not findings:
-        return []
     limit = len(findings) if verbose else FINDINGS_SHOWN
-    lines = ["", *(f"  {finding.text}" for finding in findings[:limit])]
+    lines = [f"  {finding.text}" for finding in findings[:limit]]
     if len(findings) > limit:
         lines.append(f"  {signal.name}: ... and {len(findings) - limit} more findings")
-    if any(finding.kind == "value" for finding in findings):
-        points = [[f"{t:.9g}", f"{a:.8g}", f"{b:.8g}", f"{e:+.4g}"] for t, a, b, e in signal.worst]
-        table = text_table([["time [s]", "reference", "result", "error"], *points], left=())
-        lines += ["    worst points:", *(f"      {line}" for line in table)]
-    return lines
+    points = signal.worst if any(finding.kind == "value" for finding in findings) else ()
+    title = f"worst points of {signal.name}"
+    return ["\n".join(lines), Table(title, _POINT_COLUMNS, points, title=f"  {title}:")]
 
 
 def _events(comparison: Comparison, verbose: bool) -> list[str]:
-    lines: list[str] = []
+    parts = []
     for what, events in (("telegrams", comparison.events), ("packets", comparison.packets)):
         differences = events.differences
         limit = len(differences) if verbose else EVENTS_SHOWN
-        if differences:
-            lines += ["", f"{what}:", *(f"  {difference.text}" for difference in differences[:limit])]
+        lines = [f"{what}:", *(f"  {difference.text}" for difference in differences[:limit])]
         if len(differences) > limit:
             lines.append(f"  ... and {len(differences) - limit} more")
-    return lines
+        parts += ["\n".join(lines)] if differences else []
+    return parts

@@ -19,10 +19,11 @@ from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import Mode, unobservable_modes
 from fmus.tables.numbers import number
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
 
 Array = NDArray[np.float64]
 Method = Literal["exact Jacobians", "directional derivatives", "central differences"]
+_POLE_COLUMNS = (name_column("eigenvalue", "eigenvalue"), Column("time_constant", "time constant"))
 RANK_TOLERANCE = 1e-7
 """For modes that are not seen or not reached, relative: differences lose half of the digits."""
 
@@ -134,48 +135,52 @@ class Linearisation:
         return path
 
     def text(self) -> str:
+        """The linearisation for people; see `parts`."""
+        return joined(self.parts())
+
+    def parts(self) -> Parts:
         """The linearisation for people: the point, the matrices, eigenvalues with time constants, and modes that are
         not seen or not reached.
         """
         kind = f"from one step of {number(self.step)} s to the next" if self.step else "in continuous time"
-        lines = [f"{self.name} at t = {number(self.t, 6)} s, {kind}, by {self.method}", ""]
-        lines += text_table(self._point(), left=(0, 1, 3), heading=True)
-        for key, rows, columns in (
-            ("A", self.states, self.states),
-            ("B", self.states, self.inputs),
-            ("C", self.outputs, self.states),
-            ("D", self.outputs, self.inputs),
-        ):
-            if rows and columns:
-                cells = [
-                    [name, *(number(float(v), 5) for v in row)] for name, row in zip(rows, self._m(key), strict=True)
-                ]
-                lines += ["", *text_table([[key, *columns], *cells], heading=True)]
-        lines += [
-            "",
-            *text_table([["eigenvalue", "time constant"], *map(self._pole, self.eigenvalues)], heading=True),
-            "",
+        modes = [
+            *self._sentence("no output shows", self.unobservable(), "Observable"),
+            *self._sentence("no input reaches", self.uncontrollable(), "Controllable"),
         ]
-        lines += self._sentence("no output shows", self.unobservable(), "Observable")
-        lines += self._sentence("no input reaches", self.uncontrollable(), "Controllable")
-        return "\n".join([*lines, *(f"- {remark}" for remark in self.remarks)])
+        return [
+            f"{self.name} at t = {number(self.t, 6)} s, {kind}, by {self.method}",
+            self._point(),
+            *self._matrices(),
+            Table("poles", _POLE_COLUMNS, [self._pole(value) for value in self.eigenvalues]),
+            "\n".join([*modes, *(f"- {remark}" for remark in self.remarks)]),
+        ]
 
-    def _m(self, key: str) -> Array:
-        found: Array = getattr(self, key)
-        return found
+    def _matrices(self) -> list[Table]:
+        """Those that have rows and columns, with the names of these."""
+        shapes = {"A": (self.states, self.states), "B": (self.states, self.inputs)}
+        shapes |= {"C": (self.outputs, self.states), "D": (self.outputs, self.inputs)}
+        return [
+            Table(
+                f"matrix {key}",
+                [name_column("name", key), *(Column(name, name, digits=5) for name in columns)],
+                [[name, *map(float, row)] for name, row in zip(rows, getattr(self, key), strict=True)],
+            )
+            for key, (rows, columns) in shapes.items()
+            if rows and columns
+        ]
 
-    def _point(self) -> list[list[str]]:
-        after = "a step later" if self.step else "rate"
-        rows = [["point", "name", "value", "unit", after]]
-        for what, names, values in (
-            ("state", self.states, self.x),
-            ("input", self.inputs, self.u),
-            ("output", self.outputs, self.y),
-        ):
-            for i, name in enumerate(names):
-                rate = number(float(self.rates[i]), 5) if what == "state" else ""
-                rows.append([what, name, number(float(values[i]), 6), self.units.get(name, "1"), rate])
-        return rows
+    def _point(self) -> Table:
+        """States with their rates, inputs and outputs."""
+        after = Column("rate", "a step later" if self.step else "rate", write=_or_nothing)
+        columns = [name_column("point", "point"), name_column("name", "name"), Column("value", "value", digits=6)]
+        points = (("state", self.states, self.x), ("input", self.inputs, self.u), ("output", self.outputs, self.y))
+        rates = {("state", name): float(rate) for name, rate in zip(self.states, self.rates, strict=True)}
+        rows = [
+            [what, name, float(value), self.units.get(name, "1"), rates.get((what, name))]
+            for what, names, values in points
+            for name, value in zip(names, values, strict=True)
+        ]
+        return Table("point", [*columns, text_column("unit", "unit"), after], rows)
 
     def _pole(self, value: complex) -> list[str]:
         """Eigenvalue and time constant as text."""
@@ -194,6 +199,10 @@ class Linearisation:
         if not modes:
             return [f"{otherwise}: every mode is."]
         return [f"{len(modes)} of {len(self.states)} modes {what}:", *(f"- {mode.explain()}" for mode in modes)]
+
+
+def _or_nothing(rate: float | None) -> str:
+    return "" if rate is None else number(rate, 5)
 
 
 def _places(found: Linearisation, what: str, names: Sequence[str] | None) -> list[int]:

@@ -87,7 +87,6 @@ class Rerun:
             "changes": list(self.changes),
             "failure": self.outcome.failure,
             "comparison": self.comparison.to_dict(),
-            "files": {kind: str(path) for kind, path in self.paths.items()},
         }
 
 

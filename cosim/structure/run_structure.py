@@ -1,6 +1,6 @@
 """The structure of a run, with its text and its picture.
 
-Made by `cosim.structure.inspect`, printed by `structure_text`, drawn by `structure_picture`.
+Made by `cosim.structure.inspect`, described by `structure_text`, drawn by `structure_picture`.
 """
 
 from __future__ import annotations
@@ -8,19 +8,24 @@ from __future__ import annotations
 from pathlib import Path
 
 from cosim.structure.structure_data import StructureData
-from cosim.structure.structure_text import structure_text
+from cosim.structure.structure_text import structure_parts
+from fmus.tables.table import Parts, joined
 
 
 class Structure(StructureData):
     """How the components of a run hang together, known before it; arguments as for `StructureData`."""
 
+    def tables(self) -> Parts:
+        """The structure as tables and lists."""
+        return structure_parts(self)
+
     def text(self, width: int | None = None) -> str:
-        """The structure as tables for a terminal.
+        """The same as text.
 
         Args:
-            width: columns at which long lists are broken; None for no limit.
+            width: of the terminal; None for lines as long as they are.
         """
-        return structure_text(self, width)
+        return joined(self.tables(), width)
 
     def draw(self, path: str | Path) -> Path:
         """Draw the structure to a file; its ending decides the format (``png``, ``svg``, ``pdf``).

@@ -1,12 +1,11 @@
-"""The structure of a run as tables for a terminal. Standard library only."""
+"""The structure of a run as tables. Standard library only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
-from fmus.text_table import text_table
+from fmus.tables.table import Parts, Table, name_column, pairs_table, text_column
 
 if TYPE_CHECKING:
     from cosim.structure.structure_data import Link, Part, Port, StructureData
@@ -14,28 +13,30 @@ if TYPE_CHECKING:
 DASH = "-"
 
 
-def structure_text(structure: StructureData, width: int | None = None) -> str:
-    """Components, signals, connections, groups, loops, balises, algorithm, warnings; ends without a line break.
+def structure_parts(structure: StructureData) -> Parts:
+    """Components, signals, connections, groups, loops, balises, algorithm, warnings.
 
     Args:
-        structure: what to tell. width: columns at which long lists are broken; None for no limit.
+        structure: what is described.
     """
-    sections = [
+    algorithm = f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm
+    return [
         _heading(structure),
-        _section("Components, in execution order", _components(structure)),
-        _section("Inputs and outputs", _ports(structure)),
-        _section("Connections", _connections(structure)),
+        _components(structure),
+        _ports(structure),
+        _connections(structure) if structure.links or structure.clocks else "Connections\n  none",
         _section("Groups", _groups(structure)),
         _section("Algebraic loops", _loops(structure)),
-        _section("Movement over a step, outermost stage first", _chains(structure)),
-        _section("Balises", _balises(structure)),
-        _section("Network", _network(structure)),
-        _section(
-            "Algorithm", [f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm]
+        pairs_table(
+            "chains",
+            {part.name: " > ".join(part.chain) for part in structure.parts if part.chain},
+            "Movement over a step, outermost stage first",
         ),
+        pairs_table("balises", _balises(structure), "Balises"),
+        pairs_table("network", _network(structure), "Network"),
+        _section("Algorithm", [algorithm]),
         _section("Warnings", structure.warnings),
     ]
-    return "\n\n".join(_broken(section, width) for section in sections if section)
 
 
 def _section(title: str, lines: Sequence[str]) -> str:
@@ -51,31 +52,36 @@ def _heading(structure: StructureData) -> str:
     )
 
 
-def _components(structure: StructureData) -> list[str]:
+_PART_COLUMNS = (
+    name_column("number", "#", "Place in the order of execution"),
+    name_column("name", "name"),
+    *(text_column(key, key) for key in ("kind", "FMI", "model")),
+    text_column("inputs", "inputs", "How many are connected, of all"),
+    text_column("outputs", "outputs", "How many are connected, of all"),
+    text_column("steps", "steps", "Own steps in a communication step"),
+    text_column("declares", "declares"),
+)
+
+
+def _components(structure: StructureData) -> Table:
     rates = any(part.rate for part in structure.parts)
-    headings = ["#", "name", "kind", "FMI", "model", "inputs", "outputs", *(["steps"] if rates else []), "declares"]
     rows = [
         [
-            str(number),
-            part.name,
-            part.kind,
-            part.fmi_version,
-            part.model,
-            _used(part.inputs),
-            _used(part.outputs),
-            *([part.rate or "1"] if rates else []),
-            ", ".join(part.abilities) or DASH,
+            *(str(number), part.name, part.kind, part.fmi_version, part.model),
+            *(_used(part.inputs), _used(part.outputs)),
+            *((part.rate or "1") if rates else None, ", ".join(part.abilities) or DASH),
         ]
         for number, part in enumerate(structure.parts, start=1)
     ]
-    return [*text_table([headings, *rows], left=range(1, len(headings))), "", "inputs, outputs: connected of all"]
+    notes = ["", "inputs, outputs: connected of all"]
+    return Table("parts", _PART_COLUMNS, rows, "Components, in execution order", notes).filled()
 
 
 def _used(ports: Sequence[Port]) -> str:
     return f"{sum(port.connected for port in ports)} of {len(ports)}" if ports else DASH
 
 
-def _ports(structure: StructureData) -> list[str]:
+def _ports(structure: StructureData) -> Table:
     every = [*structure.links, *structure.clocks]
     into = {link.target: link for link in every}
     out_of: dict[tuple[str, str], list[Link]] = {}
@@ -93,7 +99,8 @@ def _ports(structure: StructureData) -> list[str]:
             rows.append(
                 [f"{part.name}.{port.name}", "output", port.unit or DASH, port.kind, _to(targets) + _direct(port)]
             )
-    return text_table([["signal", "causality", "unit", "type", ""], *rows], left=range(5))
+    columns = [name_column("signal", "signal"), *(text_column(key, key) for key in ("causality", "unit", "type"))]
+    return Table("signals", [*columns, text_column("course")], rows, "Inputs and outputs")
 
 
 def _is_end(end: tuple[str, str], part: Part, port: Port) -> bool:
@@ -116,16 +123,13 @@ def _direct(port: Port) -> str:
     return f"; direct from {', '.join(port.depends_on)}" if port.depends_on else ""
 
 
-def _connections(structure: StructureData) -> list[str]:
-    rows = [
-        [".".join(link.source), f"-> {'.'.join(link.target)}", when(link), _conversion(link)]
-        for link in structure.links
-    ]
-    rows += [
-        [".".join(link.source), f"-> {'.'.join(link.target)}", "clock, ticks at its own instant", ""]
-        for link in structure.clocks
-    ]
-    return text_table([["source", "   target", "value used", "conversion"], *rows], left=range(4)) if rows else ["none"]
+def _connections(structure: StructureData) -> Table:
+    links = [(link, when(link), _conversion(link)) for link in structure.links]
+    links += [(link, "clock, ticks at its own instant", "") for link in structure.clocks]
+    rows = [[".".join(k.source), f"-> {'.'.join(k.target)}", value, conversion] for k, value, conversion in links]
+    columns = [name_column("source", "source"), name_column("target", "   target")]
+    columns += [text_column("value", "value used"), text_column("conversion", "conversion")]
+    return Table("links", columns, rows, "Connections")
 
 
 def when(link: Link) -> str:
@@ -170,50 +174,25 @@ def _loops(structure: StructureData) -> list[str]:
     return [" -> ".join(".".join(node) for node in loop) for loop in structure.loops] or ["none"]
 
 
-def _chains(structure: StructureData) -> list[str]:
-    rows = [[part.name, " > ".join(part.chain)] for part in structure.parts if part.chain]
-    return text_table(rows, (0, 1)) if rows else []
-
-
-def _balises(structure: StructureData) -> list[str]:
+def _balises(structure: StructureData) -> dict[str, str]:
     balises = structure.balises
     if balises is None:
-        return []
+        return {}
     how = "chosen by a probe of the plant when the run is set up" if balises.method == "auto" else "asked for"
-    rows = [
-        ["monitored plant", f"{balises.plant} ({balises.position}, {balises.speed})" if balises.position else "none"],
-        ["notified", ", ".join(balises.receivers) or "nobody"],
-        ["localisation", f"{balises.method}, {how}"],
-        ["timing", balises.timing],
-    ]
-    rows += [["odometer reading", balises.odometer]] if balises.odometer else []
-    return text_table(rows, left=(0, 1))
+    return {
+        "monitored plant": f"{balises.plant} ({balises.position}, {balises.speed})" if balises.position else "none",
+        "notified": ", ".join(balises.receivers) or "nobody",
+        "localisation": f"{balises.method}, {how}",
+        "timing": balises.timing,
+    } | ({"odometer reading": balises.odometer} if balises.odometer else {})
 
 
-def _network(structure: StructureData) -> list[str]:
+def _network(structure: StructureData) -> dict[str, str]:
     network = structure.network
     if network is None:
-        return []
-    rows = [[f"node {name}", ", ".join(signals)] for name, signals in network.nodes.items()]
-    rows += [
-        ["protocol", f"{network.protocol}, a transmission every {network.period:g} s, delay {network.delay}"],
-        ["notified", ", ".join(network.told) or "nobody"],
-        ["last value held", ", ".join(network.held) or "nowhere"],
-    ]
-    return text_table(rows, left=(0, 1))
-
-
-def _broken(section: str, width: int | None) -> str:
-    if width is None:
-        return section
-    lines: list[str] = []
-    for line in section.split("\n"):
-        lines += [line] if len(line) <= width else _wrapped(line, width)
-    return "\n".join(lines)
-
-
-def _wrapped(line: str, width: int) -> list[str]:
-    indent = " " * (len(line) - len(line.lstrip()) + 4)
-    return TextWrapper(
-        width, subsequent_indent=indent, replace_whitespace=False, break_long_words=False, break_on_hyphens=False
-    ).wrap(line)
+        return {}
+    return {f"node {name}": ", ".join(signals) for name, signals in network.nodes.items()} | {
+        "protocol": f"{network.protocol}, a transmission every {network.period:g} s, delay {network.delay}",
+        "notified": ", ".join(network.told) or "nobody",
+        "last value held": ", ".join(network.held) or "nowhere",
+    }

@@ -7,19 +7,21 @@ from typing import Any
 from fmus.check.findings import Verdict
 from fmus.check.run import CheckReport
 from fmus.fmi.archive import INTERFACES
-from fmus.plain import plain
+from fmus.tables.table import Parts, Table, name_column, text_column
 
 _BULLET = "  - "
 
 
-def table(report: CheckReport) -> str:
-    """The report for people: what was checked, one line a finding, the verdict with its limits, what to trust."""
-    width = max(len(finding.check) for finding in report.findings)
-    lines = [_heading(report), ""]
-    lines += [f"{f.check:{width}}  {f.verdict:8}  {f.detail}".rstrip() for f in report.findings]
-    lines += ["", f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"]
-    lines += [f"{_BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
-    return plain("\n".join([*lines, "", "What to trust:", *(f"{_BULLET}{sentence}" for sentence in report.trust)]))
+_COLUMNS = (name_column("check"), name_column("verdict"), text_column("detail"))
+
+
+def check_parts(report: CheckReport) -> Parts:
+    """The report for people: what was checked, one row a finding, the verdict with its limits, what to trust."""
+    rows = [[finding.check, str(finding.verdict), finding.detail] for finding in report.findings]
+    verdict = [f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"]
+    verdict += [f"{_BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
+    trust = ["What to trust:", *(f"{_BULLET}{sentence}" for sentence in report.trust)]
+    return [_heading(report), Table("findings", _COLUMNS, rows), "\n".join(verdict), "\n".join(trust)]
 
 
 def as_data(report: CheckReport) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import ast
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -15,6 +15,8 @@ from fmu_observer import OBSERVERS
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from fmus.build import build_fmu, fmu_path
 from fmus.cli.commands import argument
+from fmus.cli.failures import EXPECTED
+from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.fmu_report import platforms_of
 from fmus.hosted import build_hosted_fmu
@@ -44,6 +46,8 @@ class _BuildJob:
     target: Path
 
 
+GROUP = "Models"
+HELP = "export models as native FMUs"
 PARSER = {"epilog": EPILOG, "formatter_class": argparse.RawDescriptionHelpFormatter}
 ARGUMENTS = (
     argument("names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName"),
@@ -77,26 +81,33 @@ ARGUMENTS = (
 )
 
 
-def execute(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace) -> Output:
     """Build what was asked for; the paths go to standard output, everything else to standard error.
 
-    Args:
-        options: of the command line.
-
     Raises:
-        ValueError, LookupError, OSError, RuntimeError, TypeError: a mistake of the user, or a build that failed.
+        ValueError, LookupError, OSError, RuntimeError, TypeError: a mistake of the user.
     """
     if options.hosted:
-        return _run_hosted(options)
+        return _all_built(lambda: _hosted(options))
     jobs, protocol = _jobs(options), EventProtocol(options.events, options.late_policy)
     for job in jobs:
         protocol.counts(job.fmi_version)  # refuses clocks in FMI 2 before anything is built
         check_target(fmu_path(job.system, job.target))
-    _build(jobs, protocol, options)
-    return 0
+    return _all_built(lambda: _native(jobs, protocol, options))
 
 
-def _build(jobs: Sequence[_BuildJob], protocol: EventProtocol, options: argparse.Namespace) -> None:
+def _all_built(build: Callable[[], Iterator[Path]]) -> Output:
+    """The paths of what was built, also where a later one could not be."""
+    paths: list[Path] = []
+    failure: BaseException | None = None
+    try:
+        paths.extend(build())
+    except (*EXPECTED, KeyboardInterrupt) as error:
+        failure = error
+    return Output(["\n".join(map(str, paths))], {"built": paths}, error=failure)
+
+
+def _native(jobs: Sequence[_BuildJob], protocol: EventProtocol, options: argparse.Namespace) -> Iterator[Path]:
     """Build one after the other, with a bar over the libraries of all."""
     libraries = len(choose_targets(options.platform)) * len(jobs)
     number = count(1)
@@ -110,10 +121,10 @@ def _build(jobs: Sequence[_BuildJob], protocol: EventProtocol, options: argparse
             path = build_fmu(job.system, job.target, job.fmi_version, options.preset, **settings)
             bar.clear()
             print(_summary(job, path), file=sys.stderr, flush=True)
-            print(path, flush=True)
+            yield path
 
 
-def _run_hosted(options: argparse.Namespace) -> int:
+def _hosted(options: argparse.Namespace) -> Iterator[Path]:
     """FMUs with Python inside, see `fmus.hosted`; a file of the user's goes into them."""
     if options.platform != "host":
         raise ValueError("--hosted builds for this machine only; leave --platform out.")
@@ -125,11 +136,9 @@ def _run_hosted(options: argparse.Namespace) -> int:
             path = build_hosted_fmu(place, options.output, options=chosen, preset=options.preset)
         else:
             path = build_hosted_fmu(model, options.output, preset=options.preset)
-        print(
-            f"{model.name}: FMI 2.0, {path.stat().st_size / 1000:.0f} kB, runs in Python", file=sys.stderr, flush=True
-        )
-        print(path, flush=True)
-    return 0
+        size = f"{path.stat().st_size / 1000:.0f} kB"
+        print(f"{model.name}: FMI 2.0, {size}, runs in Python", file=sys.stderr, flush=True)
+        yield path
 
 
 def _summary(job: _BuildJob, path: Path) -> str:

@@ -8,22 +8,24 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from fmus.check.findings import Class, Verdict
-from fmus.check.findings_table import as_data, table
+from fmus.check.findings_table import as_data, check_parts
 from fmus.check.run import CheckReport, check_count, check_fmu
 from fmus.cli.commands import argument, one_of
+from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
 
 CLEAN, PROBLEMS, _UNCHECKED = 0, 1, 2
 _TRUTH = {"true": 1.0, "false": 0.0}
 
+GROUP = "FMUs"
+HELP = "how far an FMU can be trusted: validity and behaviour"
 PARSER: dict[str, Any] = {}
 ARGUMENTS = (
     argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0"),
@@ -35,28 +37,24 @@ ARGUMENTS = (
         argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps"),
     ),
     argument("--strict", action="store_true", help="limits end with exit code 1 too"),
-    argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table"),
+    argument("-o", "--output", type=Path, metavar="FILE", help="also write the report as JSON to a file"),
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Check a file and print the report.
-
-    Args:
-        options: what the parser of `register` understood.
-
-    Returns:
-        The exit code.
+def execute(options: argparse.Namespace) -> Output:
+    """Check a file.
 
     Raises:
         ValueError, OSError: the file cannot be checked, or a mistake of the user; the program ends with 2 then.
     """
     report = _checked(options)
-    if options.json:
-        _write_json(options.json, as_data(report))
-    if options.json != "-":
-        print(table(report))
-    return _exit_code(report, options.strict)
+    data, failure = as_data(report), None
+    try:
+        if options.output is not None:
+            options.output.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:  # the report is shown all the same
+        failure = error
+    return Output(check_parts(report), data, code=_exit_code(report, options.strict), error=failure)
 
 
 def _exit_code(report: CheckReport, strict: bool) -> int:
@@ -93,10 +91,3 @@ def _starts(words: Sequence[str]) -> dict[str, float]:
         except ValueError:
             raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.") from None
     return starts
-
-
-def _write_json(target: str, data: dict[str, Any]) -> None:
-    if target == "-":  # a terminal, perhaps: pure ASCII has no control characters
-        sys.stdout.write(json.dumps(data, indent=2) + "\n")
-    else:
-        Path(target).write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,34 +1,46 @@
-"""The commands of a program: what its help says of them, and their files, of which only that of the command in use is
-loaded. A file declares its arguments as a table.
+"""The commands of a program: one file a command, ``<name>_command.py`` in the room of the program, which says all of
+it. Only the file of the command in use is loaded.
+
+Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `HELP`, one
+line, and where there are any `FORMER`, old spellings with what is typed now; then ``PARSER``, the keywords of its
+parser, ``ARGUMENTS``, what the parser takes, and a function ``execute`` unless it consists of `Actions`.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from importlib import import_module
+from itertools import groupby
+from pathlib import Path
 from typing import Any
 
+from fmus.cli.output import Output
+from fmus.tables.table import Table, name_column, text_column
+from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
 
-Execute = Callable[[argparse.Namespace], int]
-"""Runs a command with its options and returns the exit code."""
+Execute = Callable[[argparse.Namespace], Output]
+"""Runs a command with its options."""
+_ENDING = "_command.py"
 
 
 @dataclass(frozen=True)
 class Command:
-    """One command.
+    """One command, as its file declares it.
 
     Args:
-        name: as it is typed. module: its file, with ``PARSER``, the keywords of its parser, ``ARGUMENTS``, what its
-            parser takes, and a function ``execute`` unless it consists of `Actions`. help: one line for the list of
-            commands.
+        name: as it is typed. group: under which the help lists it. help: one line. former: what is typed now, by old
+            spellings.
     """
 
     name: str
-    module: str
+    group: str
     help: str
+    former: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -124,7 +136,7 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
     """Add the parser of a command.
 
     Args:
-        subparsers: of the program. name: of the command. module: its file, see `Command`.
+        subparsers: of the program. name: of the command. module: its file.
     """
     _fill(subparsers.add_parser(name, **module.PARSER), module.ARGUMENTS, getattr(module, "execute", None))
 
@@ -132,27 +144,94 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
 def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None) -> None:
     _add_arguments(parser, arguments)
     if execute is not None:
+        if "--json" not in parser.format_help():
+            parser.add_argument("--json", action="store_true", help="print the data as JSON instead of text")
         parser.set_defaults(execute=execute)
 
 
+def executed(options: argparse.Namespace, program: str) -> int:
+    """Run the command that was typed, and show what it reports.
+
+    Args:
+        options: of the command line. program: its name.
+
+    Returns:
+        The exit code.
+    """
+    output = options.execute(options)
+    if isinstance(output, int):
+        return output
+    return output.show(program, as_json=options.json)
+
+
+def find_commands(package: str) -> list[Command]:
+    """The commands of a program, by name, without loading them.
+
+    Args:
+        package: the room of their files.
+    """
+    files = sorted(_folder(package).glob(f"*{_ENDING}"))
+    return [_declared(file.name.removesuffix(_ENDING).replace("_", "-"), file) for file in files]
+
+
+def _folder(package: str) -> Path:
+    return Path(import_module(package).__path__[0])
+
+
+def _declared(name: str, file: Path) -> Command:
+    """What the file of a command declares of it."""
+    assigned = [s for s in ast.parse(file.read_text(encoding="utf-8")).body if isinstance(s, ast.Assign)]
+    literals = {ast.unparse(s.targets[0]): s.value for s in assigned}
+    found = {key: ast.literal_eval(literals[key]) for key in ("GROUP", "HELP", "FORMER") if key in literals}
+    return Command(name, found["GROUP"], found["HELP"], found.get("FORMER", {}))
+
+
 def make_parser(
-    program: str, description: str, commands: Sequence[Command], arguments: Sequence[str]
+    program: str, description: str, package: str, groups: Sequence[str], arguments: Sequence[str]
 ) -> argparse.ArgumentParser:
     """The parser of a program; of the commands, only the one that is used is loaded.
 
     Args:
-        program: its name. description: one line. commands: in the order of the help. arguments: words after the name.
+        program: its name. description: one line. package: the room of the commands' files.
+        groups: in the order of the help. arguments: words after the name.
     """
-    parser = argparse.ArgumentParser(prog=program, description=description)
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog=program, description=description, formatter_class=raw)
     parser.add_argument("--version", action=_Version, nargs=0, help="versions of the package and of what it runs on")
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    how = f"one of those below; '{program} COMMAND --help' says what it takes"
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help=how)
     used = next((word for word in arguments if not word.startswith("-")), None)
-    for command in commands:
-        if command.name == used:
-            add_command(subparsers, command.name, import_module(command.module))
-        else:
-            subparsers.add_parser(command.name, help=command.help)
+    module = f"{used}{_ENDING}".replace("-", "_")
+    if used is not None and used.replace("-", "").isalnum() and (_folder(package) / module).is_file():
+        add_command(subparsers, used, import_module(f"{package}.{module.removesuffix('.py')}"))
+        return parser
+    commands = find_commands(package)
+    if used is not None:
+        parser.error(_unknown(used, commands))
+    parser.epilog = "commands:\n\n" + _listed(commands, groups)
     return parser
+
+
+def _unknown(name: str, commands: Sequence[Command]) -> str:
+    """What a word is now that was a command, or what may be meant."""
+    former = {old: now for command in commands for old, now in command.former.items()}
+    if name in former:
+        return f"{name!r} has become: {former[name]}"
+    names = [command.name for command in commands]
+    near = get_close_matches(name, names, 1)
+    return f"no command {name!r}; " + (f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(names)}")
+
+
+def _listed(commands: Sequence[Command], groups: Sequence[str]) -> str:
+    """The commands with a line each, by groups."""
+    order = {group: i for i, group in enumerate(groups)}
+    ordered = sorted(commands, key=lambda command: (order.get(command.group, len(order)), command.group))
+    columns, width = [name_column("name"), text_column("help")], max(len(command.name) for command in commands)
+    tables = [
+        Table(group, columns, [(f"  {c.name:{width}}", c.help) for c in members], title=group)
+        for group, members in groupby(ordered, key=lambda command: command.group)
+    ]
+    return "\n\n".join(table.text(terminal_width()) for table in tables)
 
 
 class _Version(argparse.Action):

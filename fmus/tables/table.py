@@ -153,14 +153,28 @@ class Table:
         return "\n".join([*above, *lines, *(line for note in self.notes for line in paragraph(note, width))])
 
 
-def pairs_table(key: str, entries: Mapping[str, Any]) -> Table:
+Parts = Sequence[Table | str]
+"""What is to be read, in its order; a table without rows is left out."""
+
+
+def joined(parts: Parts, width: int | None = None) -> str:
+    """Tables and paragraphs as one text, a blank line between them; ends without a line break.
+
+    Args:
+        parts: in their order. width: of the terminal, see `Table.text`.
+    """
+    texts = [p.text(width) if isinstance(p, Table) else "\n".join(paragraph(p, width)) for p in parts]
+    return "\n\n".join(filter(None, texts))
+
+
+def pairs_table(key: str, entries: Mapping[str, Any], title: str = "") -> Table:
     """Names and what belongs to each, without headings.
 
     Args:
-        key: in data. entries: values by name; of a list all are shown.
+        key: in data. entries: values by name; of a list all are shown. title: above it.
     """
 
     def written(value: Any) -> str:
         return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
-    return Table(key, [name_column("name"), text_column("value", write=written)], list(entries.items()))
+    return Table(key, [name_column("name"), text_column("value", write=written)], list(entries.items()), title)

@@ -112,7 +112,7 @@ def test_where_equal_runs_differ_nothing_is_compared() -> None:
     assert [f.verdict for f in findings([differs, compared], context)] == [Verdict.LIMIT, Verdict.SKIPPED]
 
 
-@pytest.mark.parametrize("arguments", [[], ["--json", "-"]])
+@pytest.mark.parametrize("arguments", [[], ["--json"]])
 def test_escape_sequences_of_an_fmu_never_reach_the_terminal(
     arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,4 +1,4 @@
-"""``cosim convert``: from any format to any other, and what is said when that cannot be."""
+"""``cosim export``: from any format to any other, and what is said when that cannot be."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_chain_through_all_formats_keeps_everything(tmp_path: Path, capsys: pyte
     write_results(some_result(), tmp_path / "run", ("npy",))
     chain = ["run", "a.parquet", "b.csv", "c.h5", "d.mat", "e.modelica.mat", "f.hdf5", "g.pq"]
     for source, target in pairwise(chain):
-        assert main(["convert", str(tmp_path / source), str(tmp_path / target)]) == 0
+        assert main(["export", str(tmp_path / source), str(tmp_path / target)]) == 0
         assert str(tmp_path / target) in capsys.readouterr().out
     assert_same(some_result(), load_result(tmp_path / "g.pq"))
 
@@ -33,13 +33,13 @@ def test_chain_through_all_formats_keeps_everything(tmp_path: Path, capsys: pyte
 def test_chosen_signals_without_units(tmp_path: Path) -> None:
     some_result().save(tmp_path / "a.h5")
     target = tmp_path / "a.csv"
-    assert main(["convert", str(tmp_path / "a.h5"), str(target), "--signals", "train.*", "--no-units"]) == 0
+    assert main(["export", str(tmp_path / "a.h5"), str(target), "--signals", "train.*", "--no-units"]) == 0
     assert target.read_text().splitlines()[0] == '"time","train.speed","train.force"'
 
 
 def test_numpy_says_that_it_drops_the_units(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     some_result().save(tmp_path / "a.h5")
-    assert main(["convert", str(tmp_path / "a.h5"), str(tmp_path / "a.npy")]) == 0
+    assert main(["export", str(tmp_path / "a.h5"), str(tmp_path / "a.npy")]) == 0
     assert "keeps no units" in capsys.readouterr().out
 
 
@@ -58,7 +58,7 @@ def test_mistakes_are_told_in_a_line(
 ) -> None:
     some_result().save(tmp_path / "a.h5")
     before = (tmp_path / "a.h5").read_bytes()
-    assert main(["convert", str(tmp_path / source), str(tmp_path / target), *more]) == 2
+    assert main(["export", str(tmp_path / source), str(tmp_path / target), *more]) == 2
     told = capsys.readouterr().err
     assert told.startswith("cosim: ")
     assert message in told

@@ -1,4 +1,4 @@
-"""``cosim reference``: odometer and balises of a run become a trajectory whose errors are of the size it tells."""
+"""``cosim export --trajectory``: odometer and balises become a trajectory whose errors are of the size it states."""
 
 import json
 from pathlib import Path
@@ -50,15 +50,16 @@ def test_the_command_writes_what_a_scenario_plays_back(
     Path("log.csv").write_text("time,odometer [km/h]\n" + rows)
     told = "".join(f"{t:.9f},{p:.9f}\n" for t, p in zip(stamps, np.interp(stamps, time, position), strict=True))
     Path("telegrams.csv").write_text("stamp,position\n" + told)
-    words = ["reference", "log.csv", "--odometer", "odometer", "--telegrams", "telegrams.csv", "--odometer-std", "0.05"]
-    assert main(words) == 0
+    words = ["log.csv", "reference.csv", "--trajectory", "--odometer", "odometer", "--odometer-std", "0.05"]
+    words += ["--telegrams", "telegrams.csv"]
+    assert main(["export", *words]) == 0
     out = capsys.readouterr().out
     assert "19 left out" in out
     assert "expected 1" in out
     again = load_result("reference.csv")
     assert {s.name: s.unit for s in again.signals}["speed_std"] == "m/s"
     assert np.abs(again["position"] - np.interp(again.time, time, position)).max() < 1.0
-    assert main([*words, "--json", "--out", "other.csv"]) == 0
+    assert main(["export", *words, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["readings"] == len(time)
 
 
@@ -71,11 +72,11 @@ def test_what_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[s
         (["--odometer", "odometer"], "0 balises; a trajectory needs 3 and 1"),
         (["--odometer", "odometer", "--telegrams", str(tmp_path / "no.csv")], "holds no telegrams"),
     ):
-        assert main(["reference", log, *words]) == 2
+        assert main(["export", log, str(tmp_path / "out.csv"), "--trajectory", *words]) == 2
         assert text in capsys.readouterr().err
     (tmp_path / "telegrams.csv").write_text("stamp,position\n0.1,5.0\n")
-    words = ["reference", log, "--odometer", "odometer", "--telegrams", str(tmp_path / "telegrams.csv")]
-    assert main([*words, "--odometer-std", "0"]) == 2
+    words = ["export", log, str(tmp_path / "out.csv"), "--trajectory", "--odometer", "odometer"]
+    assert main([*words, "--telegrams", str(tmp_path / "telegrams.csv"), "--odometer-std", "0"]) == 2
     assert "odometer_std = 0; expected a positive number" in capsys.readouterr().err
 
 

@@ -1,4 +1,4 @@
-"""``cosim reference``: the trajectory behind a recording, smoothed from odometer and balises."""
+"""``cosim export --trajectory``: the trajectory behind a recording, smoothed from odometer and balises."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cosim.balises.recorded import read_layout
-from cosim.cli.output import print_json
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.evaluation.reference_trajectory import (
     GATE,
@@ -24,37 +23,32 @@ from cosim.evaluation.reference_trajectory import (
 from cosim.results.load_result import load_result
 from cosim.results.result import Result, SignalInfo
 from cosim.results.save import save_result
-from fmus.cli.commands import argument
+from fmus.cli.commands import ArgumentGroup, argument
+from fmus.cli.output import Output
 from fmus.tables.numbers import number
 
-DONE = 0
-BALISE = 0.5  # standard deviation of a balise's position where no accuracy was told [m]
-ACCURACY = 0.5  # of the told location accuracy, a bound, is taken for a standard deviation
+BALISE = 0.5  # standard deviation of a balise's position where no accuracy was stated [m]
+ACCURACY = 0.5  # of the stated location accuracy, a bound, is taken for a standard deviation
 
-PARSER = {
-    "description": (
-        "Smooth odometer and balises of a recorded run, forwards and backwards, into the trajectory that it was most "
-        "likely made on: position and speed with standard deviations, for a report that has no truth of its own."
+TRAJECTORY = ArgumentGroup(
+    (
+        argument("--trajectory", action="store_true", help="write it: position and speed with standard deviations"),
+        argument("--odometer", metavar="NAME", help="signal of the odometer (default: that of the report)"),
+        argument("--telegrams", metavar="FILE", help="results folder or events.csv (default: those of SOURCE)"),
+        argument("--odometer-std", type=float, default=0.1, metavar="M_S", help="noise of a reading [m/s]"),
+        argument("--balise-std", type=float, metavar="M", help="of a balise [m] (default: half its accuracy)"),
+        argument("--jerk-density", type=float, default=JERK, metavar="Q", help="of the train [m2/s5]"),
+        argument("--scale-std", type=float, default=SCALE, metavar="S", help="of the wheel radius, relative [1]"),
+        argument("--gate", type=float, default=GATE, help="standard deviations beyond which a reading is slip"),
+        argument("--slip", type=float, default=SLIP, metavar="M_S", help="the same as a speed [m/s]"),
     ),
-    "epilog": "Exit codes: 0 written, 2 error.",
-}
-ARGUMENTS = (
-    argument("source", metavar="SOURCE", help="results folder, or table of any tool"),
-    argument("--odometer", metavar="NAME", help="signal of the odometer (default: that of the report)"),
-    argument("--telegrams", metavar="FILE", help="results folder or events.csv (default: those of SOURCE)"),
-    argument("--odometer-std", type=float, default=0.1, metavar="M_S", help="noise of a reading [m/s]"),
-    argument("--balise-std", type=float, metavar="M", help="of a balise [m] (default: half its accuracy)"),
-    argument("--jerk-density", type=float, default=JERK, metavar="Q", help="of the train [m2/s5]"),
-    argument("--scale-std", type=float, default=SCALE, metavar="S", help="of the wheel radius, relative [1]"),
-    argument("--gate", type=float, default=GATE, help="standard deviations beyond which a reading is slip"),
-    argument("--slip", type=float, default=SLIP, metavar="M_S", help="the same as a speed [m/s]"),
-    argument("--out", type=Path, default=Path("reference.csv"), metavar="FILE", help="file to write"),
-    argument("--json", action="store_true", help="print the data as JSON instead of text"),
+    "the trajectory behind a recording",
+    "odometer and balises, smoothed forwards and backwards: for a report that has no truth of its own",
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Read, smooth, write, and say how well noises fit.
+def export_trajectory(options: argparse.Namespace) -> Output:
+    """Read, smooth, write, and report how well the noises fit.
 
     Args:
         options: of the command line.
@@ -62,17 +56,13 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         CosimError: there is no odometer or no balise, or the file cannot be written.
     """
-    result = load_result(options.source)
+    result = load_result(options.scenario)
     name = _odometer(result, options.odometer)
     found = _smoothed(options, result, name)
-    written = save_result(_as_result(found), options.out)
-    if options.json:
-        data = {"odometer": name, "file": str(options.out), "balises": found.balises, "readings": found.readings}
-        print_json(data | {"left_out": found.left_out, "consistency": asdict(found.found)})
-        return DONE
-    print(_reference_text(found, name))
-    print(f"written: {', '.join(map(str, written))}")
-    return DONE
+    written = save_result(_as_result(found), options.target)
+    data = {"odometer": name, "balises": found.balises, "readings": found.readings, "left_out": found.left_out}
+    text = f"{_reference_text(found, name)}\nwritten: {', '.join(map(str, written))}"
+    return Output([text], data | {"consistency": asdict(found.found), "file": str(options.target), "written": written})
 
 
 def _smoothed(options: argparse.Namespace, result: Result, name: str) -> ReferenceTrajectory:
@@ -93,7 +83,7 @@ def _smoothed(options: argparse.Namespace, result: Result, name: str) -> Referen
             slip=options.slip,
         )
     except ScenarioError as error:
-        raise CosimError(f"{options.source}, {name}: {error}") from error
+        raise CosimError(f"{options.scenario}, {name}: {error}") from error
 
 
 def _as_result(found: ReferenceTrajectory) -> Result:

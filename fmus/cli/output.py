@@ -1,0 +1,69 @@
+"""What a command reports, as a value, and the one place that shows it: as text, or as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fmus.plain import plain
+from fmus.tables.plain_data import jsonable
+from fmus.tables.table import Parts, Table, joined
+from fmus.tables.terminal import terminal_width
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a command reports.
+
+    Attributes:
+        parts: for people.
+        data: for programs. A mapping also gets each table of `parts` that it does not hold, under its key, and `files`;
+            None for the tables, and the texts of `parts` under ``text``.
+        files: what was written, by kind. code: exit code. failures: texts for standard error.
+        error: what ended the command although there is something to show; raised when that has been shown.
+    """
+
+    parts: Parts = ()
+    data: Any = None
+    files: Mapping[str, Path] = field(default_factory=dict)
+    code: int = 0
+    failures: Sequence[str] = ()
+    error: BaseException | None = None
+
+    def to_data(self) -> Any:
+        """All of it for programs, ready for JSON."""
+        data = {"text": [part for part in self.parts if isinstance(part, str)]} if self.data is None else self.data
+        if isinstance(data, Mapping):
+            data = {part.key: part.data() for part in self.parts if isinstance(part, Table)} | dict(data)
+            data |= {"files": self.files} if self.files else {}
+        return jsonable(data)
+
+    def text(self, width: int | None = None) -> str:
+        """All of it for people, a blank line between the parts.
+
+        Args:
+            width: of the terminal, which is not exceeded; None for lines as long as they are.
+        """
+        return joined([*self.parts, "\n".join(f"{kind:>10}: {path}" for kind, path in self.files.items())], width)
+
+    def show(self, program: str, *, as_json: bool) -> int:
+        """Print it; nothing but JSON goes to standard output where that was asked for.
+
+        Args:
+            program: its name, before failures. as_json: whether JSON was asked for.
+
+        Returns:
+            The exit code.
+        """
+        text = json.dumps(self.to_data(), indent=2, allow_nan=False) if as_json else plain(self.text(terminal_width()))
+        if text:
+            print(text)
+        for failure in self.failures:
+            print(f"{program}: {plain(failure)}", file=sys.stderr)
+        if self.error is not None:
+            raise self.error
+        return self.code
