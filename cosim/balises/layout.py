@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.errors import ScenarioError
-from cosim.results.events_file import require_accuracy
+from cosim.results.record_rows import require_accuracy
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,9 @@ from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import NO_OUTCOMES, Channel, Crossing
 from cosim.components.recording import RecordingComponent
 from cosim.errors import OutputError, ScenarioError
-from cosim.results.events_file import read_events, require_accuracy
 from cosim.results.formats.telegram_csv import holds_telegrams, read_telegrams
 from cosim.results.load_result import load_result
+from cosim.results.record_rows import TELEGRAM_ROWS, require_accuracy
 from cosim.results.result import BaliseRecord
 from cosim.results.results_folder import EVENTS
 from fmus.fmi.standard import TIME_TOLERANCE
@@ -163,7 +163,7 @@ def read_layout(path: Path) -> RecordedLayout:
 
 def _read(path: Path) -> Sequence[BaliseRecord]:
     if path.is_dir() and (path / EVENTS).is_file():
-        return read_events(path / EVENTS)
+        return TELEGRAM_ROWS.read(path / EVENTS)
     if path.name.endswith(EVENTS) and not path.is_file():
         raise OutputError("there is no such file.")
     if holds_telegrams(path):

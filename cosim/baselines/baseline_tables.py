@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.baselines.baseline import Header
 from cosim.errors import BaselineError
-from cosim.results.events_file import COLUMNS, record_from_row
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result import BaliseRecord
 from cosim.results.table_layout import table_dtype
 
@@ -77,13 +77,13 @@ def parse_events(text: str, header: Header, file: Path) -> list[BaliseRecord]:
     if not text:
         return []
     reader = csv.DictReader(io.StringIO(text))
-    missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
+    missing = [name for name in TELEGRAM_ROWS.columns if name not in (reader.fieldnames or ())]
     if missing:
         raise BaselineError(f"{file}: no column {missing[0]!r}. {_AGAIN}")
     events = []
     for row in reader:
         try:
-            events.append(record_from_row(row))
+            events.append(TELEGRAM_ROWS.record(row))
         except (KeyError, TypeError, ValueError) as error:
             raise BaselineError(f"{file}, line {reader.line_num}: {error}. {_AGAIN}") from error
     if len(events) != header.events:

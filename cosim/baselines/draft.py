@@ -25,7 +25,7 @@ from cosim.baselines.recipe import Recipe
 from cosim.comparison.telegram_comparison import TIMES, telegram_limits
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.errors import BaselineError
-from cosim.results.events_file import COLUMNS, record_row
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result import Result
 
 _EVENT_DIGITS = 12
@@ -169,9 +169,9 @@ def _events_text(result: Result, tolerance: Tolerance) -> str:
     room = {**dict.fromkeys(TIMES, allowed.time), **allowed.payload}
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(TELEGRAM_ROWS.columns)
     for record in result.events:
-        writer.writerow([_event_cell(value, room.get(name, inf)) for name, value in record_row(record).items()])
+        writer.writerow([_event_cell(value, room.get(name, inf)) for name, value in TELEGRAM_ROWS.row(record).items()])
     return lines.getvalue()
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from cosim.errors import OutputError, nearest
-from cosim.results.events_file import EVENTS_SUFFIX, read_events
 from cosim.results.formats.columns import check_time
 from cosim.results.formats.foreign_csv import read_foreign_csv
 from cosim.results.formats.foreign_mat import read_foreign_mat
-from cosim.results.formats.foreign_npy import read_foreign_npy
-from cosim.results.formats.known_formats import fastest_first, table_files
+from cosim.results.formats.known_formats import FORMATS, fastest_first, table_files
+from cosim.results.formats.npy_file import read_foreign_npy
+from cosim.results.record_rows import EVENTS_SUFFIX, TELEGRAM_ROWS
 from cosim.results.result import Result
 from cosim.results.result_data import ResultData
 from cosim.results.results_folder import SUMMARY, read_results
@@ -94,13 +94,9 @@ def _reader(path: Path) -> Callable[[Path], ResultData]:
     if start.startswith(b"\x93NUMPY"):
         return read_foreign_npy
     if start.startswith(b"PAR1"):
-        from cosim.results.formats.parquet_file import read_parquet  # noqa: PLC0415 - an optional package
-
-        return read_parquet
+        return FORMATS["parquet"].read
     if start.startswith((b"\x89HDF", b"MATLAB 7.3")):
-        from cosim.results.formats.hdf5_file import read_hdf5  # noqa: PLC0415 - an optional package
-
-        return read_hdf5
+        return FORMATS["hdf5"].read
     if start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
         return read_foreign_mat
     if start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
@@ -116,5 +112,5 @@ def _with_events(result: ResultData, source: Path) -> ResultData:
     recorded = bool(result.summary.get("events_recorded"))
     beside = source.with_name(source.with_suffix("").name + EVENTS_SUFFIX)
     if "events_recorded" not in result.summary and beside.is_file():
-        result, recorded = replace(result, events=read_events(beside)), True
+        result, recorded = replace(result, events=TELEGRAM_ROWS.read(beside)), True
     return replace(result, summary={**result.summary, "file": str(source), "events_recorded": recorded})

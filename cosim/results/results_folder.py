@@ -16,10 +16,9 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages, write_messages
 from cosim.errors import OutputError
-from cosim.results.events_file import read_events, write_events
 from cosim.results.formats.known_formats import FORMATS, check_formats, fastest_first, table_files, usual_file
 from cosim.results.optional import is_installed
-from cosim.results.packets_file import read_packets, write_packets
+from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import read_unfinished
@@ -81,12 +80,12 @@ def _reason(error: OSError) -> str:
 def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list[str]:
     for name in formats:
         FORMATS[name].write(folder / usual_file(name), result)
-    write_events(folder / EVENTS, result.events)
+    TELEGRAM_ROWS.write(folder / EVENTS, result.events)
     write_messages(folder / MESSAGES, result.messages)
     content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
     write_summary(folder / SUMMARY, content)
     if result.packets:
-        write_packets(folder / PACKETS, result.packets)
+        PACKET_ROWS.write(folder / PACKETS, result.packets)
     packets = [PACKETS] if result.packets else []
     return [*(usual_file(name) for name in dict.fromkeys(formats)), EVENTS, MESSAGES, *packets, SUMMARY]
 
@@ -145,8 +144,8 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapp
         return read_unfinished(rows, events, logged, sent, content), content
     table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
-    packets = read_packets(folder / PACKETS) if (folder / PACKETS).exists() else []
-    return ResultData(table, signals, read_events(folder / EVENTS), messages=messages, packets=packets), content
+    packets = PACKET_ROWS.read(folder / PACKETS) if (folder / PACKETS).exists() else []
+    return ResultData(table, signals, TELEGRAM_ROWS.read(folder / EVENTS), messages=messages, packets=packets), content
 
 
 def read_results(directory: str | Path, table: str | None = None) -> ResultData:

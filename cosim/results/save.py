@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.results.events_file import EVENTS_SUFFIX, write_events
 from cosim.results.formats.csv_file import write_csv
 from cosim.results.formats.format import Format
 from cosim.results.formats.headings import with_unit
 from cosim.results.formats.known_formats import check_formats, format_of
+from cosim.results.record_rows import EVENTS_SUFFIX, TELEGRAM_ROWS
 from cosim.results.result_data import ResultData
 
 
@@ -63,5 +63,5 @@ def _events_beside(result: ResultData, target: Path, wanted: type[Format]) -> li
     beside = target.with_name(target.with_suffix("").name + EVENTS_SUFFIX)
     if wanted.keeps or not (result.events or beside.exists()):
         return []
-    write_events(beside, result.events)
+    TELEGRAM_ROWS.write(beside, result.events)
     return [beside]

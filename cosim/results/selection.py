@@ -6,12 +6,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
-import numpy as np
-
 from cosim.errors import OutputError, nearest
 from cosim.results.result import Result
 from cosim.results.result_data import SignalInfo
-from cosim.results.table_layout import column_names, table_dtype
+from cosim.results.table_layout import column_names, table_of
 
 
 def selected(result: Result, patterns: Iterable[str]) -> Result:
@@ -32,8 +30,7 @@ def selected(result: Result, patterns: Iterable[str]) -> Result:
             raise OutputError(f"No signal {pattern!r} in the result; {nearest(pattern, names)}")
         wanted |= found
     kept = [name for name in names if name in wanted]
-    table = np.empty(len(result.table), table_dtype(["time", *kept]))
-    for name in ("time", *kept):
-        table[name] = result.table[name]
+    columns = ["time", *kept]
+    table = table_of(columns, [result.table[name] for name in columns])
     known = {signal.name: signal for signal in result.signals}
     return replace(result, table=table, signals=[known.get(name, SignalInfo(name)) for name in kept])

@@ -21,10 +21,9 @@ import numpy as np
 from cosim.diagnostics.messages import MessageLog, in_order, write_messages
 from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, BlockFile
-from cosim.results.events_file import record_row, write_events
 from cosim.results.formats.growing_npy import growing_header
 from cosim.results.formats.known_formats import table_files, usual_file
-from cosim.results.packets_file import packet_row, write_packets
+from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord, PacketRecord, SignalInfo
 from cosim.results.results_folder import EVENTS, LAYOUT, MESSAGES, PACKETS, SUMMARY, check_writable, remove_report
 from cosim.results.row_file import RowFile
@@ -71,7 +70,7 @@ class Stream:
         self.units = foreign_units(signals, unit_of)
         self.signals = described(signals, self.units)
         self._events, self._logs, self._packets = events, logs, packets
-        self._told = self._logged = self._sent = 0
+        self._stated = self._logged = self._sent = 0
         self._file: _StreamFile | None = None
         self._block: BlockFile | None = None
         self._begin(summary)
@@ -116,12 +115,12 @@ class Stream:
             OSError: the disk refuses.
         """
         events = self._events()
-        if len(events) > self._told:
-            self._add_rows(EVENTS, (_cells(event) for event in events[self._told :]))
-            self._told = len(events)
+        if len(events) > self._stated:
+            self._add_rows(EVENTS, map(TELEGRAM_ROWS.cells, events[self._stated :]))
+            self._stated = len(events)
         packets = () if self._packets is None else self._packets(self._sent)
         if packets:
-            self._add_rows(PACKETS, (packet_row(packet).values() for packet in packets))
+            self._add_rows(PACKETS, map(PACKET_ROWS.cells, packets))
             self._sent += len(packets)
         total = sum(log.total for log in self._logs)
         if total > self._logged:
@@ -152,9 +151,9 @@ class Stream:
             for name in (SUMMARY, BLOCK_FILE, PACKETS, *table_files().values()):
                 (folder / name).unlink(missing_ok=True)
             remove_report(folder)
-            write_events(folder / EVENTS, ())
+            TELEGRAM_ROWS.write(folder / EVENTS, ())
             if self._packets is not None:
-                write_packets(folder / PACKETS, ())
+                PACKET_ROWS.write(folder / PACKETS, ())
             write_messages(folder / MESSAGES, ())
             content = {
                 "layout": LAYOUT,
@@ -227,7 +226,3 @@ class _StreamFile(RowFile):
             f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. What was recorded "
             "so far is kept. Free the disk, choose another folder, or record less (record_every)."
         )
-
-
-def _cells(event: BaliseRecord) -> list[str]:
-    return [repr(value) if isinstance(value, float) else value for value in record_row(event).values()]

@@ -19,6 +19,18 @@ def table_dtype(names: Sequence[str]) -> np.dtype[np.void]:
     return np.dtype([(name, np.float64) for name in names])
 
 
+def table_of(names: Sequence[str], columns: Sequence[np.ndarray]) -> np.ndarray:
+    """A table of columns.
+
+    Args:
+        names: column names, ``time`` first. columns: their values, shape (rows,) or (rows, 1) each.
+    """
+    table = np.empty(np.size(columns[0]), table_dtype(names))
+    for name, column in zip(names, columns, strict=True):
+        table[name] = np.ravel(column)
+    return table
+
+
 def column_names(table: np.ndarray) -> tuple[str, ...]:
     """Names of the columns of a table, checked.
 

@@ -10,19 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.results.events_file import COLUMNS, NUMBERS
 from cosim.results.optional import optional_module
+from cosim.results.record_rows import TELEGRAM_ROWS, TELEGRAM_UNITS
 from cosim.results.result_data import ResultData, SignalInfo
-
-_EVENT_UNITS = {
-    "stamp": "s",
-    "delivered_at": "s",
-    "position": "m",
-    "true_position": "m",
-    "location_accuracy": "m",
-    "odometer_reading": "m/s",
-    "time_bound": "s",
-}
 
 
 def _chosen(result: ResultData, signals: Iterable[str] | None) -> list[SignalInfo]:
@@ -62,10 +52,10 @@ def to_pandas(result: ResultData, signals: Iterable[str] | None = None) -> Any:
 def _event_columns(result: ResultData) -> dict[str, Any]:
     """Columns of the telegrams; ``outcome.NAME`` is what became of each at a receiver, empty where it was not told."""
     columns: dict[str, Any] = {}
-    for name in COLUMNS:
+    for name in TELEGRAM_ROWS.columns:
         if name != "outcomes":
             values = [getattr(event, name) for event in result.events]
-            columns[name] = np.array(values, np.float64) if name in NUMBERS else np.array(values, object)
+            columns[name] = np.array(values, np.float64) if name in TELEGRAM_ROWS.numbers else np.array(values, object)
     receivers = dict.fromkeys(receiver for event in result.events for receiver in event.outcomes)
     for receiver in receivers:
         columns[f"outcome.{receiver}"] = np.array([event.outcomes.get(receiver, "") for event in result.events], object)
@@ -86,7 +76,7 @@ def events_to_pandas(result: ResultData) -> Any:
         OutputError: pandas is not installed.
     """
     frame = optional_module("pandas", "frames", "Data frames").DataFrame(_event_columns(result))
-    frame.attrs["units"] = dict(_EVENT_UNITS)
+    frame.attrs["units"] = dict(TELEGRAM_UNITS)
     return frame
 
 
@@ -109,7 +99,7 @@ def to_xarray(result: ResultData, signals: Iterable[str] | None = None) -> Any:
         s.name: ("time", np.array(result[s.name]), _attributes(s)) for s in _chosen(result, signals)
     }
     for name, values in _event_columns(result).items():
-        unit = {"units": _EVENT_UNITS[name]} if name in _EVENT_UNITS else {}
+        unit = {"units": TELEGRAM_UNITS[name]} if name in TELEGRAM_UNITS else {}
         variables[f"balise_{name}"] = ("event", values, unit)
     time = ("time", np.array(result.time), {"units": "s", "long_name": "time"})
     attributes = {} if result.failure is None else {"failure": result.failure}

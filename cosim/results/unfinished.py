@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,8 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages
 from cosim.results.block_file import BLOCK_FILE, read_block
-from cosim.results.events_file import Record, read_events
 from cosim.results.formats.growing_npy import read_grown
-from cosim.results.packets_file import read_packets
+from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS, Record, RecordRows
 from cosim.results.result_data import ResultData, SignalInfo
 
 SPARE = ".unfinished"
@@ -44,8 +42,8 @@ def read_unfinished(table: Path, events: Path, messages: Path, packets: Path, co
     )
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     logged = read_messages(messages) if messages.exists() else []
-    sent = _whole_lines(packets, read_packets) if packets.exists() else []
-    return ResultData(rows, signals, _whole_lines(events, read_events), messages=logged, packets=sent)
+    sent = _whole_lines(packets, PACKET_ROWS) if packets.exists() else []
+    return ResultData(rows, signals, _whole_lines(events, TELEGRAM_ROWS), messages=logged, packets=sent)
 
 
 def _all_rows(table: Path) -> np.ndarray:
@@ -61,12 +59,12 @@ def _all_rows(table: Path) -> np.ndarray:
     return np.concatenate([rows, new]) if len(new) else rows
 
 
-def _whole_lines(path: Path, read: Callable[[Path], list[Record]]) -> list[Record]:
+def _whole_lines(path: Path, rows: RecordRows[Record]) -> list[Record]:
     """The telegrams or packets but for a last line that was not written to its end."""
     content = path.read_bytes()
     if content.endswith(b"\n") or b"\n" not in content:
-        return read(path)
+        return rows.read(path)
     with tempfile.TemporaryDirectory() as scratch:
         whole = Path(scratch) / path.name
         whole.write_bytes(content[: content.rindex(b"\n") + 1])
-        return read(whole)
+        return rows.read(whole)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.results.events_file import NUMBERS, record_from_row, record_row
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.summary_file import restored
 from cosim.results.table_layout import column_names
@@ -50,7 +50,11 @@ def about_text(result: ResultData) -> str:
     Args:
         result: with telegrams, summary and failure.
     """
-    content = {"events": [record_row(e) for e in result.events], "summary": result.summary, "failure": result.failure}
+    content = {
+        "events": [TELEGRAM_ROWS.row(e) for e in result.events],
+        "summary": result.summary,
+        "failure": result.failure,
+    }
     return json.dumps(jsonable(content), ensure_ascii=False, allow_nan=False)
 
 
@@ -72,4 +76,4 @@ def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> Resul
 
 
 def _record(row: Mapping[str, Any]) -> BaliseRecord:
-    return record_from_row({n: _FROM_JSON.get(v, v) if n in NUMBERS else v for n, v in row.items()})
+    return TELEGRAM_ROWS.record({n: _FROM_JSON.get(v, v) if n in TELEGRAM_ROWS.numbers else v for n, v in row.items()})

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.errors import OutputError
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.si import in_si
-from cosim.results.table_layout import table_dtype
+from cosim.results.table_layout import table_of
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 CHUNK = 1 << 20  # rows looked at at a time
@@ -41,9 +41,7 @@ def result_of_columns(
     kept = _kept(source, names, columns)
     time = _time_name(source, kept)
     order = [time, *(name for name in kept if name != time)]
-    table = np.empty(len(kept[time]), table_dtype(["time", *order[1:]]))
-    for name, field in zip(order, table.dtype.names or (), strict=True):
-        table[field] = kept[name]
+    table = table_of(["time", *order[1:]], [kept[name] for name in order])
     table["time"] *= _seconds(source, units.get(time) or "s")
     check_time(source, table["time"])
     signals = [_signal(described(name), units.get(name)) for name in order[1:]]

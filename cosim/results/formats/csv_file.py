@@ -58,35 +58,6 @@ def _rows_in_python(rows: np.ndarray) -> bytes:
     return "".join([",".join(map(repr, row)) + "\n" for row in rows.tolist()]).encode()
 
 
-def read_csv(path: str | Path) -> np.ndarray:
-    """Read a table written by `write_csv`.
-
-    Args:
-        path: file to read.
-
-    Returns:
-        The structured array that was written, bit by bit.
-
-    Raises:
-        ValueError: the file is not such a table; the message says where.
-        OSError: the file cannot be read.
-    """
-    with Path(path).open(encoding="utf-8", newline="") as file:
-        names = next(csv.reader(file), [])
-        if not names or names[0] != "time":
-            raise ValueError(f"{path} is not a result table: its first column must be 'time', got {names[:1]}.")
-        first = file.readline()
-        if not first:
-            return np.empty(0, table_dtype(names))
-        try:
-            values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2, comments=None)
-        except ValueError as error:
-            raise ValueError(f"{path} is not a result table: {error}") from error
-    if values.shape[1] != len(names):
-        raise ValueError(f"{path} is not a result table: {len(names)} names but {values.shape[1]} numbers in a row.")
-    return values.view(table_dtype(names))[:, 0]
-
-
 class CsvFormat(Format):
     """Text, for every program."""
 
@@ -101,4 +72,19 @@ class CsvFormat(Format):
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return bare(read_csv, path)
+        with path.open(encoding="utf-8", newline="") as file:
+            names = next(csv.reader(file), [])
+            if not names or names[0] != "time":
+                raise ValueError(f"{path} is not a result table: its first column must be 'time', got {names[:1]}.")
+            first = file.readline()
+            if not first:
+                return bare(np.empty(0, table_dtype(names)))
+            try:
+                values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2, comments=None)
+            except ValueError as error:
+                raise ValueError(f"{path} is not a result table: {error}") from error
+        if values.shape[1] != len(names):
+            raise ValueError(
+                f"{path} is not a result table: {len(names)} names but {values.shape[1]} numbers in a row."
+            )
+        return bare(values.view(table_dtype(names))[:, 0])

@@ -17,10 +17,10 @@ from cosim.errors import OutputError
 from cosim.results.formats.about import with_about
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
-from cosim.results.formats.mat_file import read_mat
+from cosim.results.formats.mat_file import MatFormat
 from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description, write_modelica
 from cosim.results.result_data import ResultData, SignalInfo
-from cosim.results.table_layout import table_dtype
+from cosim.results.table_layout import table_of
 
 TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``
 
@@ -47,14 +47,9 @@ def read_foreign_mat(path: Path) -> ResultData:
     if "Aclass" in content:
         return _trajectory(str(path), content)
     if "signals" in content and "events" in content:
-        result = read_mat(path)
+        result = MatFormat.read(path)
         return replace(result, summary={"events_recorded": True, **result.summary})
     return _vectors(str(path), content)
-
-
-def _read_modelica(path: str | Path) -> ResultData:
-    """Read a Modelica trajectory; see `read_foreign_mat`."""
-    return read_foreign_mat(Path(path))
 
 
 # --- trajectories -----------------------------------------------------------------------------------------------------
@@ -136,9 +131,7 @@ def _ours(trajectory: _Trajectory, about: str) -> ResultData:
     """A trajectory that `write_modelica` wrote: nothing is converted, nothing is left out."""
     more = json.loads(about)
     signals = [SignalInfo(**signal) for signal in more["signals"]]
-    table = np.empty(trajectory.data.shape[1], table_dtype(["time", *(s.name for s in signals)]))
-    for name, values in zip(table.dtype.names or (), trajectory.data, strict=True):
-        table[name] = values
+    table = table_of(["time", *(s.name for s in signals)], list(trajectory.data))
     return with_about(table, signals, more["about"])
 
 
@@ -190,4 +183,4 @@ class ModelicaFormat(Format):
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return _read_modelica(path)
+        return read_foreign_mat(path)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
+
+import numpy as np
 
 from cosim.results.result_data import ResultData, SignalInfo
+from cosim.results.table_layout import column_names
 
 
 class Format(ABC):
@@ -46,11 +48,10 @@ class Format(ABC):
         """
 
 
-def bare(read: Callable[[Path], Any], path: Path) -> ResultData:
+def bare(table: np.ndarray) -> ResultData:
     """The result of a file that holds nothing but a table.
 
     Args:
-        read: reads the table. path: of the file.
+        table: of a result.
     """
-    table = read(path)
-    return ResultData(table, [SignalInfo(name) for name in table.dtype.names[1:]])
+    return ResultData(table, [SignalInfo(name) for name in column_names(table)[1:]])

@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
 from cosim.results.formats.about import BLOCK, blocks, signals_of
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.formats.guarded_file import GuardedFile
 from cosim.results.optional import optional_module
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.summary_file import restored
-from cosim.results.table_layout import table_dtype
+from cosim.results.table_layout import table_of
 from fmus.tables.plain_data import jsonable
 
 LAYOUT = "fmu-observer result 1"
@@ -36,32 +36,6 @@ FEW = 256  # rows that are not worth it
 
 def _h5py() -> Any:
     return optional_module("h5py", "hdf5", "HDF5 files")
-
-
-def _write_hdf5(path: str | Path, result: ResultData) -> None:
-    """Write a result; a table larger than the memory is written block by block.
-
-    Args:
-        path: file to write. result: what to write; its messages are not part of the file.
-
-    Raises:
-        ValueError: the table is not a result table.
-        OutputError: h5py is not installed. OSError: the file cannot be written.
-    """
-    signals = signals_of(result)
-    chunk = min(CHUNK, max(BLOCK // result.table.dtype.itemsize, 1))
-    options = {"libver": ("v108", "latest"), "rdcc_nbytes": 8 * chunk}  # it keeps so much of each column
-    h5py = _h5py()
-    with GuardedFile(path) as target, h5py.File(target, "w", **options) as file:
-        file.attrs["layout"] = LAYOUT
-        file.attrs["summary"] = json.dumps(jsonable(result.summary), ensure_ascii=False, allow_nan=False)
-        if result.failure is not None:
-            file.attrs["failure"] = result.failure
-        datasets = _columns(file, len(result.table), chunk, signals)
-        for start, rows in blocks(result.table):
-            for field, dataset in zip(result.table.dtype.names or (), datasets, strict=True):
-                dataset[start : start + len(rows)] = rows[field]
-        _write_events(file.create_group(EVENTS), result.events)
 
 
 def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) -> list[Any]:
@@ -104,43 +78,21 @@ def _dataset_name(name: str, taken: set[str]) -> str:
 
 def _write_events(group: Any, events: Sequence[BaliseRecord]) -> None:
     text = _h5py().string_dtype()
-    rows = [record_row(event) for event in events]
-    for name in COLUMNS:
-        group.create_dataset(
-            name, data=[row[name] for row in rows], dtype="f8" if name in NUMBERS else text, shape=(len(rows),)
-        )
-
-
-def read_hdf5(path: str | Path) -> ResultData:
-    """Read a file of `_write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
-    become names.
-
-    Args:
-        path: the file.
-
-    Raises:
-        OutputError: there is nothing of that kind in it, or h5py is not installed.
-        ValueError: the file is broken. OSError: it cannot be read.
-    """
-    h5py = _h5py()
-    try:
-        with h5py.File(path, "r") as file:
-            return _ours(file) if _text(file.attrs.get("layout")) == LAYOUT else _foreign(str(path), file)
-    except OSError as error:
-        if Path(path).is_file():
-            raise ValueError(f"{path} is not an HDF5 file that can be read: {error}") from error
-        raise
+    rows = [TELEGRAM_ROWS.row(event) for event in events]
+    for name in TELEGRAM_ROWS.columns:
+        kind = "f8" if name in TELEGRAM_ROWS.numbers else text
+        group.create_dataset(name, data=[row[name] for row in rows], dtype=kind, shape=(len(rows),))
 
 
 def _ours(file: Any) -> ResultData:
     found = [dataset for name, dataset in file.items() if name not in (TIME, EVENTS)]
     datasets = sorted(found, key=lambda dataset: int(dataset.attrs["column"]))
     signals = [_signal(dataset) for dataset in datasets]
-    table = np.empty(len(file[TIME]), table_dtype([TIME, *(s.name for s in signals)]))
-    for name, dataset in zip(table.dtype.names or (), [file[TIME], *datasets], strict=True):
-        table[name] = dataset[:]
-    columns = {n: file[EVENTS][n][:].tolist() if n in NUMBERS else file[EVENTS][n].asstr()[:].tolist() for n in COLUMNS}
-    events = [record_from_row(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    columns = [dataset[:] for dataset in (file[TIME], *datasets)]
+    table = table_of([TIME, *(s.name for s in signals)], columns)
+    stored = {name: file[EVENTS][name] for name in TELEGRAM_ROWS.columns}
+    cells = {n: (c if n in TELEGRAM_ROWS.numbers else c.asstr())[:].tolist() for n, c in stored.items()}
+    events = TELEGRAM_ROWS.records(cells)
     summary = {"events_recorded": True, **restored(json.loads(file.attrs["summary"]))}
     return ResultData(table, signals, events, summary, _text(file.attrs.get("failure")))
 
@@ -199,8 +151,28 @@ class Hdf5Format(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        _write_hdf5(path, result)
+        signals = signals_of(result)
+        chunk = min(CHUNK, max(BLOCK // result.table.dtype.itemsize, 1))
+        options = {"libver": ("v108", "latest"), "rdcc_nbytes": 8 * chunk}  # it keeps so much of each column
+        h5py = _h5py()
+        with GuardedFile(path) as target, h5py.File(target, "w", **options) as file:
+            file.attrs["layout"] = LAYOUT
+            file.attrs["summary"] = json.dumps(jsonable(result.summary), ensure_ascii=False, allow_nan=False)
+            if result.failure is not None:
+                file.attrs["failure"] = result.failure
+            datasets = _columns(file, len(result.table), chunk, signals)
+            for start, rows in blocks(result.table):
+                for field, dataset in zip(result.table.dtype.names or (), datasets, strict=True):
+                    dataset[start : start + len(rows)] = rows[field]
+            _write_events(file.create_group(EVENTS), result.events)
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return read_hdf5(path)
+        h5py = _h5py()
+        try:
+            with h5py.File(path, "r") as file:
+                return _ours(file) if _text(file.attrs.get("layout")) == LAYOUT else _foreign(str(path), file)
+        except OSError as error:
+            if path.is_file():
+                raise ValueError(f"{path} is not an HDF5 file that can be read: {error}") from error
+            raise

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import scipy
 
-from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
+from cosim.results.formats.about import signals_of
 from cosim.results.formats.format import Format
 from cosim.results.formats.matlab_names import matlab_names
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
-from cosim.results.table_layout import column_names, table_dtype
+from cosim.results.table_layout import table_of
 
 _RESERVED = ("time", "units", "signals", "events")
 
@@ -42,37 +43,13 @@ def _signals_struct(signals: Sequence[SignalInfo], legal: Mapping[str, str]) -> 
 
 
 def _events_struct(events: Sequence[BaliseRecord]) -> dict[str, np.ndarray]:
-    rows = [record_row(event) for event in events]
+    rows = [TELEGRAM_ROWS.row(event) for event in events]
     return {
         name: np.array([row[name] for row in rows], dtype=np.float64).reshape(-1, 1)
-        if name in NUMBERS
+        if name in TELEGRAM_ROWS.numbers
         else _cells([str(row[name]) for row in rows])
-        for name in COLUMNS
+        for name in TELEGRAM_ROWS.columns
     }
-
-
-def write_mat(path: str | Path, result: ResultData) -> None:
-    """Write the table, the units and the events of a result as a MATLAB 5 file.
-
-    Args:
-        path: file to write.
-        result: what to write; its summary is not part of the file.
-
-    Raises:
-        ValueError: the table is not a result table.
-        OSError: the file cannot be written.
-    """
-    names = column_names(result.table)[1:]
-    legal = matlab_names(names, _RESERVED)
-    known = {signal.name: signal for signal in result.signals}
-    signals = [known.get(name, SignalInfo(name)) for name in names]
-    content: dict[str, Any] = {"time": result.table["time"]}
-    content |= {legal[name]: result.table[name] for name in names}
-    content["units"] = {legal[s.name]: s.unit for s in signals}
-    content["signals"] = _signals_struct(signals, legal)
-    content["events"] = _events_struct(result.events)
-    with Path(path).open("wb") as file:
-        scipy.io.savemat(file, content, long_field_names=True, do_compression=True, oned_as="column")
 
 
 def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], list[SignalInfo]]:
@@ -95,36 +72,12 @@ def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], list[SignalInfo
 
 def _read_events(struct: Mapping[str, Any]) -> list[BaliseRecord]:
     count = np.size(struct["stamp"])
-    columns = {n: np.ravel(struct[n]).tolist() if n in NUMBERS else _texts(struct[n], count) for n in COLUMNS}
-    return [record_from_row(dict(zip(columns, values, strict=True))) for values in zip(*columns.values(), strict=True)]
-
-
-def read_mat(path: str | Path) -> ResultData:
-    """Read a file written by `write_mat`.
-
-    Args:
-        path: file to read.
-
-    Returns:
-        A result with table (bit by bit), signals and events; its summary is empty.
-
-    Raises:
-        ValueError: the file is not such a file.
-        OSError: the file cannot be read.
-    """
-    with Path(path).open("rb") as file:
-        try:
-            content = scipy.io.loadmat(file, simplify_cells=True)
-            variables, signals = _read_signals(content["signals"])
-            columns = [content["time"], *(content[variable] for variable in variables)]
-            events = _read_events(content["events"])
-        except (KeyError, TypeError, ValueError, NotImplementedError) as error:
-            raise ValueError(f"{path} is not a MATLAB result file: {error}") from error
-    names = ["time", *(s.name for s in signals)]
-    table = np.empty(np.size(columns[0]), table_dtype(names))
-    for name, column in zip(names, columns, strict=True):
-        table[name] = np.ravel(column)
-    return ResultData(table, signals, events)
+    return TELEGRAM_ROWS.records(
+        {
+            name: np.ravel(struct[name]).tolist() if name in TELEGRAM_ROWS.numbers else _texts(struct[name], count)
+            for name in TELEGRAM_ROWS.columns
+        }
+    )
 
 
 class MatFormat(Format):
@@ -135,8 +88,25 @@ class MatFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        write_mat(path, result)
+        signals = signals_of(result)
+        names = [signal.name for signal in signals]
+        legal = matlab_names(names, _RESERVED)
+        content: dict[str, Any] = {"time": result.table["time"]}
+        content |= {legal[name]: result.table[name] for name in names}
+        content["units"] = {legal[s.name]: s.unit for s in signals}
+        content["signals"] = _signals_struct(signals, legal)
+        content["events"] = _events_struct(result.events)
+        with path.open("wb") as file:
+            scipy.io.savemat(file, content, long_field_names=True, do_compression=True, oned_as="column")
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return read_mat(path)
+        with path.open("rb") as file:
+            try:
+                content = scipy.io.loadmat(file, simplify_cells=True)
+                variables, signals = _read_signals(content["signals"])
+                columns = [content["time"], *(content[variable] for variable in variables)]
+                events = _read_events(content["events"])
+            except (KeyError, TypeError, ValueError, NotImplementedError) as error:
+                raise ValueError(f"{path} is not a MATLAB result file: {error}") from error
+        return ResultData(table_of(["time", *(s.name for s in signals)], columns), signals, events)

@@ -8,31 +8,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from cosim.errors import OutputError
+from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format, bare
 from cosim.results.result_data import ResultData
 from cosim.results.table_layout import column_names
 
-HEADER = 1 << 26  # bytes; thousands of names need more than NumPy allows unasked
-
-
-def _write_npy(path: str | Path, table: np.ndarray) -> None:
-    """Write a result table; a table that is a map of a file is not loaded for it.
-
-    Args:
-        path: file to write. table: structured array, shape (rows,), float64 fields, ``time`` first.
-
-    Raises:
-        ValueError: `table` is not a result table.
-        OSError: the file cannot be written.
-    """
-    column_names(table)
-    if _is_there(Path(path), table):
-        return
-    with Path(path).open("wb") as file:
-        np.lib.format.write_array(file, table, version=(3, 0), allow_pickle=False)
+_HEADER = 1 << 26  # bytes; thousands of names need more than NumPy allows unasked
 
 
 def _is_there(path: Path, table: np.ndarray) -> bool:
@@ -56,19 +42,33 @@ def _is_there(path: Path, table: np.ndarray) -> bool:
     return True
 
 
-def _read_npy(path: str | Path) -> np.ndarray:
-    """Read a table written by `_write_npy`; it stays in the file, whose pages are read when they are looked at.
+def read_foreign_npy(path: Path) -> ResultData:
+    """Read a structured array with a field ``time``; one of ours stays in the file, whose pages are read when looked
+    at.
+
+    Args:
+        path: the file.
 
     Raises:
-        ValueError: the file is not such a table.
-        OSError: the file cannot be read.
+        OutputError: it is another kind of array. ValueError: the file is broken. OSError: it cannot be read.
     """
-    try:
-        table: np.ndarray = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=HEADER)
-        column_names(table)
-    except (EOFError, ValueError) as error:
-        raise ValueError(f"{path} is not a result table: {error}") from error
-    return table
+    table: np.ndarray = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=_HEADER)
+    names = table.dtype.names
+    if not names or table.ndim != 1:
+        found = f"shape {table.shape} and type {table.dtype}"
+        raise OutputError(f"{path}: expected a structured array of shape (rows,) with a field 'time', got {found}.")
+    kinds: list[np.dtype[Any]] = [table.dtype[name] for name in names]
+    if names[0] == "time" and all(kind == np.float64 for kind in kinds):
+        return bare(table)
+    fields: list[str] = []
+    columns: list[np.ndarray] = []
+    for field, kind in zip(names, kinds, strict=True):
+        if kind.base.kind not in "biuf":
+            raise OutputError(f"{path}: field {field!r} must hold numbers, got {kind}. Leave it out.")
+        values = np.asarray(table[field]).reshape(len(table), -1)
+        fields += [field] if kind.shape == () else [f"{field}[{i + 1}]" for i in range(values.shape[1])]
+        columns += list(values.T)
+    return result_of_columns(str(path), fields, columns, {})
 
 
 class NpyFormat(Format):
@@ -81,8 +81,15 @@ class NpyFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        _write_npy(path, result.table)
+        column_names(result.table)
+        if _is_there(path, result.table):
+            return
+        with path.open("wb") as file:
+            np.lib.format.write_array(file, result.table, version=(3, 0), allow_pickle=False)
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return bare(_read_npy, path)
+        try:
+            return bare(np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=_HEADER))
+        except (EOFError, ValueError) as error:
+            raise ValueError(f"{path} is not a result table: {error}") from error

@@ -30,57 +30,9 @@ def _modules() -> tuple[Any, Any]:
     return arrow, parquet
 
 
-def _write_parquet(path: str | Path, result: ResultData) -> None:
-    """Write a result; a table larger than the memory is written block by block.
-
-    Args:
-        path: file to write. result: what to write; its messages are not part of the file.
-
-    Raises:
-        ValueError: the table is not a result table.
-        OutputError: pyarrow is not installed. OSError: the file cannot be written.
-    """
-    arrow, parquet = _modules()
-    signals = signals_of(result)
-    fields = [arrow.field("time", arrow.float64(), nullable=False, metadata={"unit": "s", "description": "time"})]
-    fields += [arrow.field(s.name, arrow.float64(), nullable=False, metadata=_metadata(s)) for s in signals]
-    units = {"units": {"time": "s"} | {s.name: s.unit for s in signals}}
-    schema = arrow.schema(
-        fields, metadata={ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)}
-    )
-    names = result.table.dtype.names or ()
-    with (
-        Path(path).open("wb") as file,
-        parquet.ParquetWriter(file, schema, use_dictionary=False, compression="snappy") as writer,
-    ):
-        for _, rows in blocks(result.table):
-            columns = [arrow.array(np.ascontiguousarray(rows[name])) for name in names]
-            writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
-
-
 def _metadata(signal: SignalInfo) -> dict[str, str]:
     known = {"unit": signal.unit, "variability": signal.variability, "description": signal.description}
     return known | ({} if signal.display_unit is None else {"display_unit": signal.display_unit})
-
-
-def read_parquet(path: str | Path) -> ResultData:
-    """Read a file of `_write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
-
-    Args:
-        path: the file.
-
-    Raises:
-        OutputError: a column holds no numbers, or pyarrow is not installed; the message names the column.
-        ValueError: the file is broken. OSError: it cannot be read.
-    """
-    arrow, parquet = _modules()
-    with Path(path).open("rb") as source:
-        try:
-            file = parquet.ParquetFile(source)
-            about = (file.schema_arrow.metadata or {}).get(ABOUT)
-            return _foreign(str(path), file.read()) if about is None else _ours(file, about.decode())
-        except arrow.ArrowException as error:
-            raise ValueError(f"{path} is not a Parquet file that can be read: {error}") from error
 
 
 def _ours(file: Any, about: str) -> ResultData:
@@ -133,8 +85,30 @@ class ParquetFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        _write_parquet(path, result)
+        arrow, parquet = _modules()
+        signals = signals_of(result)
+        fields = [arrow.field("time", arrow.float64(), nullable=False, metadata={"unit": "s", "description": "time"})]
+        fields += [arrow.field(s.name, arrow.float64(), nullable=False, metadata=_metadata(s)) for s in signals]
+        units = {"units": {"time": "s"} | {s.name: s.unit for s in signals}}
+        schema = arrow.schema(
+            fields, metadata={ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)}
+        )
+        names = result.table.dtype.names or ()
+        with (
+            path.open("wb") as file,
+            parquet.ParquetWriter(file, schema, use_dictionary=False, compression="snappy") as writer,
+        ):
+            for _, rows in blocks(result.table):
+                columns = [arrow.array(np.ascontiguousarray(rows[name])) for name in names]
+                writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
-        return read_parquet(path)
+        arrow, parquet = _modules()
+        with path.open("rb") as source:
+            try:
+                file = parquet.ParquetFile(source)
+                about = (file.schema_arrow.metadata or {}).get(ABOUT)
+                return _foreign(str(path), file.read()) if about is None else _ours(file, about.decode())
+            except arrow.ArrowException as error:
+                raise ValueError(f"{path} is not a Parquet file that can be read: {error}") from error

@@ -11,24 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import OutputError, nearest
-from cosim.results.events_file import COLUMNS, NUMBERS, parse_outcomes, require_accuracy
 from cosim.results.formats.csv_dialect import csv_dialect
 from cosim.results.formats.headings import split_unit
+from cosim.results.record_rows import TELEGRAM_ROWS, TELEGRAM_UNITS, parse_outcomes, require_accuracy
 from cosim.results.result_data import BaliseRecord
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
-NEEDED = ("stamp", "position")
-UNITS = {
-    "stamp": "s",
-    "delivered_at": "s",
-    "time_bound": "s",
-    "odometer_reading": "m/s",
-    "position": "m",
-    "true_position": "m",
-    "location_accuracy": "m",
-}
-DEFAULTS = {f.name: f.default for f in fields(BaliseRecord) if f.default is not MISSING} | {"true_position": nan}
-KINDS = ("true", "missed", "false")
+_NEEDED = ("stamp", "position")
+_DEFAULTS = {f.name: f.default for f in fields(BaliseRecord) if f.default is not MISSING} | {"true_position": nan}
+_KINDS = ("true", "missed", "false")
 
 
 def holds_telegrams(path: Path) -> bool:
@@ -73,35 +64,37 @@ def _columns(path: Path, headings: tuple[str, ...]) -> dict[str, float]:
     factors: dict[str, float] = {}
     for heading in headings:
         name, unit = split_unit(heading)
-        if name not in COLUMNS:
-            raise OutputError(f"{path}: unknown column {heading!r}; {nearest(name, COLUMNS)}")
+        if name not in TELEGRAM_ROWS.columns:
+            raise OutputError(f"{path}: unknown column {heading!r}; {nearest(name, TELEGRAM_ROWS.columns)}")
         try:
-            factors[name] = 1.0 if unit is None else conversion(parse_unit(unit), parse_unit(UNITS.get(name, "1")))[0]
+            factors[name] = (
+                1.0 if unit is None else conversion(parse_unit(unit), parse_unit(TELEGRAM_UNITS.get(name, "1")))[0]
+            )
         except UnitError as error:
             raise OutputError(f"{path}: column {heading!r}: {error}.") from error
-    lacking = [name for name in NEEDED if name not in factors]
+    lacking = [name for name in _NEEDED if name not in factors]
     if lacking:
         raise OutputError(f"{path}: telegrams need the columns 'stamp' and 'position'; missing: {', '.join(lacking)}.")
     return factors
 
 
 def _record(row: dict[str, str], factors: dict[str, float], identity: str) -> BaliseRecord:
-    values: dict[str, Any] = {**DEFAULTS, "identity": identity, "outcomes": {}}
+    values: dict[str, Any] = {**_DEFAULTS, "identity": identity, "outcomes": {}}
     for name, text in row.items():
         if text == "":
             continue
-        if name in NUMBERS:
+        if name in TELEGRAM_ROWS.numbers:
             try:
                 values[name] = float(text) * factors[name]
             except ValueError:
                 raise ValueError(f"{name}: expected a number, got {text!r}.") from None
         else:
             values[name] = parse_outcomes(text) if name == "outcomes" else text
-    for name in NEEDED:
+    for name in _NEEDED:
         if name not in values:
             raise ValueError(f"{name} is empty.")
     require_accuracy(values["location_accuracy"])
-    if values["kind"] not in KINDS:
-        raise ValueError(f"kind {values['kind']!r}: expected one of {', '.join(KINDS)}.")
+    if values["kind"] not in _KINDS:
+        raise ValueError(f"kind {values['kind']!r}: expected one of {', '.join(_KINDS)}.")
     values.setdefault("delivered_at", nan if values["kind"] == "missed" else values["stamp"])
     return BaliseRecord(**values)

@@ -14,7 +14,7 @@ from cosim.balises.layout import from_csv
 from cosim.balises.recorded import RecordedLayout, read_layout
 from cosim.errors import ScenarioError
 from cosim.observer_benchmark.playback import train_observers
-from cosim.results.events_file import read_events, write_events
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord
 
 LOG = "time,odometer [km/h],effort [N]\n0,36,0\n2,36,0\n"
@@ -127,9 +127,9 @@ def test_an_accuracy_that_is_none_is_refused_by_row_and_column(tmp_path: Path, a
     record = BaliseRecord(0.5, 0.5, "B1", 5.0, 5.0, float(accuracy))
     with pytest.raises(ScenarioError, match=r"a run: telegram 1 \(B1\): location_accuracy: expected"):
         RecordedLayout((record,), "a run")
-    write_events(tmp_path / "events.csv", [record])
+    TELEGRAM_ROWS.write(tmp_path / "events.csv", [record])
     with pytest.raises(ValueError, match=r"events\.csv, line 2: location_accuracy: expected"):
-        read_events(tmp_path / "events.csv")
+        TELEGRAM_ROWS.read(tmp_path / "events.csv")
 
 
 RECEIVERS = [name for name in train_observers() if name != "delayed_train_observer"]

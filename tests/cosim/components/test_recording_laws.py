@@ -11,7 +11,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import CosimError, ScenarioError
-from cosim.results.events_file import write_events
+from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result import BaliseRecord
 from cosim.run.outcome import Outcome
 
@@ -144,7 +144,7 @@ def test_telegrams_that_cannot_be_told_are_refused(
     records: list[BaliseRecord] | None, keys: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
     if records is not None:
-        write_events(tmp_path / "events.csv", records)
+        TELEGRAM_ROWS.write(tmp_path / "events.csv", records)
     with pytest.raises(ScenarioError, match=words):
         small().balises(layout="recorded", file=str(tmp_path / "events.csv"), **{"method": "auto"} | keys).run()
 
@@ -161,7 +161,7 @@ def test_a_wrong_row_of_telegrams_is_told_with_its_file_once(tmp_path: Path) -> 
 
 
 def test_recorded_telegrams_are_not_exported(tmp_path: Path) -> None:
-    write_events(tmp_path / "events.csv", [telegram()])
+    TELEGRAM_ROWS.write(tmp_path / "events.csv", [telegram()])
     scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("log", recording="log.csv")
     (tmp_path / "log.csv").write_text("time,position,speed\n0,0,1\n1,1,1\n", encoding="utf-8")
     scenario.balises(position="log.position", speed="log.speed", layout="recorded", file="events.csv")

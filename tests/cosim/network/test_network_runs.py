@@ -13,7 +13,7 @@ from cosim import Outcome, Scenario
 from cosim.errors import CosimError
 from cosim.results import stream as stream_module
 from cosim.results.load_result import load_result
-from cosim.results.packets_file import read_packets, write_packets
+from cosim.results.record_rows import PACKET_ROWS
 
 ROUGH: dict[str, Any] = {
     "delay_model": "uniform",
@@ -219,8 +219,8 @@ def test_the_block_gives_the_numbers_of_the_service(protocol: str, delay: int) -
 def test_packets_are_kept_to_the_last_bit(tmp_path: object) -> None:
     packets = run(**ROUGH).result.packets
     path = f"{tmp_path}/packets.csv"
-    write_packets(path, packets)
-    again = read_packets(path)
+    PACKET_ROWS.write(path, packets)
+    again = PACKET_ROWS.read(path)
     assert [repr(p) for p in again] == [repr(p) for p in packets]  # nan is nan
 
 

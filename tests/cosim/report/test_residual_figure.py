@@ -19,7 +19,7 @@ def run() -> Result:
     table["time"], table["a.ratio_quiet"] = np.arange(11.0), 0.5
     table["fault"] = table["time"] > 5.0
     table["a.ratio_two_wheels"] = 3.0 * table["fault"]
-    return Result.of(bare(lambda _: table, "run"))
+    return Result.of(bare(table))
 
 
 def test_residuals_that_cross_their_thresholds_are_named_and_none_is_below_the_floor() -> None:

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 from cosim.errors import OutputError
-from cosim.results.events_file import outcomes_text, parse_outcomes, read_events, write_events
-from cosim.results.formats.csv_file import read_csv, write_csv
-from cosim.results.formats.mat_file import read_mat, write_mat
+from cosim.results.formats.csv_file import CsvFormat, write_csv
+from cosim.results.formats.mat_file import MatFormat
 from cosim.results.formats.matlab_names import matlab_names
+from cosim.results.record_rows import TELEGRAM_ROWS, outcomes_text, parse_outcomes
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.results_folder import check_writable, read_results, write_results
 from cosim.results.summary_file import read_summary, write_summary
@@ -75,7 +75,7 @@ def same_events(first: Any, second: Any) -> bool:
 
 def test_csv_reads_back_bit_by_bit(result: Result, tmp_path: Path) -> None:
     write_csv(tmp_path / "t.csv", result.table)
-    assert bits(read_csv(tmp_path / "t.csv")) == bits(result.table)
+    assert bits(CsvFormat.read(tmp_path / "t.csv").table) == bits(result.table)
 
 
 def test_fmpy_reads_the_csv_bit_by_bit(result: Result, tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_fmpy_reads_the_csv_bit_by_bit(result: Result, tmp_path: Path) -> None:
 
 def test_we_read_the_csv_of_fmpy(result: Result, tmp_path: Path) -> None:
     fmpy.util.write_csv(tmp_path / "t.csv", result.table)
-    assert bits(read_csv(tmp_path / "t.csv")) == bits(result.table)
+    assert bits(CsvFormat.read(tmp_path / "t.csv").table) == bits(result.table)
 
 
 @settings(max_examples=60, deadline=None)
@@ -96,7 +96,7 @@ def test_csv_keeps_every_float(rows: list[tuple[float, float]], tmp_path_factory
         table[name][np.isnan(table[name])] = math.nan
     path = tmp_path_factory.mktemp("csv") / "t.csv"
     write_csv(path, table)
-    assert bits(read_csv(path)) == bits(table)
+    assert bits(CsvFormat.read(path).table) == bits(table)
     if len(table):
         assert bits(fmpy.util.read_csv(path)) == bits(table)
 
@@ -104,14 +104,14 @@ def test_csv_keeps_every_float(rows: list[tuple[float, float]], tmp_path_factory
 def test_csv_names_may_hold_commas_and_quotes(tmp_path: Path) -> None:
     table = make_table({"time": [0.0], "a[1,2]": [1.0], 'der("x")': [2.0], "#c": [3.0]})
     write_csv(tmp_path / "t.csv", table)
-    assert bits(read_csv(tmp_path / "t.csv")) == bits(table)
+    assert bits(CsvFormat.read(tmp_path / "t.csv").table) == bits(table)
 
 
 @pytest.mark.parametrize("text", ["", "x,y\n1,2\n", '"time","a"\n1.0\n', '"time","a"\n1.0,two\n', '"time"\n1.0,2.0\n'])
 def test_csv_that_is_no_result_table_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(ValueError, match="not a result table"):
-        read_csv(tmp_path / "t.csv")
+        CsvFormat.read(tmp_path / "t.csv")
 
 
 @pytest.mark.parametrize("dtype", [[("t", "f8")], [("time", "f8"), ("a", "i4")], [("time", "f4")]])
@@ -124,8 +124,8 @@ def test_table_of_another_layout_is_not_written(dtype: Any, tmp_path: Path) -> N
 
 
 def test_mat_reads_back_bit_by_bit(result: Result, tmp_path: Path) -> None:
-    write_mat(tmp_path / "t.mat", result)
-    back = read_mat(tmp_path / "t.mat")
+    MatFormat.write(tmp_path / "t.mat", result)
+    back = MatFormat.read(tmp_path / "t.mat")
     assert bits(back.table) == bits(result.table)
     assert list(back.signals) == list(result.signals)
     assert same_events(back.events, result.events)
@@ -135,20 +135,20 @@ def test_mat_reads_back_bit_by_bit(result: Result, tmp_path: Path) -> None:
 @pytest.mark.parametrize("telegrams", [0, 1])
 def test_mat_of_few_rows_and_telegrams(rows: int, telegrams: int, result: Result, tmp_path: Path) -> None:
     small = replace(result, table=result.table[:rows], events=result.events[:telegrams])
-    write_mat(tmp_path / "t.mat", small)
-    back = read_mat(tmp_path / "t.mat")
+    MatFormat.write(tmp_path / "t.mat", small)
+    back = MatFormat.read(tmp_path / "t.mat")
     assert bits(back.table) == bits(small.table)
     assert same_events(back.events, small.events)
 
 
 def test_mat_of_time_alone(tmp_path: Path) -> None:
     table = make_table({"time": [0.0, 1.0]})
-    write_mat(tmp_path / "t.mat", Result(table, []))
-    assert bits(read_mat(tmp_path / "t.mat").table) == bits(table)
+    MatFormat.write(tmp_path / "t.mat", Result(table, []))
+    assert bits(MatFormat.read(tmp_path / "t.mat").table) == bits(table)
 
 
 def test_mat_as_matlab_sees_it(result: Result, tmp_path: Path) -> None:
-    write_mat(tmp_path / "t.mat", result)
+    MatFormat.write(tmp_path / "t.mat", result)
     seen = loadmat(tmp_path / "t.mat")
     assert seen["locomotive_position"].shape == (4, 1)
     assert seen["units"]["locomotive_position"][0, 0][0] == "m"
@@ -158,7 +158,7 @@ def test_mat_as_matlab_sees_it(result: Result, tmp_path: Path) -> None:
 def test_mat_of_another_kind_is_refused(tmp_path: Path) -> None:
     (tmp_path / "t.mat").write_bytes(b"time,a\n" * 40)
     with pytest.raises(ValueError, match="not a MATLAB result file"):
-        read_mat(tmp_path / "t.mat")
+        MatFormat.read(tmp_path / "t.mat")
 
 
 def test_matlab_names_are_legal_and_clashes_are_numbered() -> None:
@@ -177,8 +177,8 @@ def test_matlab_names_are_unique_identifiers(names: list[str]) -> None:
 
 
 def test_events_read_back(result: Result, tmp_path: Path) -> None:
-    write_events(tmp_path / "e.csv", result.events)
-    assert same_events(read_events(tmp_path / "e.csv"), result.events)
+    TELEGRAM_ROWS.write(tmp_path / "e.csv", result.events)
+    assert same_events(TELEGRAM_ROWS.read(tmp_path / "e.csv"), result.events)
 
 
 @given(
@@ -192,10 +192,10 @@ def test_outcomes_read_back(outcomes: dict[str, str]) -> None:
 
 def test_broken_event_row_names_its_line(result: Result, tmp_path: Path) -> None:
     path = tmp_path / "e.csv"
-    write_events(path, result.events)
+    TELEGRAM_ROWS.write(path, result.events)
     path.write_text(path.read_text().replace("0.2,nan", "soon,nan"))
     with pytest.raises(ValueError, match="line 3"):
-        read_events(path)
+        TELEGRAM_ROWS.read(path)
 
 
 def test_summary_is_strict_json(tmp_path: Path) -> None:
