@@ -202,7 +202,7 @@ def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpa
         _headline(summary),
         *(_tables(outcome) if outcome.result.table.size else []),
         cost_table(outcome.result),
-        "" if study is None else study.text(),
+        "" if study is None else study.table(),
         outcome.expectations_text(),
     ]
     return Output(parts, data, paths, code, [] if failure is None else [f"the run ended early: {failure}"])

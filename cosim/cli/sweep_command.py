@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -18,6 +19,7 @@ from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling_plans import MOST, Range, uniform
 from cosim.studies.sweep import Sweep
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 
 DONE, _SOME_FAILED = 0, 1
@@ -50,17 +52,12 @@ ARGUMENTS = (
     argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)"),
     argument("--table-only", action="store_true", help="keep the table, and no results folder for each run"),
     *MANY_RUNS,
-    argument("--json", action="store_true", help="print the table as JSON"),
     QUIET,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Run, write each run as soon as it is done, and print the table.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Run, and write each run as soon as it is done."""
     scenario = load_scenario(options)
     sweep = _sweep(scenario, options)
     directory = check_writable(
@@ -79,12 +76,10 @@ def execute(options: argparse.Namespace) -> int:
         )
     if options.by is not None:
         studies.write_groups(result, options.by, directory)
-    if options.json:
-        print((directory / "index.json").read_text(encoding="utf-8"), end="")
-    else:
-        print(result.text() if options.by is None else studies.groups_text(result, options.by))
-        print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
-    return _SOME_FAILED if result.failed else DONE
+    table = result.shown() if options.by is None else studies.groups_table(result, options.by)
+    ending = f"{len(result) - len(result.failed)} of {len(result)} runs done: {directory}"
+    data = json.loads((directory / "index.json").read_text(encoding="utf-8"))
+    return Output([table, ending], data, code=_SOME_FAILED if result.failed else DONE)
 
 
 def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite, nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from cosim.evaluation.fault_detection import HOUR, clopper_pearson, garwood
 from cosim.studies.measures import RATES, SHARES, setting_text
 from fmus.tables.numbers import DASH
 from fmus.tables.numbers import number as number_text
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Table, name_column
 
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
@@ -104,19 +105,21 @@ def _total(runs: Sequence[SweepRun], name: str) -> float:
     return sum(count for count in counts if isfinite(count))
 
 
-def groups_text(result: SweepRuns, by: str) -> str:
-    """The groups as a table, failures in words below it.
+def groups_table(result: SweepRuns, by: str) -> Table:
+    """The groups, failures in words below.
 
     Args:
         result: of a sweep. by: what was varied.
     """
-    columns = result.columns
-    rows = [[by, "runs", *(column.heading for column in columns)]]
     counts = _runs(result, by)
-    for key, measures in grouped(result, by).items():
-        rows.append([key, str(counts[key]), *(measures[c.measure].text(c.factor) for c in columns)])
+    rows = [
+        [key, counts[key], *(measures[column.key] for column in result.columns)]
+        for key, measures in grouped(result, by).items()
+    ]
+    columns = [replace(column, write=partial(Spread.text, factor=column.factor)) for column in result.columns]
     note = "Means of the runs, and shares and rates of what was counted in all of them, with 95 % intervals."
-    return "\n".join([*text_table(rows, left=(0,), heading=True), "", note, *result.troubles()])
+    names = [name_column(by, by), Column("runs", "runs")]
+    return Table("groups", [*names, *columns], rows, notes=["", note, *result.troubles()])
 
 
 def _runs(result: SweepRuns, by: str) -> Mapping[str, int]:

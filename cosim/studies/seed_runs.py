@@ -12,12 +12,12 @@ import numpy as np
 
 from cosim.errors import RunError
 from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.seed_table import seed_table
 from cosim.evaluation.spec import ReportSpec
 from cosim.run.signal_roles import report_spec
 from cosim.runs.engine import Progress
 from cosim.studies.measures import error_measures
-from fmus.tables.numbers import error_number
-from fmus.text_table import text_table
+from fmus.tables.table import Table
 
 if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
@@ -104,14 +104,14 @@ class SeedStudy:
             )
         return rows
 
-    def text(self) -> str:
-        """A plain-text table, failed seeds in words below it."""
-        rows = [["observer", "phase", "quartile", "median", "quartile", "published", "independent"]]
-        for observer, phase, *sizes in (row.values() for row in self.rows()):
-            rows.append([observer, phase, *(error_number(size) for size in sizes)])
-        head = f"Maximal speed error over {len(self.seeds)} seeds [m/s]"
+    def table(self) -> Table:
+        """The same as a table, failed seeds in words below it."""
         failed = [f"seed {seed} failed: {why}" for seed, why in self.failures.items()]
-        return "\n".join([head, *text_table(rows, left=(0, 1)), *failed])
+        return seed_table(self.rows(), f"Maximal speed error over {len(self.seeds)} seeds", failed)
+
+    def text(self) -> str:
+        """The same as plain text."""
+        return self.table().text()
 
     def to_data(self) -> dict[str, Any]:
         """Plain data: the seeds that ended, the quartiles, and a row for each seed."""

@@ -13,9 +13,8 @@ from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.runs.runnable import RunnableScenario
-from cosim.studies.measures import measure_unit, setting_text, with_unit
-from fmus.tables.numbers import number as number_text
-from fmus.text_table import text_table
+from cosim.studies.measures import measure_unit, setting_text
+from fmus.tables.table import Column, Table, name_column
 
 
 @dataclass(frozen=True)
@@ -48,19 +47,6 @@ class SweepRun:
 
 
 @dataclass(frozen=True)
-class _SweepColumn:
-    """A column of a printed table.
-
-    Args:
-        measure: name. heading: above it. factor: what numbers are multiplied by.
-    """
-
-    measure: str
-    heading: str
-    factor: float = 1.0
-
-
-@dataclass(frozen=True)
 class SweepRuns:
     """The runs of a sweep, in order of its variations.
 
@@ -90,7 +76,7 @@ class SweepRuns:
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
 
     @property
-    def columns(self) -> list[_SweepColumn]:
+    def columns(self) -> list[Column]:
         """The measures that printed tables show: those the scenario chooses under ``report.measures``, or all.
 
         Raises:
@@ -98,12 +84,12 @@ class SweepRuns:
         """
         chosen = self.scenario.table().report.measures
         if not chosen or not self.measures:
-            return [_SweepColumn(name, with_unit(name, self.unit(name))) for name in self.measures]
-        unknown = [column.measure for column in chosen if column.measure not in self.measures]
+            return [Column(name, name, self.unit(name) or "", digits=4) for name in self.measures]
+        unknown = [c.measure for c in chosen if c.measure not in self.measures]
         if unknown:
             raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
         return [
-            _SweepColumn(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor)
+            Column(c.measure, c.label or c.measure, c.unit or self.unit(c.measure) or "", factor=c.factor, digits=4)
             for c in chosen
         ]
 
@@ -137,17 +123,15 @@ class SweepRuns:
             raise OutputError("This needs pandas: pip install 'fmu-observer[frames]'") from error
         return pd.DataFrame(self.table()).set_index("run")
 
+    def shown(self) -> Table:
+        """The settings and the chosen measures of each run, failures in words below."""
+        columns = [*(name_column(name, name, write=setting_text) for name in ("run", *self.names)), *self.columns]
+        rows = [[row[column.key] for column in columns] for row in self.table()]
+        return Table("runs", columns, rows, notes=self.troubles())
+
     def text(self) -> str:
-        """The table as plain text, failures in words below it."""
-        rows = self.table()
-        settings = ["run", *self.names]
-        columns = self.columns
-        cells = [[*settings, *(column.heading for column in columns)]]
-        for row in rows:
-            numbers = (number_text(column.factor * row[column.measure], digits=4) for column in columns)
-            cells.append([*(setting_text(row[name]) for name in settings), *numbers])
-        lines = text_table(cells, left=())
-        return "\n".join([*lines, *self.troubles()])
+        """The same as plain text."""
+        return self.shown().text()
 
     def troubles(self) -> list[str]:
         """What failed, in words, a line each."""

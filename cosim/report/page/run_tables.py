@@ -8,6 +8,7 @@ from typing import Any
 from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.indicators import indicator_statistics
 from cosim.evaluation.roles import label
+from cosim.evaluation.seed_table import seed_table
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.expectations.judged import Judged
@@ -23,10 +24,6 @@ _CERTIFICATE_COLUMNS = (
     Column("constant_limit", "Limit, constant gap", "s", "Longest gap that is certified where all gaps are equal"),
     Column("max_gap", "Largest gap expected", "s", "From the layout of the balises and the speed, before the run"),
     Column("largest_gap_seen", "Largest gap seen", "s", "Between telegrams that were used in the run"),
-)
-_SEED_COLUMNS = tuple(
-    Column(key, key, "m/s", "Maximal speed error")
-    for key in ("lower quartile", "median", "upper quartile", "published", "independent")
 )
 _PACKET_COLUMNS = (
     Column("sent", "Sent"),
@@ -61,9 +58,8 @@ def seeds_table(result: Result) -> Table:
     Args:
         result: the run.
     """
-    columns = [OBSERVER, name_column("phase", "Phase"), *_SEED_COLUMNS]
     rows = mapping_entry(result, "seed_study").get("rows", [])
-    return Table("seeds", columns, [[row.get(c.key) for c in columns] for row in rows if isinstance(row, Mapping)])
+    return seed_table(row for row in rows if isinstance(row, Mapping))
 
 
 def certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str]]:

@@ -16,7 +16,7 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
 from cosim.runs.journal import JOURNAL
-from cosim.studies.groups import grouped, groups_text, mean_of
+from cosim.studies.groups import grouped, groups_table, mean_of
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
 
@@ -89,7 +89,7 @@ def test_groups_are_means_with_the_interval_of_student(swept: SweepResult) -> No
     low, high = stats.t.interval(0.95, 1, loc=np.mean(ways), scale=stats.sem(ways))
     spread = found["heavy, long"]["way"]
     assert (spread.mean, spread.low, spread.high, spread.count) == pytest.approx((np.mean(ways), low, high, 2))
-    assert "heavy, long     2" in groups_text(swept, "case")
+    assert "heavy, long     2" in groups_table(swept, "case").text()
     assert mean_of([nan, 3.0]).text() == "3.00"
     assert mean_of([nan]).text() == "–"
 
@@ -120,7 +120,7 @@ def test_columns_have_labels_units_and_factors(swept: SweepResult) -> None:
     column = {"measure": "way", "label": "w", "factor": 1000.0, "unit": "mm"}
     result = SweepResult(swept.scenario.copy().report(measures=[column]), swept.names, swept.runs)
     assert "w [mm]" in result.text().splitlines()[0]
-    assert result.text().splitlines()[1].endswith(f"{1000 * swept[0].measures['way']:.0f}")
+    assert result.text().splitlines()[2].endswith(f"{1000 * swept[0].measures['way']:.0f}")
     wrong = SweepResult(swept.scenario.copy().report(measures=["wey"]), swept.names, swept.runs)
     with pytest.raises(ScenarioError, match="did you mean 'way'"):
         wrong.text()

@@ -23,13 +23,14 @@ from cosim.observer_benchmark.benchmark import ObserverBenchmark, benchmark_obse
 from cosim.observer_benchmark.candidates import find_candidates
 from cosim.observer_benchmark.observer_scores import (
     CertifiedGap,
+    ObserverScore,
     divergence,
     error_at_balises,
     false_alarms,
     longest_gap,
     telegram_outcomes,
 )
-from cosim.observer_benchmark.observer_table import certified, certified_limit
+from cosim.observer_benchmark.observer_table import observer_table
 from cosim.observer_benchmark.playback import find_parts, shared_parameters, train_observers
 from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
@@ -226,9 +227,9 @@ def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
 
 
 def test_no_limit_is_told_as_any_gap() -> None:
-    assert certified_limit(CertifiedGap(np.inf, 22.5, 31.9)) == "any"
-    assert certified(CertifiedGap(np.inf, 22.5, 31.9)) == "yes/yes"
-    assert certified_limit(CertifiedGap(0.5, None, None)) == 0.5
+    gaps = [CertifiedGap(np.inf, 22.5, 31.9), CertifiedGap(0.5, None, None)]
+    rows = observer_table([ObserverScore("o", "o", "m", "defaults", certificate=gap) for gap in gaps]).data()
+    assert [(row["certified"], row["holds"]) for row in rows] == [("any", "yes/yes"), (0.5, "?/?")]
 
 
 def test_a_scenario_without_observers_serves_shipped_ones() -> None:
