@@ -36,7 +36,7 @@ class _PositionGains:
     gains: tuple[float, ...]
     decay: float
     certificate: Certificate
-    noise_to_speed: float
+    _noise_to_speed: float
 
 
 def augmented_matrix(drag_slope: float) -> np.ndarray:
@@ -66,15 +66,10 @@ def position_gains(poles: Sequence[float] | np.ndarray, drag_slope: float = 0.0)
     return np.asarray(polynomial @ np.linalg.solve(observability, np.eye(_ORDER)[-1]))
 
 
-def sampled_errors(
+def _sampled_errors(
     gains: Sequence[float], decay: float, drag_slopes: Sequence[float], odometer_gain: Sequence[float] = (0.0,) * _ORDER
 ) -> tuple[SampledError, ...]:
-    """Error equations of the augmented observer, one for each drag slope [1/s].
-
-    Args:
-        gains: of position samples, shape (4,). decay: of the innovation [1/s].
-        drag_slopes: corners of what the drag slope may be. odometer_gain: of a continuous odometer, shape (4,).
-    """
+    """Error equations of the augmented observer, one for each drag slope [1/s]."""
     continuous = np.outer(odometer_gain, np.eye(_ORDER)[1])
     return tuple(SampledError.of((augmented_matrix(s) - continuous).tolist(), gains, decay) for s in drag_slopes)
 
@@ -98,29 +93,26 @@ def design_for_gap(
     if not (isfinite(max_gap) and max_gap > 0.0 and isfinite(margin) and margin > 0.0):
         raise ValueError(f"design_for_gap: expected a positive gap [s] and margin, got {max_gap!r} and {margin!r}.")
     unit = position_gains(unit_poles)
-    limit = aperiodic_limit(sampled_errors(unit.tolist(), float(unit[0]), (0.0,)), _HORIZON)
+    limit = aperiodic_limit(_sampled_errors(unit.tolist(), float(unit[0]), (0.0,)), _HORIZON)
     if limit in (0.0, inf):
         raise ValueError(
             f"design_for_gap: no gap is certified for poles like {tuple(unit_poles)}; choose better damped ones."
         )
     scale = limit / ((1.0 + margin) * max_gap)
     gains = position_gains(scale * np.asarray(unit_poles))
-    errors = sampled_errors(gains.tolist(), float(gains[0]), drag_slopes)
+    errors = _sampled_errors(gains.tolist(), float(gains[0]), drag_slopes)
     certificate = certify_sampled_error(
         errors, max_gap, "four-state error of the augmented observer at the given drag slopes"
     )
-    return _PositionGains(tuple(map(float, gains)), float(gains[0]), certificate, noise_to_speed(errors[0], max_gap))
+    return _PositionGains(tuple(map(float, gains)), float(gains[0]), certificate, _noise_to_speed(errors[0], max_gap))
 
 
-def noise_to_speed(error: SampledError, gap: float) -> float:
+def _noise_to_speed(error: SampledError, gap: float) -> float:
     """Standard deviation of the speed error, just before a sample, over that of white noise on positions at a constant
     gap [1/s].
 
     Exact: the noise enters the innovation, ``e+ = Phi e - Gamma n``, and the stationary covariance solves a discrete
     Lyapunov equation; inf where the gap is unstable.
-
-    Args:
-        error: error equations. gap: between two samples [s].
     """
     if error.spectral_radius(gap) >= 1.0:
         return inf

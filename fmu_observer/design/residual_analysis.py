@@ -40,7 +40,7 @@ def h_infinity_norm(channel: ResidualChannel, tolerance: float = 1e-7) -> float:
         level = best * (1.0 + tolerance)
         if level == 0.0:
             return 0.0
-        crossings = level_crossings(channel, level)
+        crossings = _level_crossings(channel, level)
         if not len(crossings):
             break
         between = _between(np.unique(np.r_[0.0, crossings]))
@@ -75,7 +75,7 @@ def minimum_gain(channel: ResidualChannel, low: float = 0.0, high: float = inf, 
         level = best * (1.0 - tolerance)
         if level <= 0.0:
             return best
-        crossings = level_crossings(channel, level)
+        crossings = _level_crossings(channel, level)
         inside = crossings[(crossings > low) & (crossings < high)]
         if not len(inside):
             break
@@ -99,7 +99,7 @@ def bands_above(channel: ResidualChannel, level: float) -> list[tuple[float, flo
         ValueError: the level is not positive.
     """
     check_numbers("Bands above a level", {"level": level})
-    edges = np.r_[0.0, level_crossings(channel, level), inf]
+    edges = np.r_[0.0, _level_crossings(channel, level), inf]
     bands: list[tuple[float, float]] = []
     for low, high, middle in zip(edges[:-1], edges[1:], _between(edges), strict=True):
         if float(_smallest(channel, np.array([middle]))[0]) >= level:
@@ -201,12 +201,8 @@ def sudden_fault(channel: ResidualChannel, threshold: float, length: float = inf
     return threshold / peak if peak > 0.0 else inf
 
 
-def level_crossings(channel: ResidualChannel, level: float) -> np.ndarray:
-    """Frequencies at which a singular value of the response equals a level, in order, shape (K,) [rad/s].
-
-    Args:
-        channel: without a pole on the imaginary axis. level: positive, and no singular value of D.
-    """
+def _level_crossings(channel: ResidualChannel, level: float) -> np.ndarray:
+    """Frequencies at which a singular value of the response equals a level, in order, shape (K,) [rad/s]."""
     A, B, C, D = channel.matrices
     size = np.linalg.norm(D, 2)
     if abs(level - size) <= 1e-12 * size:  # the response tends to it and need not reach it

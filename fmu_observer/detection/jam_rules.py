@@ -290,7 +290,7 @@ class RepairedRules(Rules):
 
     def limit(self, m: Any, p: Any) -> Array:
         """Residual beyond which the odometer is doubted, or, while it is held to lie, within which it agrees [m/s]."""
-        return agreement_limit(m.hold_time, p)
+        return _agreement_limit(m.hold_time, p)
 
     def settled_time(self, m: Any, p: Any) -> Array:
         """Time for which the residual of an odometer that was followed has been small [s]; `settle_samples` periods of
@@ -361,7 +361,7 @@ def _held(m: Any, now: _Compared, p: Any) -> tuple[Array, Array, Array, Array, A
     its time has expired, and where the fault is withdrawn.
     """
     hold = np.where(now.held > 0.0, m.hold_time + p.odometer_period, 0.0)
-    agrees = now.held * indicator(now.size <= agreement_limit(hold, p))
+    agrees = now.held * indicator(now.size <= _agreement_limit(hold, p))
     row = np.where(agrees > 0.0, np.where(now.rolls > 0.0, m.agreeing + 1.0, 1.0), 0.0)
     believed = now.held * indicator(row >= p.recover_samples)
     doubtful = np.maximum(1.0 - now.proven, now.lasts)
@@ -398,12 +398,8 @@ def _proven_time(m: Any, reading: Reading, doubted: Array, small: Array, p: Any)
     return np.where(stands > 0.0, 0.0, np.where(m.samples > 0.0, later, first))
 
 
-def agreement_limit(hold_time: Array, p: Any) -> Array:
-    """Residual within which a held odometer agrees [m/s]: ``eps' + M delta T``.
-
-    Args:
-        hold_time: for which the model has run alone, T [s].
-    """
+def _agreement_limit(hold_time: Array, p: Any) -> Array:
+    """Residual within which a held odometer agrees [m/s]: ``eps' + M delta T``."""
     return doubt_limit(p) + p.residual_gain * p.disturbance_bound * hold_time
 
 

@@ -48,7 +48,7 @@ class _Availability(NamedTuple):
     apart: dict[str, dict[str, Array]]
 
 
-class Wheels(NamedTuple):
+class _Wheels(NamedTuple):
     """What a wheel may do.
 
     Attributes:
@@ -115,7 +115,7 @@ def alarms_after(x: Any, t: Array, ratios: Sequence[Array], p: Any) -> dict[str,
     return {"ratio": vector(*ratios), **{name: vector(*values) for name, values in after}}
 
 
-def wheels(x: Any, u: Any, brake_force: Array, p: Any) -> tuple[Wheels, dict[str, Array]]:
+def wheels(x: Any, u: Any, brake_force: Array, p: Any) -> tuple[_Wheels, dict[str, Array]]:
     """Whether an effort acts, or acted until `release_time` ago, that can jam or spin a wheel.
 
     Args:
@@ -129,10 +129,10 @@ def wheels(x: Any, u: Any, brake_force: Array, p: Any) -> tuple[Wheels, dict[str
     since_pull = np.where(pulls > 0.0, 0.0, x.since_pull + p.sample_period)
     since_brake = np.where(brakes > 0.0, 0.0, x.since_brake + p.sample_period)
     slow, fast = (np.where(since <= p.release_time, 1.0, 0.0) for since in (since_brake, since_pull))
-    return Wheels(slow, fast), {"since_pull": since_pull, "since_brake": since_brake}
+    return _Wheels(slow, fast), {"since_pull": since_pull, "since_brake": since_brake}
 
 
-def contradicted_wheels(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[list[Array], dict[str, Array]]:
+def contradicted_wheels(x: Any, read: Readings, wheel: _Wheels, p: Any) -> tuple[list[Array], dict[str, Array]]:
     """For each odometer 1 where it is off for so long that no wheel explains it: the sensor is at fault.
 
     Args:
@@ -159,7 +159,7 @@ def contradicted_wheels(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[
     return wrong, {"against_wheel": vector(*times)}
 
 
-def stuck_sensors(x: Any, read: Readings, wheel: Wheels, p: Any) -> tuple[list[Array], dict[str, Array]]:
+def stuck_sensors(x: Any, read: Readings, wheel: _Wheels, p: Any) -> tuple[list[Array], dict[str, Array]]:
     """For odometers, radar, satellites and pressure 1 where a reading has not changed although it should have.
 
     A wheel that is locked reads zero: that is no sensor that stands still while the brake may lock it.

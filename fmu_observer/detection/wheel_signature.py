@@ -77,7 +77,7 @@ class WheelSignature(HybridSystem):
         taken, kind = x.readings, x.told_kind
         change = np.where(taken > 0.5, u.odometer - x.last_reading, 0.0)
         record = [*x.changes[1:], change]
-        newest = np.where(taken > CHANGES - 0.5, record_class(WHEEL_CLASSES, record), 0.0)
+        newest = np.where(taken > CHANGES - 0.5, _record_class(WHEEL_CLASSES, record), 0.0)
         acts = np.where(newest == x.told_change, 0.0, newest)
         kept = np.where(acts * kind == 0.0, np.where(kind == 0.0, acts, kind), np.where(acts == kind, kind, 0.0))
         time = np.where(kept == 0.0, 0.0, np.where(kept == kind, x.held_time + p.odometer_period, 0.0))
@@ -97,12 +97,8 @@ class WheelSignature(HybridSystem):
         return {"odometer_fault": np.abs(x.told_kind)} | newest
 
 
-def record_class(classes: SignatureClassifier, record: Sequence[Array]) -> Array:
-    """Class of a record by the decisions of a classifier: -1 a drop, 1 a rise, 0 steady. It traces.
-
-    Args:
-        classes: decisions. record: samples from the oldest to the newest, scalars or of shape (members,).
-    """
+def _record_class(classes: SignatureClassifier, record: Sequence[Array]) -> Array:
+    """Class of a record by the decisions of a classifier: -1 a drop, 1 a rise, 0 steady. It traces."""
     verdict = CODES[str(classes.last)] + 0.0 * record[-1]
     for stage in reversed(classes.stages):
         abscissa, ordinate = _point(stage.plane, record)

@@ -16,16 +16,10 @@ _SQUARINGS = 6  # the remainder of the series is below 1e-14 while the norm of A
 _SUBSTEPS = 4  # Runge-Kutta steps in one period of a nonlinear model
 
 
-def zero_order_hold(A: np.ndarray, B: np.ndarray, period: Array) -> tuple[Array, Array]:
+def _zero_order_hold(A: np.ndarray, B: np.ndarray, period: Array) -> tuple[Array, Array]:
     """``A_d = exp(A T)`` and ``B_d = (integral of exp(A s) from 0 to T) B``, exact for inputs held over the period.
 
     By scaling, Taylor polynomial and squaring of a fixed number each, so that it traces.
-
-    Args:
-        A: shape (n, n). B: shape (n, m). period: T [s], a number or a traced scalar, norm(A) T below 16.
-
-    Returns:
-        A_d of shape (n, n) and B_d of shape (n, m).
     """
     n, m = B.shape
     block = np.zeros((n + m, n + m))
@@ -49,7 +43,7 @@ def transition(model: ObserverModel, x: Array, u: Array, period: Array) -> Array
         model: the model. x: state, shape (n,). u: inputs, shape (m,). period: T [s].
     """
     if model.phi is None:
-        A, B = zero_order_hold(model.A, model.B, period)
+        A, B = _zero_order_hold(model.A, model.B, period)
         return A @ x + B @ u if len(model.inputs) else A @ x
     for _ in range(_SUBSTEPS):
         x = rk4_step(lambda _t, at: model.flow(at, u), 0.0, period / _SUBSTEPS, x)

@@ -131,7 +131,7 @@ class ReportedPlace(NamedTuple):
     t: Array
 
 
-class GateJudgement(NamedTuple):
+class _GateJudgement(NamedTuple):
     """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. weight: of the
     innovation, 0 to 1. memory: afterwards.
     """
@@ -194,16 +194,12 @@ def _pulled(before: GateMemory, report: ReportedPlace) -> Array:
     return np.minimum(np.abs(report.odometer - before.last_odometer) / (PULLING * time), 1.0)
 
 
-def gate_limit(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
-    """Innovation beyond which a position is doubted [m].
-
-    Args:
-        before: memory of the gate before the telegram. report: the telegram and what the observer knows then.
-    """
+def _gate_limit(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
+    """Innovation beyond which a position is doubted [m]."""
     return p.gate_floor + known_accuracy(report.accuracy) + _granted_error(before, report, p)
 
 
-def judge(before: GateMemory, report: ReportedPlace, p: Any) -> GateJudgement:
+def judge(before: GateMemory, report: ReportedPlace, p: Any) -> _GateJudgement:
     """Whether a reported position is used, how much it weighs, and what the gate remembers of it.
 
     Args:
@@ -212,7 +208,7 @@ def judge(before: GateMemory, report: ReportedPlace, p: Any) -> GateJudgement:
     size, accuracy = np.abs(report.estimate - report.position), known_accuracy(report.accuracy)
     granted = _granted_error(before, report, p)
     settled = indicator(before.settled >= p.gate_recover)
-    outside = indicator(size > gate_limit(before, report, p))
+    outside = indicator(size > _gate_limit(before, report, p))
     doubted = outside * settled * indicator(p.gate > OFF)
     refused = doubted * indicator(p.gate >= REJECT)
     row = _row(before, report, p)
@@ -237,7 +233,7 @@ def judge(before: GateMemory, report: ReportedPlace, p: Any) -> GateJudgement:
     )
     kept = (np.where(used > 0.0, new, old) for new, old in zip(after[1:6], before[1:6], strict=True))
     still_doubted = np.where(used > 0.0, 0.0, after.doubted)
-    return GateJudgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
+    return _GateJudgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
 
 
 def _row(before: GateMemory, report: ReportedPlace, p: Any) -> tuple[Array, ...]:

@@ -51,7 +51,7 @@ def recall(kind: str, key: str) -> Any:
     Args:
         kind: as for `remembered`. key: digest of what the value follows from.
     """
-    path = entry_path(kind, key)
+    path = _entry_path(kind, key)
     try:
         return _checked(path.read_bytes(), kind, key)
     except FileNotFoundError:
@@ -73,18 +73,14 @@ def keep(kind: str, key: str, value: Any) -> Any:
     text = json.dumps(value)
     head = {"format": FORMAT, "kind": kind, "key": key, "sha256": _digest(text.encode())}
     try:
-        write_whole(entry_path(kind, key), f"{json.dumps(head)}\n{text}\n".encode())
+        write_whole(_entry_path(kind, key), f"{json.dumps(head)}\n{text}\n".encode())
     except OSError as error:
         LOG.info("Nothing is kept in the cache: %s", error)
     return json.loads(text)
 
 
-def entry_path(kind: str, key: str) -> Path:
-    """Where an entry lies.
-
-    Args:
-        kind: as for `remembered`. key: digest of what the value follows from.
-    """
+def _entry_path(kind: str, key: str) -> Path:
+    """Where an entry lies."""
     return cache_folder() / kind / f"{key}.json"
 
 

@@ -183,7 +183,7 @@ def identity(*values: Any, code: tuple[str, ...] = ()) -> str | None:
     description = _Description()
     try:
         parts = [description.text(values), _surroundings()]
-        parts += [folder_digest(name) for name in _with_floors_below({"plant_models", *description.packages, *code})]
+        parts += [_folder_digest(name) for name in _with_floors_below({"plant_models", *description.packages, *code})]
     except (_NoIdentityError, OSError):
         return None
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
@@ -195,20 +195,8 @@ def _with_floors_below(names: set[str]) -> list[str]:
 
 
 @cache
-def folder_digest(name: str) -> str:
-    """Digest of the files of a package of this project, or of one of its folders or files; read once in a process.
-
-    Args:
-        name: ``plant_models``, ``fmus/check`` or ``cosim/run/certificates.py``.
-
-    Returns:
-        The name and 64 hexadecimal digits.
-
-    Raises:
-        NoIdentityError: the files are not on disk, or were changed since this process began: what was loaded may be
-            older.
-        OSError: one of them cannot be read.
-    """
+def _folder_digest(name: str) -> str:
+    """Digest of the files of a package of this project, or of one of its folders or files; read once in a process."""
     package, _, rest = name.partition("/")
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:

@@ -124,7 +124,7 @@ class CartDoublePendulum(NoisyPlant):
 
     def plain(self, x: Any, p: Any) -> dict[str, Array]:
         (first, second), (first_rate, second_rate) = _turning(x)
-        a11, a12, a13, a22, a23, a33 = mass_matrix((first, second), p)
+        a11, a12, a13, a22, a23, a33 = _mass_matrix((first, second), p)
         speed = x.cart_speed
         kinetic = 0.5 * (a11 * speed**2 + a22 * first_rate**2 + a33 * second_rate**2)
         coupled = a12 * speed * first_rate + a13 * speed * second_rate + a23 * first_rate * second_rate
@@ -144,13 +144,8 @@ def _both_masses(p: Any) -> Array:
     return p.first_mass + 2.0 * p.second_mass
 
 
-def mass_matrix(angles: Pair, p: Any) -> tuple[Array, ...]:
-    """Entries 11, 12, 13, 22, 23, 33 of the symmetric matrix A(q): (4.13).
-
-    Args:
-        angles: of the lower and of the upper rod from upright [rad]. p: constants by the names of
-            `_DoublePendulumConstants`.
-    """
+def _mass_matrix(angles: Pair, p: Any) -> tuple[Array, ...]:
+    """Entries 11, 12, 13, 22, 23, 33 of the symmetric matrix A(q): (4.13)."""
     first, second = angles
     lower, upper = _both_masses(p) * p.first_length, p.second_mass * p.second_length
     return (
@@ -163,13 +158,8 @@ def mass_matrix(angles: Pair, p: Any) -> tuple[Array, ...]:
     )
 
 
-def right_hand_side(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Array, Array, Array]:
-    """b1, b2 and b3: (4.14), with its signs repaired or not.
-
-    Args:
-        angles: of the lower and of the upper rod from upright [rad]. rates: their derivatives [rad/s].
-        force: on the cart [N]. p: constants by the names of `_DoublePendulumConstants`.
-    """
+def _right_hand_side(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Array, Array, Array]:
+    """b1, b2 and b3: (4.14), with its signs repaired or not."""
     (first, second), (first_rate, second_rate) = angles, rates
     lower, upper = _both_masses(p) * p.first_length, p.second_mass * p.second_length
     centrifugal = p.centrifugal_sign * 2.0 * upper * p.first_length * np.sin(second - first)
@@ -187,7 +177,7 @@ def accelerations(angles: Pair, rates: Pair, force: Array, p: Any) -> tuple[Arra
         angles: of the lower and of the upper rod from upright [rad]. rates: their derivatives [rad/s].
         force: on the cart [N]. p: constants by the names of `_DoublePendulumConstants`.
     """
-    return _solved_3(mass_matrix(angles, p), right_hand_side(angles, rates, force, p))
+    return _solved_3(_mass_matrix(angles, p), _right_hand_side(angles, rates, force, p))
 
 
 def _solved_3(matrix: tuple[Array, ...], right: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:

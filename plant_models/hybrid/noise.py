@@ -63,20 +63,12 @@ def seed_of(run_seed: int, name: str) -> int:
     for byte in name.encode():
         hashed = (hashed ^ byte) * _FNV_PRIME & _MASK_64
     words = (hashed & _MASK, hashed >> 32, run_seed & _MASK, run_seed >> 32)
-    high, low, _, _ = philox4x32(words, _NAMING)
+    high, low, _, _ = _philox4x32(words, _NAMING)
     return (high >> 5) << 26 | low >> 6
 
 
-def philox4x32(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Ten rounds of Philox 4x32 on a 128-bit counter with a 64-bit key.
-
-    Args:
-        counter: four 32-bit words.
-        key: two 32-bit words.
-
-    Returns:
-        Four 32-bit words, uniform over their range.
-    """
+def _philox4x32(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Ten rounds of Philox 4x32 on a 128-bit counter with a 64-bit key."""
     c0, c1, c2, c3 = counter
     k0, k1 = key
     for _ in range(10):
@@ -97,7 +89,7 @@ def uniform_pair(seed: int, signal: int, index: int, purpose: int = Purpose.NOIS
         purpose: what it is drawn for.
     """
     key = (seed & _MASK, (seed >> 32) & _MASK)
-    a, b, c, d = philox4x32((index & _MASK, (index >> 32) & _MASK, signal & _MASK, purpose), key)
+    a, b, c, d = _philox4x32((index & _MASK, (index >> 32) & _MASK, signal & _MASK, purpose), key)
     scale = 2.0**-53
     first = ((a >> 5) * 67108864.0 + (b >> 6) + 0.5) * scale
     second = ((c >> 5) * 67108864.0 + (d >> 6) + 0.5) * scale

@@ -10,10 +10,10 @@ from adaptive_runs import Samples, motion
 from scipy.integrate import solve_ivp
 
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
-from fmu_observer.formulas.adaptation.adaptive_law import own_excitation, smallest_eigenvalue
+from fmu_observer.formulas.adaptation.adaptive_law import _own_excitation, smallest_eigenvalue
 from fmu_observer.models.known_models import find_state_affine_model
 from fmu_observer.observers.generic.adaptive import AdaptiveHold, AdaptivePredictor
-from fmu_observer.observers.generic.adaptive.adaptive_certificate import errors_left
+from fmu_observer.observers.generic.adaptive.adaptive_observer import _errors_left
 from plant_models.hybrid import state
 
 PERIODS = {"adaptive_predictor": 0.1, "adaptive_hold": 0.09}
@@ -142,14 +142,14 @@ def test_the_certificate_counts_with_the_adaptation(
 def test_what_the_certificate_says_is_left_is_left() -> None:
     """The errors are linear: those of a run are within the largest singular value, here a fifth of a standard run."""
     observer = AdaptivePredictor()
-    left = errors_left(observer, observer.start_parameters(), 0.1)
+    left = _errors_left(observer, observer.start_parameters(), 0.1)
     start = np.hypot(*observer.model.example[:2])
     run = Samples(observer, 0.1, 40.0)
     late = run["time"] > 32.0
     found = np.max(run["error"][late]) / np.linalg.norm([start, 10.0, 20.0])
     assert 0.02 * left.states < found < 10.0 * left.states
     sampled = AdaptivePredictor("excited_oscillator", "sampled")
-    assert errors_left(sampled, observer.start_parameters(), 0.2).states < 1e-6
+    assert _errors_left(sampled, observer.start_parameters(), 0.2).states < 1e-6
 
 
 def test_the_condition_is_the_excitation_that_lasts() -> None:
@@ -170,7 +170,7 @@ def test_excitation_in_closed_form() -> None:
             E = seen.T @ seen
             scale = np.trace(E)
             assert abs(float(smallest_eigenvalue(E, size)) - np.linalg.eigvalsh(E)[0]) < 1e-9 * scale
-            np.testing.assert_allclose(own_excitation(E, size), 1.0 / np.diag(np.linalg.inv(E)), rtol=1e-6)
+            np.testing.assert_allclose(_own_excitation(E, size), 1.0 / np.diag(np.linalg.inv(E)), rtol=1e-6)
     with pytest.raises(ValueError, match="up to size 3, got 4"):
         smallest_eigenvalue(np.eye(4), 4)
 

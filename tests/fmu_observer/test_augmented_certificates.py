@@ -10,11 +10,11 @@ from fmu_observer.certificates.aperiodic import aperiodic_limit
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.design.augmented_gains import (
     UNIT_POLES,
+    _noise_to_speed,
+    _sampled_errors,
     augmented_matrix,
     design_for_gap,
-    noise_to_speed,
     position_gains,
-    sampled_errors,
 )
 from fmu_observer.observers.train import AugmentedHighGainCdo, AugmentedTakagiSugenoCdo
 from fmu_observer.observers.train.augmented_observer import AugmentedTrainObserver
@@ -34,7 +34,7 @@ def by_hand(gains: np.ndarray, decay: float, gap: float, slope: float = 0.0) -> 
 
 
 def test_limits_of_the_binomial_gains() -> None:
-    error = sampled_errors(BINOMIAL, 4.0, (0.0,))
+    error = _sampled_errors(BINOMIAL, 4.0, (0.0,))
     constant = first_unstable_gap(error, 20.0)
     assert constant == pytest.approx(1.283, abs=5e-4)  # spec 5.6
     for gap, stable in ((1.28, True), (1.29, False)):
@@ -90,10 +90,10 @@ def test_noise_to_speed_is_that_of_a_long_run() -> None:
     for n in np.random.default_rng(1).standard_normal(200_000):
         error = transition @ error - influence * n  # the sign of a measured position
         speeds.append(error[1])
-    expected = noise_to_speed(sampled_errors(gains.tolist(), float(gains[0]), (0.0,))[0], 0.1)
+    expected = _noise_to_speed(_sampled_errors(gains.tolist(), float(gains[0]), (0.0,))[0], 0.1)
     # 200000 samples, correlated over about 1 / (0.5 1/s 0.1 s) = 20 of them: one per cent
     assert np.std(speeds) == pytest.approx(expected, rel=0.03)
-    assert noise_to_speed(sampled_errors(BINOMIAL, 4.0, (0.0,))[0], 1.5) == np.inf
+    assert _noise_to_speed(_sampled_errors(BINOMIAL, 4.0, (0.0,))[0], 1.5) == np.inf
 
 
 LIMITS = {  # [s], balise gaps that the docstrings name

@@ -21,7 +21,7 @@ from fmu_observer.observers.generic.sampled import (
     MultirateSylvester,
     OutputPredictor,
 )
-from fmu_observer.observers.generic.sampled.hybrid_impulsive import hybrid_gains
+from fmu_observer.observers.generic.sampled.hybrid_impulsive import _hybrid_gains
 
 BISECTION = 5e-4  # relative: twice the tolerance of the search for the aperiodic limit, and the grid of the check
 SHIFT = np.array([[0.0, 1.0], [0.0, 0.0]])
@@ -136,7 +136,7 @@ def test_the_printed_gains_of_two_measurements_decay_as_measured() -> None:
 @pytest.mark.parametrize("gap", [0.05, 0.4, 1.1])
 def test_a_pure_jump_is_a_discrete_observer(gap: float) -> None:
     """With the whole correction at once z is zero, and the error moves by ``exp(A gap) (I - F C)``."""
-    L, H, F = hybrid_gains(np.array([[2.0], [1.0]]), 2.0, 1.0)
+    L, H, F = _hybrid_gains(np.array([[2.0], [1.0]]), 2.0, 1.0)
     observer = HybridImpulsive(chain(2))
     gains = {"flow_gain": L, "flow_matrix": H, "jump_gain": F}
     whole = expm(SHIFT * gap) @ (np.eye(2) - F @ C)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from fmu_observer.formulas.diagnosis.actuator_identification import ActuatorParameters, identified_actuator
+from fmu_observer.formulas.diagnosis.actuator_identification import _ActuatorParameters, identified_actuator
 from fmu_observer.formulas.diagnosis.redundancy import larger
 from fmu_observer.formulas.diagnosis.residual_filters import filtered, residual_filter, settled
 from fmu_observer.formulas.diagnosis.window_inversion import grid_around, invert, smoothed
@@ -100,7 +100,7 @@ def test_a_nominal_response_takes_the_bias_of_the_noise_off_the_actuators_parame
     noisy = true + 0.2 * rng.standard_normal(true.size)
     biased = identified_actuator(noisy, reference, 0.01)
     assert biased.damping < 0.9 * 0.6
-    nominal = ActuatorParameters(5.73, 0.45)  # far off
+    nominal = _ActuatorParameters(5.73, 0.45)  # far off
     assert identified_actuator(noisy, reference, 0.01, nominal=nominal) == pytest.approx((11.11, 0.6), rel=0.03)
     with pytest.raises(ValueError, match="one length"):
         identified_actuator(noisy[:-1], reference, 0.01)

@@ -5,10 +5,10 @@ import pytest
 from scipy import stats
 
 from fmu_observer.formulas.filtering.covariance_consistency import (
+    _independent_count,
+    _is_inside,
     average_over_runs,
     chi_square_band,
-    independent_count,
-    is_inside,
     judge,
     normalised_squares,
 )
@@ -52,8 +52,8 @@ def test_matched_filters_are_flagged_at_the_stated_rate(matched: tuple[np.ndarra
     most = float(stats.binom.ppf(0.999, SEEDS, 0.01)) / SEEDS
     assert sum(flagged(nis, 1.0, white=True).values()) <= most
     assert sum(flagged(nees[:, 20:], 2.0, white=False).values()) <= 0.05
-    assert np.mean(is_inside(nis, 1.0)) == pytest.approx(0.95, abs=0.005)  # 80 000 samples: 0.001
-    assert np.mean(is_inside(nees, 2.0)) == pytest.approx(0.95, abs=0.01)
+    assert np.mean(_is_inside(nis, 1.0)) == pytest.approx(0.95, abs=0.005)  # 80 000 samples: 0.001
+    assert np.mean(_is_inside(nees, 2.0)) == pytest.approx(0.95, abs=0.01)
 
 
 def test_the_average_over_runs_lies_in_its_band(matched: tuple[np.ndarray, np.ndarray]) -> None:
@@ -83,7 +83,7 @@ def test_independent_samples_of_a_first_order_series(rho: float) -> None:
     values = np.zeros(count)
     for k, draw in enumerate(random.normal(size=count - 1), start=1):
         values[k] = rho * values[k - 1] + draw
-    assert independent_count(values) == pytest.approx(count * (1.0 - rho) / (1.0 + rho), rel=0.15)
+    assert _independent_count(values) == pytest.approx(count * (1.0 - rho) / (1.0 + rho), rel=0.15)
 
 
 def test_bands_are_those_of_scipy() -> None:

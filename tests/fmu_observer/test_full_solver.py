@@ -14,7 +14,7 @@ from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost, arriv
 from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver, WindowError
 from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout
-from fmu_observer.formulas.moving_horizon.window_program import SweptProgram, WindowProgram
+from fmu_observer.formulas.moving_horizon.window_program import WindowProgram, _SweptProgram
 from plant_models.hybrid import vector
 
 LAYOUT = RowLayout(inputs=1, measurements=2)
@@ -247,7 +247,7 @@ def test_a_sweep_over_free_rows_is_the_programme_without_bounds(seed: int, count
     F = np.eye(order) + 0.3 * rng.normal(size=shape)
     F[0] = 0.0
     programme = A, b, F, G, 0.1 * rng.normal(size=(count, order))
-    swept, solved = (program(count, order).solve_free(*programme) for program in (SweptProgram, WindowProgram))
+    swept, solved = (program(count, order).solve_free(*programme) for program in (_SweptProgram, WindowProgram))
     assert swept.solved
     assert solved.solved
     for ours, theirs in zip(swept[:3], solved[:3], strict=True):

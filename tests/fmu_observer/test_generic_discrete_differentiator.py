@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.formulas.differentiation import implicit_recursion as module
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
-from fmu_observer.formulas.differentiation.implicit_recursion import (
-    equation_coefficients,
-    implicit_step,
-    solve_first_filter_equation,
-)
 from fmu_observer.observers.generic.differentiators import ImplicitDifferentiator
+from fmu_observer.observers.generic.differentiators import implicit_differentiator as module
+from fmu_observer.observers.generic.differentiators.implicit_differentiator import (
+    _equation_coefficients,
+    _implicit_step,
+    _solve_first_filter_equation,
+)
 from plant_models.hybrid import Runtime
 
 Signal = Callable[[Any], Any]
@@ -76,9 +76,9 @@ def test_the_first_filter_equation_is_solved_to_rounding() -> None:
     largest = 0.0
     for row in rows[1:]:
         w, error = row[:nf], row[nf] - row[nf + n + 1]
-        w_next, _ = implicit_step(list(w), list(row[nf : nf + n + 1]), row[nf + n + 1], bound, tau)
+        w_next, _ = _implicit_step(list(w), list(row[nf : nf + n + 1]), row[nf + n + 1], bound, tau)
         b = -(tau**nf) / factorial(nf) * error - sum(tau**i / factorial(i) * w[i] for i in range(nf))
-        root, sign = solve_first_filter_equation(b, equation_coefficients(n + nf, bound, tau))
+        root, sign = _solve_first_filter_equation(b, _equation_coefficients(n + nf, bound, tau))
         largest = max(largest, abs(w_next[0] - sign * root ** (n + nf + 1)))
     assert largest < 3e-18
 
@@ -90,7 +90,7 @@ def test_the_root_is_that_of_the_polynomial(exponents: list[float], excess: floa
     right = 10.0**excess
     b = (a[0] + right) * (-1.0 if negative else 1.0)
     right = abs(b) - a[0]  # what is left of it after rounding
-    root, sign = solve_first_filter_equation(b, a)
+    root, sign = _solve_first_filter_equation(b, a)
     assert sign == (1.0 if negative else -1.0)
     if right <= 0.0:
         assert root == 0.0
@@ -103,10 +103,10 @@ def test_the_root_is_that_of_the_polynomial(exponents: list[float], excess: floa
 @given(st.lists(st.floats(-30.0, 5.0), min_size=2, max_size=6), st.floats(-30.0, 5.0))
 def test_the_fixed_number_of_iterations_is_enough(exponents: list[float], excess: float) -> None:
     a = [10.0**e for e in exponents]
-    few = solve_first_filter_equation(a[0] + 10.0**excess, a)[0]
+    few = _solve_first_filter_equation(a[0] + 10.0**excess, a)[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "ITERATIONS", 60)
-        many = solve_first_filter_equation(a[0] + 10.0**excess, a)[0]
+        many = _solve_first_filter_equation(a[0] + 10.0**excess, a)[0]
     assert few == pytest.approx(many, rel=1e-14, abs=1e-300)
 
 
@@ -118,15 +118,15 @@ def test_the_step_is_odd(orders: tuple[int, int], seed: int, tau: float) -> None
     """
     n, nf = orders
     w, z, f = np.split(np.random.default_rng(seed).normal(size=nf + n + 2), [nf, nf + n + 1])
-    plus, minus = implicit_step(list(w), list(z), f[0], 1.5, tau), implicit_step(list(-w), list(-z), -f[0], 1.5, tau)
+    plus, minus = _implicit_step(list(w), list(z), f[0], 1.5, tau), _implicit_step(list(-w), list(-z), -f[0], 1.5, tau)
     for a, b in zip(plus, minus, strict=True):
         np.testing.assert_array_equal(np.array(a), -np.array(b))
 
 
 def test_within_the_sliding_band_the_state_is_zero() -> None:
-    a = equation_coefficients(4, 2.0, 0.1)
+    a = _equation_coefficients(4, 2.0, 0.1)
     for share in (-1.0, -0.3, 0.0, 1.0):
-        assert solve_first_filter_equation(share * a[0], a) == (0.0, -share)
+        assert _solve_first_filter_equation(share * a[0], a) == (0.0, -share)
 
 
 def test_what_is_left_on_a_line_shrinks_with_the_powers_of_the_period() -> None:
@@ -156,7 +156,7 @@ def test_the_period_is_a_parameter_and_the_first_sample_only_reads() -> None:
     runtime.advance(0.249)
     assert runtime.x[5] == 3.0
     runtime.advance(0.25)
-    w, z = implicit_step([0.0] * 3, [2.0, 0.0], 3.0, 1.0, 0.25)
+    w, z = _implicit_step([0.0] * 3, [2.0, 0.0], 3.0, 1.0, 0.25)
     np.testing.assert_allclose(runtime.x, [*w, *z, 4.0, 1.0, 0.0], rtol=1e-14)
     assert ImplicitDifferentiator().condition({"sample_period": 0.1}).values["chatter_1"] == pytest.approx(0.1)
     with pytest.raises(ValueError, match="at least 1"):

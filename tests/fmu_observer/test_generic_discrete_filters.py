@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, circle_distance, transition_lipschitz
-from fmu_observer.models.discrete_model import transition, zero_order_hold
+from fmu_observer.models.discrete_model import _zero_order_hold, transition
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import find_model
@@ -145,7 +145,7 @@ def test_estimates_and_covariances_are_those_of_the_textbook(cls: type[ExtendedK
 def test_the_linear_filter_settles_at_the_riccati_solution() -> None:
     observer = KalmanFilter()
     p, model = observer.start_parameters(), linear_pendulum()
-    Ad, _ = zero_order_hold(model.A, model.B, T)
+    Ad, _ = _zero_order_hold(model.A, model.B, T)
     QN, RN = p[:4].reshape(2, 2), p[4:5].reshape(1, 1)
     _, P, _ = control.dlqe(Ad, np.eye(2), model.C, QN, RN)
     updated = P - P @ model.C.T @ np.linalg.inv(model.C @ P @ model.C.T + RN) @ model.C @ P
@@ -161,7 +161,7 @@ def test_the_covariance_is_that_of_the_errors() -> None:
     """300 runs with noises as declared: the mean of e' inv(P) e is 2, its standard deviation 2 / sqrt(300)."""
     observer, generator = KalmanFilter(), np.random.default_rng(11)
     p = observer.start_parameters()
-    Ad, _ = zero_order_hold(linear_pendulum().A, linear_pendulum().B, T)
+    Ad, _ = _zero_order_hold(linear_pendulum().A, linear_pendulum().B, T)
     root = np.linalg.cholesky(p[:4].reshape(2, 2))
     values = []
     for _ in range(300):

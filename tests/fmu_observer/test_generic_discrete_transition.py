@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
 from fmu_observer.design.noise_covariance import process_covariance
-from fmu_observer.models.discrete_model import transition, zero_order_hold
+from fmu_observer.models.discrete_model import _zero_order_hold, transition
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.train.freight_train_model import freight_train
@@ -25,7 +25,7 @@ def test_the_zero_order_hold_is_that_of_scipy(n: int, m: int, seed: int, size: f
     A, B = generator.normal(size=(n, n)), generator.normal(size=(n, m))
     period = 10.0**size / max(np.linalg.norm(np.hstack([A, B]), 2), 1e-9)
     Ad, Bd, *_ = cont2discrete((A, B, np.eye(n), np.zeros((n, m))), period)
-    found = zero_order_hold(A, B, period)
+    found = _zero_order_hold(A, B, period)
     largest = np.exp(10.0**size)  # squaring six times costs 2^6 roundings of the largest exponential there can be
     np.testing.assert_allclose(found[0], Ad, atol=1e-13 * largest)
     np.testing.assert_allclose(found[1], Bd, atol=1e-13 * largest)
@@ -33,9 +33,9 @@ def test_the_zero_order_hold_is_that_of_scipy(n: int, m: int, seed: int, size: f
 
 def test_it_traces_with_the_period_as_a_symbol() -> None:
     period = ca.SX.sym("T")
-    Ad, Bd = zero_order_hold(linear_pendulum().A, linear_pendulum().B, ca.ArrayInterface.SX(period, shape=()))
+    Ad, Bd = _zero_order_hold(linear_pendulum().A, linear_pendulum().B, ca.ArrayInterface.SX(period, shape=()))
     traced = ca.Function("hold", [period], [ca.SX(Ad), ca.SX(Bd)])(0.3)
-    for one, other in zip(traced, zero_order_hold(linear_pendulum().A, linear_pendulum().B, 0.3), strict=True):
+    for one, other in zip(traced, _zero_order_hold(linear_pendulum().A, linear_pendulum().B, 0.3), strict=True):
         np.testing.assert_allclose(np.asarray(one), other, rtol=1e-14, atol=1e-15)
 
 

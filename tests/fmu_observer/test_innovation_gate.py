@@ -24,10 +24,10 @@ from fmu_observer.observers.innovation_gate import (
     OFF,
     REJECT,
     WARN,
-    GateJudgement,
     GateMemory,
     ReportedPlace,
-    gate_limit,
+    _gate_limit,
+    _GateJudgement,
     judge,
 )
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
@@ -114,7 +114,7 @@ LIMIT = 0.5 + 0.2 + SINCE + 3.0 * 0.4
 """Of `SETTLED` and `judged`: floor, accuracy, the way since 60 m, and of the recent innovation [m]."""
 
 
-def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> GateJudgement:
+def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> _GateJudgement:
     """The judgement on a position so far from an estimate of 100 m."""
     return judge(before, ReportedPlace(100.0 - innovation, 0.2, 100.0, 0.3, 0.0, 10.0)._replace(**told), GATE)
 
@@ -136,9 +136,9 @@ def test_the_share_of_the_way_is_learnt_within_creep_and_drift(share: float, gra
     before = SETTLED._replace(share=share, left=0.0, recent=0.0)
     told = ReportedPlace(0.0, 0.0, 100.0, 0.0, 10.0, 10.0)
     for change, floor in ((0.0, 0.01), (0.15, 0.03), (-0.15, 0.03), (1.0, 0.05)):  # of the speed [m/s2]
-        limit = float(gate_limit(before._replace(last_odometer=10.0 + 10.0 * change), told, GATE))
+        limit = float(_gate_limit(before._replace(last_odometer=10.0 + 10.0 * change), told, GATE))
         assert limit == pytest.approx(0.5 + max(granted, floor) * 40.0)
-    assert float(gate_limit(before, told._replace(odometer=None), GATE)) == pytest.approx(0.5 + 0.05 * 40.0)
+    assert float(_gate_limit(before, told._replace(odometer=None), GATE)) == pytest.approx(0.5 + 0.05 * 40.0)
 
 
 def test_what_is_remembered_of_a_telegram() -> None:

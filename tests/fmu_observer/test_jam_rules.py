@@ -23,7 +23,7 @@ from fmu_observer.detection.jam_rules import (
     Passing,
     Reading,
     RepairedRules,
-    agreement_limit,
+    _agreement_limit,
     certain_fault,
 )
 from fmu_observer.observers.train import QuasiLpvUio
@@ -192,7 +192,7 @@ def test_agreement_widens_with_the_time_held_and_takes_two_samples() -> None:
         second = repaired(first.memory, 20.0 - gap, 20.0)
         assert second.memory.odometer_mode == expected
         assert second.restart == (expected == TRUSTED)
-    assert float(agreement_limit(2.0, P)) == pytest.approx(0.9 + 2.3 * 0.1 * 2.0)
+    assert float(_agreement_limit(2.0, P)) == pytest.approx(0.9 + 2.3 * 0.1 * 2.0)
 
 
 def test_a_wheel_that_jumps_does_not_roll() -> None:

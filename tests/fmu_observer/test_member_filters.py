@@ -8,7 +8,7 @@ from scipy import stats
 from fmu_observer.formulas.filtering import ensemble, particles
 from fmu_observer.formulas.filtering.covariance_consistency import judge
 from fmu_observer.formulas.filtering.smoothing import extended_pass
-from fmu_observer.models.discrete_model import zero_order_hold
+from fmu_observer.models.discrete_model import _zero_order_hold
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
 from fmu_observer.models.traced_system_model import system_model
 from fmu_observer.observers.generic.discrete import EnsembleKalmanFilter, ParticleFilter
@@ -141,7 +141,7 @@ def test_as_systems_they_follow_the_kalman_filter(filter_class: type) -> None:
     """Of the linear pendulum, 50 members, from the fifth sample on; errors in standard deviations of the filter,
     medians over nine seeds: of 30 the largest error of the particles was 0.6 to 4.4, above 1.5 in 8.
     """
-    count, A, B = 40, *zero_order_hold(linear_pendulum().A, linear_pendulum().B, 0.1)
+    count, A, B = 40, *_zero_order_hold(linear_pendulum().A, linear_pendulum().B, 0.1)
     torques, random = np.sin(0.37 * np.arange(count)), np.random.default_rng(1)
     angles = 0.3 * np.cos(0.1 * np.arange(count + 1)) + 0.1 * random.normal(size=count + 1)
     noise = 1e-3 * np.eye(2)

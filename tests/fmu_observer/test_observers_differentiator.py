@@ -7,9 +7,9 @@ import pytest
 from observer_runner import INERTIA, RADIUS, SteadyMotion, SystemRunner
 
 from fmu_observer.formulas.differentiation.differentiator import (
+    _signed_power,
     differentiator_flow,
     filtering_differentiator_flow,
-    signed_power,
 )
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.observers.train import DifferentiatorCdo
@@ -83,8 +83,8 @@ def test_table_rows_and_errors() -> None:
 
 
 def test_signed_power() -> None:
-    np.testing.assert_allclose(signed_power(np.array([-8.0, 0.0, 8.0]), 1, 3), [-2.0, 0.0, 2.0])
-    np.testing.assert_array_equal(signed_power(np.array([-8.0, 0.0, 8.0]), 0, 3), [-1.0, 0.0, 1.0])
+    np.testing.assert_allclose(_signed_power(np.array([-8.0, 0.0, 8.0]), 1, 3), [-2.0, 0.0, 2.0])
+    np.testing.assert_array_equal(_signed_power(np.array([-8.0, 0.0, 8.0]), 0, 3), [-1.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("jerk_bound", [1.0, 10.0, 100.0])

@@ -14,9 +14,9 @@ from scipy.signal import lsim
 
 from fmu_observer.design.quasi_lpv_published import PUBLISHED, SECTION_3_3_4, SECTION_5_3_1, SEEN, QuasiLpvDesign
 from fmu_observer.design.residual_analysis import (
+    _level_crossings,
     bands_above,
     h_infinity_norm,
-    level_crossings,
     minimum_fault,
     minimum_gain,
     pulse_ratio,
@@ -103,7 +103,7 @@ def test_degenerate_channels() -> None:
     silent = ResidualChannel(-np.eye(2), np.zeros((2, 1)), np.eye(2), np.zeros((2, 1)))
     assert h_infinity_norm(silent) == 0.0
     assert minimum_gain(random_channel(1, q=1, k=2)) == 0.0  # two faults in one residual can cancel
-    assert len(level_crossings(LAG, 2.0)) == 0
+    assert len(_level_crossings(LAG, 2.0)) == 0
 
 
 @pytest.mark.parametrize("length", [0.3, 2.0, 50.0])

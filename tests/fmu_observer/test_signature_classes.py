@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 
 from fmu_observer.detection import WheelSignature
 from fmu_observer.detection.wheel_classes import WHEEL_CLASSES
-from fmu_observer.detection.wheel_signature import CODES, record_class
+from fmu_observer.detection.wheel_signature import CODES, _record_class
 from fmu_observer.formulas.signatures.classification import PencilSpace, SeparationError, train_classifier
 from fmu_observer.formulas.signatures.clouds import Coordinate, extent, separation
 from fmu_observer.formulas.signatures.conditional_estimate import train_conditional, train_curve
@@ -231,7 +231,7 @@ def test_the_detector_decides_as_its_classifier():
     records = np.random.default_rng(4).normal(-0.2, 1.0, (4, 300))
     classified = WHEEL_CLASSES.classify(records, strip=0.0).index
     codes = np.array([CODES[str(label)] for label in WHEEL_CLASSES.labels])[classified]
-    np.testing.assert_array_equal(record_class(WHEEL_CLASSES, list(records)), codes)
+    np.testing.assert_array_equal(_record_class(WHEEL_CLASSES, list(records)), codes)
     assert set(codes) == {-1.0, 0.0, 1.0}
 
 

@@ -6,7 +6,7 @@ import pytest
 import fmus
 from fmu_observer.formulas.diagnosis.finite_window_observer import sampled
 from fmu_observer.observers.exhibits.drive_train_residuals import torsion_gains
-from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS, simulated_speed
+from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS, _simulated_speed
 from fmu_observer.observers.exhibits.wind_turbine_diagnosis import ALARM_NAMES, WindTurbineDiagnosis
 from fmu_observer.observers.exhibits.wind_turbine_limits import WARNINGS
 from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
@@ -214,7 +214,7 @@ def test_the_slow_mode_is_that_of_the_drive_train() -> None:
         for u in zip(driving, braking, strict=True):
             x = A @ x + B @ np.array(u)
         # The shaft still swings after the last block, by its torsion of 1e-3 rad times 15 to 28 rad/s, times Ng.
-        found = simulated_speed(np.array([efficiency]), 1.6 * 95.0, driving, braking, 10.0, p)
+        found = _simulated_speed(np.array([efficiency]), 1.6 * 95.0, driving, braking, 10.0, p)
         assert found == pytest.approx(x[1], abs=1e-4 * 28.0 * 95.0)
 
 

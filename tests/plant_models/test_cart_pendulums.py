@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from plant_models.exhibits import CartDoublePendulum, CartPendulum, StateFeedback
-from plant_models.exhibits.cart_double_pendulum import (
-    SECTION_IV_2_2_3,
-    accelerations,
-    mass_matrix,
-    right_hand_side,
-)
+from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3, _mass_matrix, _right_hand_side, accelerations
 from plant_models.exhibits.cart_pendulum import TABLE_4_1
 from plant_models.exhibits.cart_pendulum import accelerations as accelerations_of_one
 from plant_models.exhibits.noisy_plant import NoisyPlant
@@ -68,8 +63,8 @@ class Solved(NamedTuple):
 
 
 def linear_system(x: np.ndarray, u: float) -> Solved:
-    a11, a12, a13, a22, a23, a33 = mass_matrix(x[2::2], SECTION_IV_2_2_3)
-    right = right_hand_side(x[2::2], x[3::2], u, SECTION_IV_2_2_3)
+    a11, a12, a13, a22, a23, a33 = _mass_matrix(x[2::2], SECTION_IV_2_2_3)
+    right = _right_hand_side(x[2::2], x[3::2], u, SECTION_IV_2_2_3)
     return Solved(np.array([[a11, a12, a13], [a12, a22, a23], [a13, a23, a33]]), np.array(right))
 
 

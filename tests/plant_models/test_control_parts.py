@@ -10,9 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models.railway.control import MdpeController
-from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
-from plant_models.railway.control.effort_limits import electric_brake_limit, stepped_towards, traction_limit
-from plant_models.railway.control.mdpe_controller import _coupler_headroom, _effort_steps, _next_available_effort
+from plant_models.railway.control.brake_blending import air_brake_demand, electric_part
+from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
+from plant_models.railway.control.mdpe_controller import (
+    _built_up_after,
+    _coupler_headroom,
+    _effort_steps,
+    _next_available_effort,
+    _stepped_towards,
+)
 from plant_models.railway.control.mode_switch import Situation, next_level, next_mode
 from plant_models.railway.control.sampled_regulator import pole_placement, tracking_integral, wanted_force
 
@@ -56,7 +62,7 @@ def test_the_electric_brake_fades_at_low_speed() -> None:
 
 @given(previous=FORCES, wanted=FORCES, down=st.floats(0.0, 1e5), up=st.floats(0.0, 1e5))
 def test_a_step_is_never_larger_than_allowed(previous: float, wanted: float, down: float, up: float) -> None:
-    step = stepped_towards(previous, wanted, down, up) - previous
+    step = _stepped_towards(previous, wanted, down, up) - previous
     assert -down - 1e-6 <= step <= up + 1e-6
     if -down <= wanted - previous <= up:
         assert step == pytest.approx(wanted - previous, abs=1e-6)
@@ -79,8 +85,8 @@ def test_the_air_brake_is_asked_for_its_share() -> None:
 
 
 def test_air_builds_up_quickly_and_is_released_slowly() -> None:
-    assert built_up_after(0.0, 100.0, 1.5, 1.5, 8.0) == pytest.approx(100.0 * (1.0 - np.exp(-1.0)))
-    assert built_up_after(100.0, 0.0, 8.0, 1.5, 8.0) == pytest.approx(100.0 * np.exp(-1.0))
+    assert _built_up_after(0.0, 100.0, 1.5, 1.5, 8.0) == pytest.approx(100.0 * (1.0 - np.exp(-1.0)))
+    assert _built_up_after(100.0, 0.0, 8.0, 1.5, 8.0) == pytest.approx(100.0 * np.exp(-1.0))
 
 
 def test_the_headroom_of_a_coupler_falls_from_its_soft_limit_through_zero_at_the_limit() -> None:
@@ -93,7 +99,7 @@ def test_the_headroom_of_a_coupler_falls_from_its_soft_limit_through_zero_at_the
 @given(effort=FORCES, coupler=st.floats(-600e3, 600e3), wanted=st.one_of(st.just(0.0), FORCES))
 def test_a_loaded_coupler_is_not_loaded_further(effort: float, coupler: float, wanted: float) -> None:
     down, up = _effort_steps(effort, coupler, 6.8e3, 150e3, 250e3)
-    after = stepped_towards(effort, wanted, down, up)
+    after = _stepped_towards(effort, wanted, down, up)
     assert abs(after - effort) <= 6.8e3 + 1e-6
     if coupler >= 250e3:
         assert after <= max(effort, 0.0)

@@ -20,8 +20,8 @@ import pytest
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.disk_cache import files, identity
-from plant_models.disk_cache.entries import entry_path, recall, remembered
-from plant_models.disk_cache.identity import _Description, _NoIdentityError, folder_digest
+from plant_models.disk_cache.entries import _entry_path, recall, remembered
+from plant_models.disk_cache.identity import _Description, _folder_digest, _NoIdentityError
 from plant_models.hybrid import HybridSystem, Signal, kernel, parameter
 
 KEY = "0" * 64
@@ -50,7 +50,7 @@ def test_nothing_is_kept_without_a_key_or_of_what_fails() -> None:
     assert remembered("trial", None, lambda: (1, 2)) == (1, 2)
     with pytest.raises(ZeroDivisionError):
         remembered("trial", KEY, lambda: 1 / 0)
-    assert not entry_path("trial", KEY).parent.exists()
+    assert not _entry_path("trial", KEY).parent.exists()
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_a_damaged_or_foreign_entry_is_told_and_made_again(
     damage: Any, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     remembered("trial", KEY, lambda: {"gap": 0.5})
-    path = entry_path("trial", KEY)
+    path = _entry_path("trial", KEY)
     path.write_bytes(damage(path.read_bytes()))
     assert remembered("trial", KEY, lambda: {"gap": 0.5}) == {"gap": 0.5}
     assert words in caplog.text
@@ -79,7 +79,7 @@ def test_a_damaged_or_foreign_entry_is_told_and_made_again(
 
 
 def test_an_entry_that_cannot_be_read_or_written_stops_nobody(caplog: pytest.LogCaptureFixture) -> None:
-    entry_path("trial", KEY).mkdir(parents=True)  # a folder in its place
+    _entry_path("trial", KEY).mkdir(parents=True)  # a folder in its place
     with caplog.at_level(logging.INFO, "plant_models"):
         assert remembered("trial", KEY, lambda: 3) == 3
     assert "is not used and made again" in caplog.text
@@ -92,7 +92,7 @@ def test_many_at_once_find_whole_entries() -> None:
 
     with ThreadPoolExecutor(8) as pool:
         assert set(pool.map(work, range(8))) == {1_000_000}
-    assert not list(entry_path("trial", KEY).parent.glob(".*"))
+    assert not list(_entry_path("trial", KEY).parent.glob(".*"))
 
 
 # -- seals ------------------------------------------------------------------------------------------------------------
@@ -230,7 +230,7 @@ def test_versions_count(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_code_that_changed_after_it_was_loaded_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    folder_digest.cache_clear()
+    _folder_digest.cache_clear()
     monkeypatch.setattr(identity, "LOADED_AT", 0.0)
     assert identity.identity(1) is None
     monkeypatch.setattr(identity, "LOADED_AT", time.time())
@@ -253,4 +253,4 @@ def test_a_kernel_from_the_cache_is_the_traced_one(name: str, monkeypatch: pytes
 @pytest.mark.parametrize("name", ["no_such_package_anywhere", "__future__"])
 def test_what_is_no_folder_on_disk_has_no_digest(name: str) -> None:
     with pytest.raises(_NoIdentityError, match=f"files of {name} are not on disk"):
-        folder_digest(name)
+        _folder_digest(name)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from plant_models.hybrid.noise import Purpose, philox4x32, seed_of, standard_normal, uniform_pair
+from plant_models.hybrid.noise import Purpose, _philox4x32, seed_of, standard_normal, uniform_pair
 
 FULL = 0xFFFFFFFF
 
@@ -24,7 +24,7 @@ FULL = 0xFFFFFFFF
     ],
 )
 def test_philox_gives_the_published_vectors(counter: tuple, key: tuple, expected: tuple) -> None:
-    assert philox4x32(counter, key) == expected
+    assert _philox4x32(counter, key) == expected
 
 
 def test_uniform_numbers_lie_inside_the_open_interval_and_are_uniform() -> None:
@@ -64,7 +64,7 @@ def test_names_are_hashed_as_fnv_says() -> None:
     over hash and run seed.
     """
     for name, hashed in (("", 0xCBF29CE484222325), ("a", 0xAF63DC4C8601EC8C), ("foobar", 0x85944171F73967E8)):
-        words = philox4x32((hashed & 0xFFFFFFFF, hashed >> 32, 7, 0), (0x73656564, 0))
+        words = _philox4x32((hashed & 0xFFFFFFFF, hashed >> 32, 7, 0), (0x73656564, 0))
         assert seed_of(7, name) == (words[0] >> 5) * 2**26 + (words[1] >> 6)
 
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models import Locomotive
-from plant_models.railway.track.table import piecewise_constant, piecewise_linear
-from plant_models.railway.track.track import Track
+from plant_models.railway.track.table import piecewise_linear
+from plant_models.railway.track.track import Track, _piecewise_constant
 from plant_models.railway.vehicle.resistance import davis_from_vehicle, gradient_resistance, moving_resistance
 
 BB27000 = {"mass": 90e3, "axle_mass": 22.5e3, "cross_section": 2.857 * 4.31, "perimeter": 2.857, "length": 19.5}
@@ -71,7 +71,7 @@ def test_padded_points_and_jumps_of_a_broken_line() -> None:
 @given(points=POINTS, at=st.floats(-20.0, 350.0))
 def test_a_staircase_holds_the_last_point(points: tuple[np.ndarray, np.ndarray], at: float) -> None:
     x, y = points
-    assert piecewise_constant(at, x, y) == y[max(np.searchsorted(x, at, side="right") - 1, 0)]
+    assert _piecewise_constant(at, x, y) == y[max(np.searchsorted(x, at, side="right") - 1, 0)]
 
 
 def test_a_track_lies_along_time_or_position() -> None:

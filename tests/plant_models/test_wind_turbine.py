@@ -16,7 +16,7 @@ from scipy.linalg import expm
 import cosim
 from plant_models.exhibits.wind_turbine import Wind, WindTurbine, WindTurbineController
 from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
-from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain, power_coefficient
+from plant_models.exhibits.wind_turbine.rotor import Rotor, _power_coefficient, optimal_torque_gain
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 EIGENVALUES = (  # of the specification, with as many digits as it has
@@ -59,16 +59,16 @@ def test_gain_of_the_best_torque() -> None:
 
 def test_the_stand_in_has_the_largest_coefficient_of_the_benchmark() -> None:
     ratios = np.linspace(0.1, 20.0, 2000)
-    values = power_coefficient(ratios, 0.0 * ratios, 0.4554)
+    values = _power_coefficient(ratios, 0.0 * ratios, 0.4554)
     assert values.max() == pytest.approx(0.4554, rel=2e-3)  # 0.48 is Heier's maximum to two digits
     assert ratios[values.argmax()] == pytest.approx(8.1, abs=0.1)
-    assert (np.diff([power_coefficient(8.0, pitch, 0.4554) for pitch in (0.0, 2.0, 5.0, 10.0, 20.0)]) < 0.0).all()
+    assert (np.diff([_power_coefficient(8.0, pitch, 0.4554) for pitch in (0.0, 2.0, 5.0, 10.0, 20.0)]) < 0.0).all()
 
 
 def test_the_rotor_takes_the_share_of_the_power_that_its_coefficient_says() -> None:
     rotor, wind, speed = Rotor(), 11.0, 1.4
     power = rotor.torque(wind, speed, (3.0, 3.0, 3.0)) * speed
-    share = power_coefficient(speed * rotor.radius / wind, 3.0, 0.4554)
+    share = _power_coefficient(speed * rotor.radius / wind, 3.0, 0.4554)
     assert power == pytest.approx(0.5 * 1.225 * np.pi * 57.5**2 * wind**3 * share, rel=1e-12)
 
 

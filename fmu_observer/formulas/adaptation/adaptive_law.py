@@ -201,13 +201,8 @@ def error_drift(plant: Plant, gains: Gains, sizes: Sizes, predicts: bool) -> Arr
     return np.vstack([top, middle, np.zeros((q, n + m + q))])
 
 
-def own_excitation(E: Array, size: int, guard: Array = _TINY) -> Array:
-    """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
-
-    Args:
-        E: mean Gramian, shape (m, m). size: m, 1 to 3. guard: added to the diagonal for the others, so that rounding
-            does not decide where they cannot be distinguished.
-    """
+def _own_excitation(E: Array, size: int, guard: Array = _TINY) -> Array:
+    """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,)."""
     if size == 1:
         return vector(E[0, 0])
     own = [E[i, i] + guard for i in range(size)]
@@ -227,7 +222,7 @@ def learnt_constants(E: Array, least: Array, size: int) -> Array:
     Args:
         E: mean Gramian, shape (m, m). least: excitation below which a constant is held; 0 for never. size: m.
     """
-    found = own_excitation(E, size, _GUARD * least + _TINY)
+    found = _own_excitation(E, size, _GUARD * least + _TINY)
     return vector(*(np.where(least > 0.0, np.where(found[i] >= least, 1.0, 0.0), 1.0) for i in range(size)))
 
 

@@ -12,7 +12,7 @@ import scipy
 from fmu_observer.formulas.diagnosis.residual_filters import ResidualFilter, residual_filter
 
 
-class ActuatorParameters(NamedTuple):
+class _ActuatorParameters(NamedTuple):
     """Parameters of ``y'' = wn^2 (r - y) - 2 zeta wn y'``.
 
     Attributes:
@@ -28,8 +28,8 @@ def identified_actuator(
     reference: np.ndarray,
     sample_period: float,
     time_constant: float = 0.06,
-    nominal: ActuatorParameters | None = None,
-) -> ActuatorParameters:
+    nominal: _ActuatorParameters | None = None,
+) -> _ActuatorParameters:
     """Parameters for which the filtered model holds best over a recording: Omar 2012, (7.6.2), (7.6.8).
 
     The thesis has least squares in mind. The noise of the reading stands on both sides of them, and they are biased.
@@ -57,7 +57,7 @@ def identified_actuator(
     square, slope = np.linalg.solve(moments, instruments[:2] @ -rows[2])
     if square <= 0.0:
         raise ValueError(f"identified_actuator: wn^2 comes out as {square:g}: too much noise, or too little motion.")
-    return ActuatorParameters(float(np.sqrt(square)), float(slope / (2.0 * np.sqrt(square))))
+    return _ActuatorParameters(float(np.sqrt(square)), float(slope / (2.0 * np.sqrt(square))))
 
 
 def _recordings(measured: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -70,7 +70,7 @@ def _recordings(measured: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray
     return reading, asked
 
 
-def _response(actuator: ActuatorParameters, reference: np.ndarray, sample_period: float) -> np.ndarray:
+def _response(actuator: _ActuatorParameters, reference: np.ndarray, sample_period: float) -> np.ndarray:
     """Positions at the samples of an actuator that rests at the first reference, shape (samples,)."""
     square, slope = actuator.frequency**2, 2.0 * actuator.damping * actuator.frequency
     held = scipy.signal.cont2discrete(([square], [1.0, slope, square]), sample_period)

@@ -35,7 +35,7 @@ def differentiator_flow(z: Sequence[Array], signal: Array, L: Array) -> list[Arr
     gains = _gains(n)
     error = z[0] - signal
     return [
-        -gains[n - i] * power(L, i + 1, n + 1) * signed_power(error, n - i, n + 1) + _next(z, i) for i in range(n + 1)
+        -gains[n - i] * power(L, i + 1, n + 1) * _signed_power(error, n - i, n + 1) + _next(z, i) for i in range(n + 1)
     ]
 
 
@@ -65,9 +65,9 @@ def filtering_differentiator_flow(
     m = n + nf
     gains = _gains(m)
     chain = [*w, z[0] - signal]
-    dw = [-gains[m - i] * power(L, i + 1, m + 1) * signed_power(w[0], m - i, m + 1) + chain[i + 1] for i in range(nf)]
+    dw = [-gains[m - i] * power(L, i + 1, m + 1) * _signed_power(w[0], m - i, m + 1) + chain[i + 1] for i in range(nf)]
     dz = [
-        -gains[n - j] * power(L, nf + 1 + j, m + 1) * signed_power(w[0], n - j, m + 1) + _next(z, j)
+        -gains[n - j] * power(L, nf + 1 + j, m + 1) * _signed_power(w[0], n - j, m + 1) + _next(z, j)
         for j in range(n + 1)
     ]
     return dw, dz
@@ -88,7 +88,7 @@ def power(value: Array, numerator: int, denominator: int) -> Array:
     return result
 
 
-def signed_power(value: Array, numerator: int, denominator: int) -> Array:
+def _signed_power(value: Array, numerator: int, denominator: int) -> Array:
     """``|value|^(numerator/denominator) sgn(value)``."""
     return np.sign(value) if numerator == 0 else power(np.abs(value), numerator, denominator) * np.sign(value)
 

@@ -110,17 +110,11 @@ def chi_square_band(degrees: float, count: float = 1.0, level: float = _POINTWIS
     return Band(low, high, level)
 
 
-def independent_count(values: np.ndarray) -> float:
+def _independent_count(values: np.ndarray) -> float:
     """How many independent numbers a correlated series is worth for its mean.
 
     ``N / (1 + 2 sum rho)``, the sum of the autocorrelations cut where a pair of them is no longer positive: Geyer,
     Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
-
-    Args:
-        values: shape (rows,), in order of time, evenly spaced.
-
-    Returns:
-        At least 1, at most the number of rows.
     """
     count = len(values)
     centred = values - values.mean()
@@ -142,8 +136,8 @@ def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, leve
     Args:
         squares: NEES or NIS of each sample, shape (rows,), in order of time; those that are NaN are left out.
         degrees: degrees of freedom, one number or one a sample, shape (rows,).
-        white: whether samples do not depend on each other, as those of NIS; otherwise `independent_count` says how many
-            there are.
+        white: whether samples do not depend on each other, as those of NIS; otherwise `_independent_count` says how
+            many there are.
         level: share of consistent filters that pass.
 
     Returns:
@@ -157,9 +151,9 @@ def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, leve
     of_one, mean = float(each.mean()), float(values.mean())
     if not isfinite(mean):
         return Consistency(of_one, mean, len(values), nan, nan, Band(nan, nan, level), "not finite")
-    independent = float(len(values)) if white else independent_count(values / each)
+    independent = float(len(values)) if white else _independent_count(values / each)
     band = chi_square_band(of_one, independent, level)
-    inside = float(np.mean(is_inside(values, each)))
+    inside = float(np.mean(_is_inside(values, each)))
     verdict: Verdict = "consistent"
     if independent < _FEWEST:
         verdict = "too few samples"
@@ -168,13 +162,8 @@ def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, leve
     return Consistency(of_one, mean, len(values), independent, inside, band, verdict)
 
 
-def is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = _POINTWISE) -> np.ndarray:
-    """Which samples lie inside the band of one, shape (rows,).
-
-    Args:
-        squares: NEES or NIS, shape (rows,). degrees: of freedom, one number or one a sample.
-        level: probability of a sample of a consistent filter.
-    """
+def _is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = _POINTWISE) -> np.ndarray:
+    """Which samples lie inside the band of one, shape (rows,)."""
     low, high = (quantile(degrees, share) for share in _tails(level))
     return np.asarray((squares >= low) & (squares <= high))
 

@@ -203,7 +203,7 @@ class WindowProgram:
         return found[0].copy(), found[2].copy(), status
 
 
-class SweptProgram(WindowProgram):
+class _SweptProgram(WindowProgram):
     """One that sweeps over the rows where no bound counts, which is quicker; the solver has the rest."""
 
     def solve_free(self, A: np.ndarray, b: np.ndarray, F: np.ndarray, G: np.ndarray, c: np.ndarray) -> Step:
@@ -220,7 +220,7 @@ def window_program(count: int, order: int, disturbed: tuple[int, ...] = ()) -> W
     Args:
         count: N, rows. order: n, states. disturbed: states whose noises have bounds.
     """
-    return SweptProgram(count, order, disturbed=disturbed)
+    return _SweptProgram(count, order, disturbed=disturbed)
 
 
 def _sparsity(counts: list[np.ndarray], rows: list[np.ndarray], height: int | None = None) -> Any:

@@ -62,20 +62,12 @@ def sample_torques(m: Any, generator: Array, driving: Array, braking: Array) -> 
     }
 
 
-def simulated_speed(efficiency: Array, start: Array, driving: Array, braking: Array, period: Array, p: Any) -> Array:
+def _simulated_speed(efficiency: Array, start: Array, driving: Array, braking: Array, period: Array, p: Any) -> Array:
     """Generator speed after the blocks of a window.
 
     The two inertias turn as one, ``(Jr + Ng^2 Jg / eta) w' = tau_r - (Br + Ng^2 Bg / eta) w - Ng tau_g / eta``, exact
     for torques held over a block. Left out is the twisting of the shaft: it swings with 28 rad/s and is gone after a
     minute (its time constant is 18 s), so that windows of some minutes do not see it.
-
-    Args:
-        efficiency: values of eta [1], shape (k,). start: generator speed where the window begins [rad/s].
-        driving: mean torques on the rotor, oldest first [N.m]. braking: of the generator [N.m].
-        period: length of a block [s]. p: parameters with `EFFICIENCY_PARAMETERS` and `gear_ratio`.
-
-    Returns:
-        Speeds [rad/s], shape (k,).
 
     Source:
         Omar 2012, (7.3.3), repaired, reduced to its slow mode.
@@ -122,7 +114,7 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Array]:
     grid = grid_around(previous, VALUES, *bounds)
     start = m.generator_starts[0]  # where the oldest of the moved blocks began
     torques = (moved["driving_means"], moved["braking_means"])
-    ends_there = simulated_speed(vector(*grid), start, *torques, p.update_period, p)
+    ends_there = _simulated_speed(vector(*grid), start, *torques, p.update_period, p)
     found = invert(grid, [ends_there[i] - m.last_generator for i in range(VALUES)], previous)
     full = full_blocks > BLOCKS + 0.5  # the block before the window tells where it begins
     return {

@@ -19,18 +19,11 @@ HEIER_LARGEST = 0.48
 LEAST_WIND, LEAST_RATIO = 0.1, 0.1  # [m/s], [1]: below them the formula is held, so that nothing is divided by zero
 
 
-def power_coefficient(ratio: Array, pitch: Array, largest: Array) -> Array:
+def _power_coefficient(ratio: Array, pitch: Array, largest: Array) -> Array:
     """Share of the wind's power that the rotor takes, by Heier's formula (a stand-in for the table that is missing).
 
     ``1 / l = 1 / (ratio + 0.08 b) - 0.035 / (b^3 + 1)`` and ``Cp = c (0.5176 (116 / l - 0.4 b - 5) exp(-21 / l) +
     0.0068 ratio)``, with c chosen so that the largest value is `largest`.
-
-    Args:
-        ratio: tip speed over wind speed [1], scalar or shape (members,). pitch: angle b of the blade [deg], taken as
-            zero below zero. largest: largest coefficient [1].
-
-    Returns:
-        Power coefficient [1], of the shape of `ratio`; negative where the wind is too slow for the rotor.
 
     Source: Heier, Grid Integration of Wind Energy, 1998; its place in the benchmark is ours.
     """
@@ -67,7 +60,7 @@ class Rotor(NamedTuple):
         """
         blowing = np.maximum(wind, LEAST_WIND)
         ratio = np.maximum(speed * self.radius / blowing, LEAST_RATIO)
-        taken = sum(power_coefficient(ratio, pitch, self.largest_coefficient) for pitch in pitches)
+        taken = sum(_power_coefficient(ratio, pitch, self.largest_coefficient) for pitch in pitches)
         swept = np.pi * self.radius * self.radius * self.radius
         return self.air_density * swept / 6.0 * taken * blowing * blowing / ratio
 

@@ -30,14 +30,3 @@ def electric_part(force: Array, built_up: Array, brake_limit: Array) -> Array:
         force: wanted brake force [N], < 0. built_up: force of the air brake by now [N], >= 0. brake_limit: [N], >= 0.
     """
     return np.maximum(np.minimum(force + built_up, 0.0), -brake_limit)
-
-
-def built_up_after(built_up: Array, asked: Array, period: Array, build_up_time: Array, release_time: Array) -> Array:
-    """Force [N] to which `building_up` leads within a period [s] of constant demand, exactly.
-
-    Args:
-        built_up: force at the start of the period [N]. asked: demanded force [N].
-        build_up_time, release_time: from none to full force and back [s].
-    """
-    time = np.where(asked > built_up, build_up_time, release_time)
-    return asked + np.exp(-period / time) * (built_up - asked)

@@ -29,11 +29,3 @@ def electric_brake_limit(speed: Array, brake_limit: Array, fade_start: Array, fa
     """
     width = np.maximum(fade_start - fade_end, 1e-9)
     return brake_limit * np.clip((np.abs(speed) - fade_end) / width, 0.0, 1.0)
-
-
-def stepped_towards(previous: Array, wanted: Array, down: Array, up: Array) -> Array:
-    """`wanted`, or as near to it as a step of at most `down` below and `up` above `previous` comes, any one unit.
-
-    A negative `up` (or `down`) demands a step of at least that size the other way.
-    """
-    return previous + np.minimum(np.maximum(wanted - previous, -down), up)

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
+from plant_models.railway.control.brake_blending import air_brake_demand, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
-from plant_models.railway.control.effort_limits import electric_brake_limit, stepped_towards, traction_limit
+from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.mode_switch import (
     COMBINED,
@@ -207,7 +207,7 @@ class MdpeController(HybridSystem):
         target = either(standing, 0.0, regulated.target)
         effort, demand = _share(x, mode, target, standing, limits, p)
         asked = demand * p.full_brake_force
-        built_up = built_up_after(
+        built_up = _built_up_after(
             x.built_up_brake, asked, p.control_period, p.brake_build_up_time, p.brake_release_time
         )
         sanding = every(sliding, holds(np.abs(error) > p.sanding_error))
@@ -325,7 +325,7 @@ def _share(x: Any, mode: Array, target: Array, standing: Array, limits: _Limits,
     braked = either(standing, -p.holding_effort, target)
     demand = either(holds(mode > 2.5), air_brake_demand(braked, capacity, p.full_brake_force), 0.0)
     wanted = either(holds(mode == TRACTION), target, electric_part(braked, x.built_up_brake, limits.electric))
-    effort = stepped_towards(x.held_effort, wanted, limits.down, limits.up)
+    effort = _stepped_towards(x.held_effort, wanted, limits.down, limits.up)
     return np.minimum(np.maximum(effort, -limits.electric), limits.traction), demand
 
 
@@ -374,3 +374,17 @@ def _next_available_effort(
     transmitted = np.abs(adhesion_force) * either(sliding, margin, 1.0)
     cut = np.minimum(available, np.maximum(transmitted, floor))
     return either(some(sliding, newly_degraded), cut, np.minimum(available + recovery, limit))
+
+
+def _built_up_after(built_up: Array, asked: Array, period: Array, build_up_time: Array, release_time: Array) -> Array:
+    """Force [N] to which `building_up` leads within a period [s] of constant demand, exactly."""
+    time = np.where(asked > built_up, build_up_time, release_time)
+    return asked + np.exp(-period / time) * (built_up - asked)
+
+
+def _stepped_towards(previous: Array, wanted: Array, down: Array, up: Array) -> Array:
+    """`wanted`, or as near to it as a step of at most `down` below and `up` above `previous` comes, any one unit.
+
+    A negative `up` (or `down`) demands a step of at least that size the other way.
+    """
+    return previous + np.minimum(np.maximum(wanted - previous, -down), up)

@@ -30,17 +30,3 @@ def piecewise_linear(at: Array, abscissae: Array, ordinates: Array) -> Array:
         width = np.maximum(abscissae[i + 1] - abscissae[i], _SMALLEST_WIDTH)
         value = value + (ordinates[i + 1] - ordinates[i]) * np.clip((at - abscissae[i]) / width, 0.0, 1.0)
     return value
-
-
-def piecewise_constant(at: Array, abscissae: Array, ordinates: Array) -> Array:
-    """Staircase: the ordinate of the last point at or before `at`, and the first ordinate before the first point.
-
-    Args:
-        at: where to read, a scalar or shape (members,).
-        abscissae: shape (n,) or (n, members), not decreasing.
-        ordinates: shape (n,) or (n, members).
-    """
-    value = ordinates[0]
-    for i in range(1, ordinates.shape[0]):
-        value = np.where(at >= abscissae[i], ordinates[i], value)
-    return value

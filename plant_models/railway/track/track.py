@@ -12,7 +12,7 @@ import numpy as np
 
 from plant_models.hybrid import Array, Signal, parameter
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.railway.track.table import piecewise_constant, piecewise_linear
+from plant_models.railway.track.table import piecewise_linear
 
 ZoneAxis = Literal["time", "position"]
 GradientShape = Literal["constant", "linear"]
@@ -104,7 +104,7 @@ class Track:
 
     def gradient(self, position: Array, p: Any) -> Array:
         """Sine of the slope angle at the position [m], positive uphill [1]."""
-        read = piecewise_linear if self.gradient_shape == "linear" else piecewise_constant
+        read = piecewise_linear if self.gradient_shape == "linear" else _piecewise_constant
         return read(position, p.gradient_position, p.gradient)
 
 
@@ -131,3 +131,11 @@ def _parameters(zones: ZoneAxis, zone_count: int, gradient_count: int) -> tuple[
             size=gradient_count,
         ),
     )
+
+
+def _piecewise_constant(at: Array, abscissae: Array, ordinates: Array) -> Array:
+    """Staircase: the ordinate of the last point at or before `at`, and the first ordinate before the first point."""
+    value = ordinates[0]
+    for i in range(1, ordinates.shape[0]):
+        value = np.where(at >= abscissae[i], ordinates[i], value)
+    return value

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Array, PeriodicEvent, Signal, input_signal, memory, parameter
-from plant_models.railway.traction.motor_equations import AXES
-from plant_models.railway.traction.transforms import to_stator
+from plant_models.hybrid import Array, PeriodicEvent, input_signal, parameter
 
 STATE_NAMES = ("current_d", "current_q", "speed", "angle")
 PUBLISHED_NOISE = {"process_variance": (1e-3, 1e-3, 1e-3, 1e-3), "measurement_variance": (0.1, 0.1)}
@@ -57,21 +55,6 @@ def sampling_event(name: str) -> PeriodicEvent:
     return PeriodicEvent(name, "sample_period", None, (*process, *measurement), "The motor is sampled")
 
 
-def measured_memory(frame: str) -> tuple[Signal, ...]:
-    """Memory of the last measured currents, and whether there was a sample.
-
-    Args:
-        frame: of the currents, ``rotor`` or ``stator``.
-
-    Returns:
-        Three signals.
-    """
-    return (
-        *(memory(f"held_current_{axis}", "A", 0.0, f"Last sampled current along {axis}") for axis in AXES[frame]),
-        memory("sampled", "1", 0.0, "1 after the first sample"),
-    )
-
-
 def process_noise(u: Any, p: Any) -> tuple[Array, Array, Array, Array]:
     """What one sample adds to the state, in the units of the state.
 
@@ -84,21 +67,3 @@ def process_noise(u: Any, p: Any) -> tuple[Array, Array, Array, Array]:
     numbers = (u.current_d_noise, u.current_q_noise, u.speed_noise, u.angle_noise)
     first, second, third, fourth = (np.sqrt(p.process_variance[i]) * number for i, number in enumerate(numbers))
     return first, second, third, fourth
-
-
-def measured_currents(frame: str, state: tuple[Array, Array, Array, Array], u: Any, p: Any) -> tuple[Array, Array]:
-    """The currents as they are measured, with noise.
-
-    Args:
-        frame: ``rotor`` (d, q) or ``stator`` (alpha, beta). state: currents along d and q [A], speed [rad/s], angle
-            [rad]. u: inputs with the noises of `sampling_event`. p: parameters with `measurement_variance`.
-
-    Returns:
-        Currents along both axes of the frame [A].
-    """
-    current_d, current_q, _, angle = state
-    first, second = (current_d, current_q) if frame == "rotor" else to_stator(current_d, current_q, angle)
-    return (
-        first + np.sqrt(p.measurement_variance[0]) * u.measurement_noise_1,
-        second + np.sqrt(p.measurement_variance[1]) * u.measurement_noise_2,
-    )

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from plant_models.hybrid import Array, HybridSystem, Signal, state
+import numpy as np
+
+from plant_models.hybrid import Array, HybridSystem, Signal, memory, state
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.traction.motor_equations import (
     AXES,
@@ -19,13 +21,7 @@ from plant_models.railway.traction.motor_equations import (
     motor_rates,
     rotor_voltages,
 )
-from plant_models.railway.traction.sampled_currents import (
-    NOISE_PARAMETERS,
-    measured_currents,
-    measured_memory,
-    process_noise,
-    sampling_event,
-)
+from plant_models.railway.traction.sampled_currents import NOISE_PARAMETERS, process_noise, sampling_event
 from plant_models.railway.traction.transforms import to_stator
 
 Noise = Literal["none", "sampled"]
@@ -75,7 +71,7 @@ class SynchronousMotor(HybridSystem):
             self.state_signal("rotor_current_q", "A", 0.0, "Current along q"),
             self.state_signal("shaft_speed", "rad/s", 0.0, "Speed of the shaft"),
             self.state_signal("electrical_angle", "rad", 0.0, "Electrical angle of the rotor"),
-            *(measured_memory(frame) if self.sampled else ()),
+            *(_measured_memory(frame) if self.sampled else ()),
         )
         self.inputs, self.outputs = motor_inputs(frame), motor_outputs(frame)
         super().__init__(**{option: value for option, value in chosen.items() if option in self.option_choices})
@@ -95,7 +91,7 @@ class SynchronousMotor(HybridSystem):
         )
         after = (first, second, third, fourth)
         names = (*MOVING, *(f"held_current_{axis}" for axis in AXES[self.frame]), "sampled")
-        return dict(zip(names, (*after, *measured_currents(self.frame, after, u, p), 1.0), strict=True))
+        return dict(zip(names, (*after, *_measured_currents(self.frame, after, u, p), 1.0), strict=True))
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         current_d, current_q, speed, angle = self._moving(x)
@@ -114,3 +110,21 @@ class SynchronousMotor(HybridSystem):
     def _moving(x: Any) -> State:
         """Currents along d and q [A], speed [rad/s] and angle [rad]."""
         return x.rotor_current_d, x.rotor_current_q, x.shaft_speed, x.electrical_angle
+
+
+def _measured_memory(frame: str) -> tuple[Signal, ...]:
+    """Memory of the last measured currents, and whether there was a sample."""
+    return (
+        *(memory(f"held_current_{axis}", "A", 0.0, f"Last sampled current along {axis}") for axis in AXES[frame]),
+        memory("sampled", "1", 0.0, "1 after the first sample"),
+    )
+
+
+def _measured_currents(frame: str, state: tuple[Array, Array, Array, Array], u: Any, p: Any) -> tuple[Array, Array]:
+    """The currents as they are measured, with noise."""
+    current_d, current_q, _, angle = state
+    first, second = (current_d, current_q) if frame == "rotor" else to_stator(current_d, current_q, angle)
+    return (
+        first + np.sqrt(p.measurement_variance[0]) * u.measurement_noise_1,
+        second + np.sqrt(p.measurement_variance[1]) * u.measurement_noise_2,
+    )

@@ -9,7 +9,7 @@ import pytest
 from cosim.cli import main
 from cosim.evaluation.reference_trajectory import reference_trajectory, sampled_rows
 from cosim.results.load_result import load_result
-from fmu_observer.formulas.filtering.covariance_consistency import is_inside
+from fmu_observer.formulas.filtering.covariance_consistency import _is_inside
 
 STD, SCALE, BALISES = 0.05, 0.015, 250.0
 
@@ -35,7 +35,7 @@ def test_errors_are_of_the_size_it_tells_and_the_wheel_is_found() -> None:
     assert np.abs(errors[:, 0]).max() < 1.0
     assert np.sqrt(np.square(errors).mean(axis=0)) == pytest.approx([0.0, 0.0], abs=0.25)
     for i in range(2):
-        assert is_inside((errors[:, i] / found.deviations[:, i]) ** 2, 1.0).mean() > 0.8  # of one run, correlated
+        assert _is_inside((errors[:, i] / found.deviations[:, i]) ** 2, 1.0).mean() > 0.8  # of one run, correlated
     assert found.values[:, 3].mean() == pytest.approx(SCALE, abs=2e-3)
     assert found.left_out == pytest.approx(19, abs=2)  # the slip: readings strictly between 50 and 52 s
     assert found.readings == len(time)

@@ -8,7 +8,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import inf
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -38,12 +38,28 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.generic.adaptive.adaptive_certificate import HORIZON, LEFT, errors_left
 from fmu_observer.observers.generic.adaptive.adaptive_trials import adaptive_trial
 from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import arrival_event, estimate_outputs, estimate_states
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Array, Signal, output_signal, parameter, scalar_names
+from plant_models.hybrid import Array, HybridSystem, Runtime, Signal, output_signal, parameter, scalar_names
+
+_HORIZON = 40.0  # [s]; the second regressor of the printed example has faded long before
+_COARSE = 0.01  # [s], internal step: RK4 of frequencies of 20 rad/s to 1e-5
+_LEFT = 0.02  # share of the first error that may be left in the states
+_LAST_PART = 0.8  # of the horizon; what is left after it counts
+
+
+class _Left(NamedTuple):
+    """Shares of the first error that are left, as root mean squares over errors that are equally likely at the start.
+
+    Args:
+        states: largest over the last fifth of the horizon. constants: of each unknown constant, at its end.
+    """
+
+    states: float
+    constants: tuple[float, ...]
+
 
 SHORTEST, _BISECTIONS = 0.02, 6  # [s], [1] of the search for the longest period
 
@@ -195,20 +211,20 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
             "only; noise is left out",
         )
         values = np.concatenate([np.ravel(np.asarray(getattr(p, s.name), float)) for s in self.parameter_signals])
-        left = errors_left(self, values, max_gap)
+        left = _errors_left(self, values, max_gap)
         of_constants = ", ".join(
             f"{s.name} {share:.2g}" for s, share in zip(self.model.unknowns, left.constants, strict=True)
         )
         note = (
             f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
-            f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
+            f"{_HORIZON:g} s, the constants {of_constants}; {_LEFT:g} of it in the states is allowed"
         )
         known = first_unstable_gap([self.known_error(float(p.mu))], _LONGEST_PERIOD)
         longest = _adaptation_limit(self, values, min(known, _LONGEST_PERIOD))
         return replace(
             found,
-            holds=found.holds and max_gap <= longest and left.states < LEFT,
-            spectral_radius=max(found.spectral_radius, left.states ** (max_gap / HORIZON)),
+            holds=found.holds and max_gap <= longest and left.states < _LEFT,
+            spectral_radius=max(found.spectral_radius, left.states ** (max_gap / _HORIZON)),
             constant_limit=min(found.constant_limit, longest),
             aperiodic_limit=min(found.aperiodic_limit, longest),
             notes=(*found.notes, note),
@@ -265,7 +281,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
                 searched_to=_LONGEST_PERIOD,
                 tried=_shortest_tried(known),
                 exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
-                f"{trial.left:.2g} of the states' first error left by the adaptation after {HORIZON:g} s, to 5 %",
+                f"{trial.left:.2g} of the states' first error left by the adaptation after {_HORIZON:g} s, to 5 %",
                 trial=trial,
             ),
         )
@@ -320,14 +336,14 @@ def _covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Size
     return jump @ V @ jump.T + variance * added
 
 
-def _adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: float = LEFT) -> float:
+def _adaptation_limit(observer: Any, parameters: np.ndarray, high: float, left: float = _LEFT) -> float:
     """Longest period [s] at which the adaptation leaves no more than a share of the states, to 5 %, rounded down.
 
     By bisection, which takes what fails once for what fails from there on.
     """
     key = (observer.name, observer.model.name, observer.sizes, high, left, tuple(float(v) for v in parameters))
     if key not in _LIMITS:
-        _LIMITS[key] = _longest_kept(lambda period: errors_left(observer, parameters, period).states < left, high)
+        _LIMITS[key] = _longest_kept(lambda period: _errors_left(observer, parameters, period).states < left, high)
     return _LIMITS[key]
 
 
@@ -347,3 +363,32 @@ def _longest_kept(keeps: Callable[[float], bool], high: float) -> float:
 def _shortest_tried(high: float) -> float:
     """The shortest period that the search for the longest one tries [s]."""
     return min(SHORTEST, 0.5 * high)
+
+
+def _errors_left(observer: Any, parameters: np.ndarray, period: float) -> _Left:
+    """Errors after `_HORIZON`, samples coming each `period`, inputs at their starts, no noise."""
+    system: HybridSystem = observer
+    n, m = observer.sizes[:2]
+    runtime = Runtime(system)
+    runtime.p[:] = parameters
+    names = scalar_names(system.parameter_signals)
+    runtime.p[names.index("noise_deviation")] = 0.0
+    runtime.p[names.index("internal_step")] = max(runtime.p[names.index("internal_step")], _COARSE)
+    places = [i for i, name in enumerate(scalar_names(system.states)) if name.startswith("error_covariance")]
+    size = observer.sizes.error
+    diagonal = [places[i * size - i * (i - 1) // 2] for i in range(n + m)]
+    first = float(np.sqrt(np.mean(runtime.x[diagonal])))
+    runtime.start(0.0)
+    count = max(int(_HORIZON / period), 1)
+    largest = 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(1, count + 1):
+            runtime.advance(k * period)
+            variances = runtime.x[diagonal]
+            if not np.all(np.isfinite(runtime.x)):
+                return _Left(np.inf, (np.inf,) * m)
+            if k > _LAST_PART * count:
+                largest = max(largest, float(np.mean(np.maximum(variances[:n], 0.0))))
+            runtime.trigger(observer.model.event)
+        constants = np.sqrt(np.maximum(runtime.x[diagonal][n:], 0.0)) / first
+    return _Left(float(np.sqrt(largest)) / first, tuple(map(float, constants)))

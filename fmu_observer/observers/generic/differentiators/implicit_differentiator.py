@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import factorial
 from typing import Any, ClassVar
 
-from fmu_observer.formulas.differentiation.implicit_recursion import implicit_step
+import numpy as np
+
+from fmu_observer.formulas.differentiation.differentiator import power
+from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
 from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from plant_models.hybrid import Array, PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole
+
+_ITERATIONS = 7  # Newton from at most twice the root: the last two change nothing any more
+_SMALLEST = 1e-200  # stands in for an excess that is not positive, where the root is not used
 
 
 class ImplicitDifferentiator(SignalDifferentiator):
@@ -60,7 +67,7 @@ class ImplicitDifferentiator(SignalDifferentiator):
 
         def advance(x: Any) -> dict[str, Array]:
             w, z = stacked_of(x, self.filters), stacked_of(x, self.estimates)
-            w_next, z_next = implicit_step(w, z, x.held_signal, p.bound, p.sample_period)
+            w_next, z_next = _implicit_step(w, z, x.held_signal, p.bound, p.sample_period)
             return named_as((*self.filters, *self.estimates), (*w_next, *z_next))
 
         def read(x: Any) -> dict[str, Array]:  # where the signal is missing it is taken to be what is estimated
@@ -71,3 +78,71 @@ class ImplicitDifferentiator(SignalDifferentiator):
     def interval(self, p: Any) -> float:
         """The sampling period [s]."""
         return float(p.sample_period)
+
+
+def _implicit_step(
+    w: Sequence[Array], z: Sequence[Array], signal: Array, L: Array, tau: Array
+) -> tuple[list[Array], list[Array]]:
+    """The next filter states and estimates: Bouchama 2024, (1.36) with Theorem 5, its third case repaired.
+
+    ``w_i+ = tau^(nf-i+1)/(nf-i+1)! (z_0 - f) + sum_{l=i..nf} tau^(l-i)/(l-i)! w_l + sum_{l=i..m+1} tau^(l-i+1)/(l-i+1)!
+    v_{l-1}``, ``z_j+ = sum_{l=j..n} [tau^(l-j)/(l-j)! z_l + tau^(l-j+1)/(l-j+1)! v_{nf+l}]`` with ``v_j = -g_{m-j}
+    L^((j+1)/(m+1)) |w_1+|^((m-j)/(m+1)) xi``, m = n + nf, g the row m of Table 1.1.
+    """
+    n, nf = len(z) - 1, len(w)
+    m = n + nf
+    gains = LEVANT_GAINS[m]
+    error = z[0] - signal
+    b = -_taylor(tau, nf) * error - sum(_taylor(tau, i) * w[i] for i in range(nf))
+    root, sign = _solve_first_filter_equation(b, _equation_coefficients(m, L, tau))
+    v = [-gains[m - j] * power(L, j + 1, m + 1) * _whole_power(root, m - j) * sign for j in range(m + 1)]
+    w_next = [
+        _taylor(tau, nf - i) * error
+        + sum(_taylor(tau, k - i) * w[k] for k in range(i, nf))
+        + sum(_taylor(tau, k - i + 1) * v[k] for k in range(i, m + 1))
+        for i in range(nf)
+    ]
+    z_next = [
+        sum(_taylor(tau, k - j) * z[k] + _taylor(tau, k - j + 1) * v[nf + k] for k in range(j, n + 1))
+        for j in range(n + 1)
+    ]
+    return w_next, z_next
+
+
+def _equation_coefficients(m: int, L: Array, tau: Array) -> list[Array]:
+    """``a_j = tau^(m-j+1)/(m-j+1)! g_j L^((m-j+1)/(m+1))``, j = 0 ... m, of Theorem 5."""
+    return [_taylor(tau, m - j + 1) * LEVANT_GAINS[m][j] * power(L, m - j + 1, m + 1) for j in range(m + 1)]
+
+
+def _solve_first_filter_equation(b: Array, a: Sequence[Array]) -> tuple[Array, Array]:
+    """Root r and sign xi of Theorem 5; then ``w_1+ = xi r^(m+1)``.
+
+    ``|b| <= a_0``: r = 0, ``xi = -b / a_0``. Else ``xi = -sgn(b)`` and r > 0 solves
+    ``r^(m+1) + a_m r^m + ... + a_1 r = |b| - a_0``. The print has another sign in the case b < -a_0. Newton's method
+    from above, where the polynomial is increasing and convex, cannot fail; it starts from the smallest root that one
+    term alone would give, which is at most twice the true one.
+    """
+    degree = len(a)
+    excess = np.abs(b) - a[0]
+    right = np.maximum(excess, _SMALLEST)
+    r = right ** (1.0 / degree)
+    for j in range(1, degree):
+        r = np.minimum(r, (right / a[j]) ** (1.0 / j))
+    for _ in range(_ITERATIONS):
+        value, slope = 1.0 + 0.0 * r, 0.0 * r
+        for j in range(degree - 1, -1, -1):  # Horner, a_0 replaced by minus the right-hand side
+            slope = slope * r + value
+            value = value * r + (a[j] if j else -right)
+        r = r - value / slope
+    return np.where(excess > 0.0, r, 0.0), -np.clip(b / a[0], -1.0, 1.0)
+
+
+def _taylor(tau: Array, order: int) -> Array:
+    return _whole_power(tau, order) / float(factorial(order))
+
+
+def _whole_power(value: Array, exponent: int) -> Array:
+    result: Array = 1.0
+    for _ in range(exponent):
+        result = result * value
+    return result

@@ -44,7 +44,7 @@ class HybridImpulsive(SampledObserver):
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
         width = check_chain(chosen, self.name)
-        L, H, F = hybrid_gains(chain_gain(chosen.order // width, width), THETA, _JUMP_SHARE)
+        L, H, F = _hybrid_gains(chain_gain(chosen.order // width, width), THETA, _JUMP_SHARE)
         self.gain_parameters = (
             self.gain_parameter("flow_gain", L, "Gain L of z, row by row"),
             self.gain_parameter("flow_matrix", H, "Matrix H of z, row by row [1/s]", "1/s"),
@@ -106,17 +106,8 @@ class HybridImpulsive(SampledObserver):
         return as_matrix(p.flow_gain, n, q), as_matrix(p.flow_matrix, q, q), as_matrix(p.jump_gain, n, q)
 
 
-def hybrid_gains(K: np.ndarray, theta: float, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gains L, H, F from a high gain [ours].
-
-    Args:
-        K: shape (n, q), blocks of q rows, the first one invertible. theta: [1/s]. share: of the correction given at
-            once, 0 to 1.
-
-    Returns:
-        ``theta inv(Delta) K`` of shape (n, q), ``-theta K_1`` of shape (q, q), ``share inv(Delta) K inv(K_1)`` of shape
-        (n, q).
-    """
+def _hybrid_gains(K: np.ndarray, theta: float, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gains L, H, F from a high gain [ours]."""
     n, q = K.shape
     powers = theta ** (np.arange(n) // q)[:, None]
     return theta * powers * K, -theta * K[:q], share * powers * np.linalg.solve(K[:q].T, K.T).T

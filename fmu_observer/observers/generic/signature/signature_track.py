@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
-from fmu_observer.formulas.signatures.tip_recursion import CYCLES, TIP_MEMORY, next_tips
 from plant_models.hybrid import (
     Array,
     HybridSystem,
@@ -25,6 +24,26 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
+
+_CYCLES = 4.0
+"""Tips before the properties count: the first two may be those of a transient."""
+_TIP_MEMORY: tuple[Signal, ...] = (
+    memory("abscissa_before", "1", 0.0, "Abscissa of the long signature one sample ago"),
+    memory("abscissa_earlier", "1", 0.0, "Abscissa of the long signature two samples ago"),
+    memory("last_tip", "1", 0.0, "Abscissa of the last tip"),
+    memory("lowest", "1", 0.0, "Smallest abscissa of the long signature since the last tip"),
+    memory("lowest_before", "1", 0.0, "Smallest abscissa between the last two tips"),
+    memory("highest", "1", 0.0, "Largest abscissa of the long signature since the last tip"),
+    memory("highest_before", "1", 0.0, "Largest abscissa between the last two tips"),
+    memory("short_highest", "1", 0.0, "Largest abscissa of the short signature since the last tip"),
+    memory("short_before", "1", 0.0, "Largest abscissa of the short signature between the last two tips"),
+    memory("tips", "1", 0.0, "Tips found since the start, or since the signal last stopped to oscillate"),
+    memory("since_tip", "1", 0.0, "Samples since the last tip"),
+    memory("held_length", "1", 0.0, "Property r1 at the last tip"),
+    memory("held_short_tip", "1", 0.0, "Property r2 at the last tip"),
+    memory("held_gap", "1", 0.0, "Property r3 at the last tip"),
+)
+
 
 _TOLERANCE = 0.01
 """Of the ordinate, as printed."""
@@ -137,7 +156,7 @@ class SignatureTrack(HybridSystem):
         self.states = (
             memory("samples", "1", 0.0, "The last samples, the oldest first", size=long_order),
             memory("taken", "1", 0.0, "Samples taken, counted as far as is needed"),
-            *TIP_MEMORY,
+            *_TIP_MEMORY,
             *(_PRINTED_MEMORY if reading == "as_published" else ()),
         )
         super().__init__(
@@ -169,7 +188,7 @@ class SignatureTrack(HybridSystem):
         short_point = pencil_point(past[count - short :], u.signal, p.eps, self.next_scaling)
         patience = p.patience / p.sample_period
         if self.reading == "repaired":
-            found = next_tips(x, long_point[0], short_point[0], patience)
+            found = _next_tips(x, long_point[0], short_point[0], patience)
         else:
             points = ((long_point[0], long_point[1]), (short_point[0], short_point[1]))
             found = _next_printed(x, *points, patience)
@@ -181,7 +200,7 @@ class SignatureTrack(HybridSystem):
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        ready = np.where(x.tips > CYCLES - 0.5, 1.0, 0.0)
+        ready = np.where(x.tips > _CYCLES - 0.5, 1.0, 0.0)
         past = x.samples
         third = past[3:] - 3.0 * past[2:-1] + 3.0 * past[1:-2] - past[:-3]  # white noise: 20 times its variance
         noise = np.sqrt(np.sum(third * third) / (20.0 * max(self.orders[0] - 3, 1)))
@@ -215,7 +234,7 @@ def _next_printed(
 
     ``|S_y - y*| < 0.01`` asks for the ordinate of a tip that is still to come; here it is that of the last one.
     """
-    tips = next_tips(x, long_point[0], short_point[0], patience)
+    tips = _next_tips(x, long_point[0], short_point[0], patience)
     tip = tips["since_tip"] < 0.5
     near = np.where(np.abs(long_point[1] - x.tip_ordinate) < _TOLERANCE, np.minimum(x.near, long_point[0]), x.near)
     bend = short_point[1] - 2.0 * x.short_ordinate + x.short_earlier
@@ -247,4 +266,35 @@ def _properties(x: Any, tip: Array, near: Array, at_bend: Array) -> dict[str, Ar
         "held_length": np.where(tip, 0.5 * (top + nearest) - low, x.held_length),
         "held_short_tip": np.where(tip, at_bend, x.held_short_tip),
         "held_gap": np.where(tip, top - nearest, x.held_gap),
+    }
+
+
+def _next_tips(x: Any, long_abscissa: Array, short_abscissa: Array, patience: Array) -> dict[str, Array]:
+    """Memory after a sample.
+
+    A tip is a local maximum of the long signature's abscissa in the upper half of its extent. Extremes are those of
+    the last two ways between tips, so that both branches count.
+    """
+    before = x.abscissa_before
+    lowest = np.minimum(x.lowest, x.lowest_before)
+    middle = 0.5 * (lowest + np.maximum(x.highest, x.highest_before))
+    tip = (before > x.abscissa_earlier) * (before >= long_abscissa) * (before > middle)
+    length = 0.5 * (before + x.last_tip) - lowest
+    lost = x.since_tip >= patience
+    kept = np.where(lost, 0.0, x.tips)
+    return {
+        "abscissa_before": long_abscissa,
+        "abscissa_earlier": before,
+        "last_tip": np.where(tip, before, x.last_tip),
+        "lowest": np.where(tip, long_abscissa, np.minimum(x.lowest, long_abscissa)),
+        "lowest_before": np.where(tip, x.lowest, x.lowest_before),
+        "highest": np.where(tip, long_abscissa, np.maximum(x.highest, long_abscissa)),
+        "highest_before": np.where(tip, x.highest, x.highest_before),
+        "short_highest": np.where(tip, short_abscissa, np.maximum(x.short_highest, short_abscissa)),
+        "short_before": np.where(tip, x.short_highest, x.short_before),
+        "tips": np.where(tip, kept + 1.0, kept),
+        "since_tip": np.where(tip, 0.0, np.where(lost, 0.0, x.since_tip + 1.0)),
+        "held_length": np.where(tip, length, x.held_length),
+        "held_short_tip": np.where(tip, np.maximum(x.short_highest, x.short_before), x.held_short_tip),
+        "held_gap": np.where(tip, np.abs(before - x.last_tip), x.held_gap),
     }
