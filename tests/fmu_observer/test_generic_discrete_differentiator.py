@@ -105,7 +105,7 @@ def test_the_fixed_number_of_iterations_is_enough(exponents: list[float], excess
     a = [10.0**e for e in exponents]
     few = _solve_first_filter_equation(a[0] + 10.0**excess, a)[0]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "ITERATIONS", 60)
+        patch.setattr(module, "_ITERATIONS", 60)
         many = _solve_first_filter_equation(a[0] + 10.0**excess, a)[0]
     assert few == pytest.approx(many, rel=1e-14, abs=1e-300)
 
