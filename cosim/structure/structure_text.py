@@ -32,8 +32,8 @@ def structure_parts(structure: StructureData) -> Parts:
             {part.name: " > ".join(part.chain) for part in structure.parts if part.chain},
             "Movement over a step, outermost stage first",
         ),
-        pairs_table("balises", _balises(structure), "Balises"),
-        pairs_table("network", _network(structure), "Network"),
+        pairs_table("balise service", _balises(structure), "Balises"),
+        pairs_table("network nodes", _network(structure), "Network"),
         _section("Algorithm", [algorithm]),
         _section("Warnings", structure.warnings),
     ]
@@ -129,7 +129,7 @@ def _connections(structure: StructureData) -> Table:
     rows = [[".".join(k.source), f"-> {'.'.join(k.target)}", value, conversion] for k, value, conversion in links]
     columns = [name_column("source", "source"), name_column("target", "   target")]
     columns += [text_column("value", "value used"), text_column("conversion", "conversion")]
-    return Table("links", columns, rows, "Connections")
+    return Table("connections", columns, rows, "Connections")
 
 
 def when(link: Link) -> str:

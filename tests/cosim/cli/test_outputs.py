@@ -1,0 +1,178 @@
+"""Laws of all commands: with ``--json`` one JSON value and nothing else, which holds what the text holds; no text wider
+than the terminal; and what the help says of them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_fmus.build import linear_fmu
+
+import cosim.cli
+import fmus.cli
+from cosim import Scenario
+from fmus.cli.commands import find_commands, make_parser
+from fmus.cli.output import Output
+from fmus.tables.table import Table
+
+# words behind the name of the program; a name in capitals is a file that `files` makes
+LINES = {
+    "cosim": {
+        "baseline make": "baseline make TRAIN OUT.json --quiet",
+        "baseline check": "baseline check BASE.json --quiet --verbose --plots OUT_pages",
+        "baseline show": "baseline show BASE.json",
+        "baseline update": "baseline update BASE.json --quiet",
+        "baseline embed": "baseline embed FMUBASE.json LAG.fmu -o OUT.fmu",
+        "baseline extract": "baseline extract HOLDS.fmu OUT_taken.json",
+        "benchmark-observers": "benchmark-observers TRAIN --observers takagi_sugeno_cdo,multirate_cdo --out OUT_page",
+        "compare": "compare RESULTS OTHER --verbose --html OUT.html --plots OUT_pictures",
+        "export of a result": "export RESULTS OUT.npy",
+        "export of a scenario": "export TRAIN OUT.ssp",
+        "export of a trajectory": "export RESULTS OUT_way.csv --trajectory --odometer odometer.reading",
+        "info of a model": "info locomotive",
+        "info of an FMU": "info LAG.fmu",
+        "linearise": "linearise takagi_sugeno_cdo",
+        "list": "list",
+        "new": "new LAG.fmu -o OUT_new.toml",
+        "report": "report RESULTS --out OUT_report.html",
+        "rerun": "rerun RESULTS --quiet --out OUT_again",
+        "run": "run TRAIN --quiet --out OUT_run --seeds 2",
+        "show": "show TRAIN --picture OUT.svg",
+        "sweep": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --quiet --out OUT_sweep",
+        "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT_by",
+    },
+    "fmus": {
+        "build": "build driver -o OUT_built",
+        "check": "check LAG.fmu -o OUT_check.json",
+        "info": "info LAG.fmu",
+        "list": "list",
+    },
+}
+PENDING = {"bound", "calibrate", "identify", "limits", "tune"}
+"""Commands that print by themselves."""
+PROGRAMS = {"cosim": cosim.cli.GROUPS, "fmus": fmus.cli.GROUPS}
+
+
+def output_of(program: str, words: list[str]) -> Output:
+    """What a command reports, and prints nowhere."""
+    options = make_parser(program, "", f"{program}.cli", PROGRAMS[program], words).parse_args(words)
+    options.command_line = shlex.join([program, *words])
+    output: Output = options.execute(options)
+    return output
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with a scenario, an FMU, results, and baselines; relative paths are as short as a user types them."""
+    folder, before = tmp_path_factory.mktemp("files"), Path.cwd()
+    os.chdir(folder)
+    scenario = Scenario.load("freight_profile_d").set("stop", 12.0).set("expect", []).set("step", 0.05)
+    scenario.save(folder / "TRAIN.toml")
+    scenario.set("locomotive.mass", 80e3).save(folder / "heavy.toml")
+    linear_fmu(folder, "LAG", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
+    for line in (
+        "run TRAIN.toml --no-report --quiet --out RESULTS",
+        "run heavy.toml --no-report --quiet --out OTHER",
+        "baseline make TRAIN.toml BASE.json --quiet",
+        "baseline make LAG.fmu FMUBASE.json --quiet --stop 1 --step 0.1",
+        "baseline embed FMUBASE.json LAG.fmu -o HOLDS.fmu",
+    ):
+        assert output_of("cosim", line.split()).code == 0
+    yield folder
+    os.chdir(before)
+
+
+CASES = [(program, case) for program, lines in LINES.items() for case in lines]
+
+
+@pytest.fixture(scope="module")
+def outputs() -> dict[tuple[str, str], Output]:
+    """What commands reported, each run once."""
+    return {}
+
+
+@pytest.fixture
+def output(
+    request: pytest.FixtureRequest, outputs: dict[tuple[str, str], Output], capsys: pytest.CaptureFixture[str]
+) -> Output:
+    key = request.param
+    if key not in outputs:
+        words = [word.replace("TRAIN", "TRAIN.toml") for word in LINES[key[0]][key[1]].split()]
+        if any(word.isupper() or word.partition(".")[0].isupper() for word in words):
+            request.getfixturevalue("files")
+        outputs[key] = output_of(key[0], words)
+        assert capsys.readouterr().out == ""
+    return outputs[key]
+
+
+def strings(data: Any) -> Iterator[str]:
+    """All texts in plain data, keys included."""
+    if isinstance(data, dict):
+        yield from map(str, data)
+        data = list(data.values())
+    if isinstance(data, list):
+        for item in data:
+            yield from strings(item)
+    elif data is not None:
+        yield str(data)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("output", CASES, indirect=True, ids=lambda key: " ".join(key))
+def test_json_is_one_value_and_holds_what_the_text_holds(output: Output, capsys: pytest.CaptureFixture[str]) -> None:
+    output.show("program", as_json=True)
+    data = json.loads(capsys.readouterr().out)
+    known = " ".join(strings(data))
+    for part in output.parts:
+        if isinstance(part, Table):
+            names = [row[i] for row in part.rows for i in range(part.names) if isinstance(row[i], str)]
+            assert [name for name in names if name.strip() not in known] == []
+            assert part.key in data or not part
+    assert [path for path in output.files.values() if str(path) not in known] == []
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("width", [60, 80, 120])
+@pytest.mark.parametrize("output", CASES, indirect=True, ids=lambda key: " ".join(key))
+def test_no_line_is_wider_than_the_terminal(
+    output: Output, width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Only a single word, such as a path, stands out: it can be copied."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    output.show("program", as_json=False)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if len(line) > width and " " in line.split(": ", 1)[-1].strip()] == []
+
+
+@pytest.mark.parametrize("program", LINES)
+def test_every_command_is_among_them(program: str) -> None:
+    names = {command.name for command in find_commands(f"{program}.cli")}
+    assert {line.split()[0] for line in LINES[program].values()} == names - PENDING
+
+
+@pytest.mark.parametrize("program", LINES)
+def test_the_help_lists_every_command_in_its_group(program: str) -> None:
+    text = make_parser(program, "", f"{program}.cli", PROGRAMS[program], ["--help"]).format_help()
+    commands = find_commands(f"{program}.cli")
+    assert {command.group for command in commands} == set(PROGRAMS[program])
+    for command in commands:
+        below = text[text.index(f"\n{command.group}\n") :]
+        assert f"\n  {command.name} " in below
+        assert command.help.split()[0] in below
+
+
+@pytest.mark.parametrize("program", LINES)
+def test_an_old_spelling_is_answered_by_the_new_one(program: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for command in find_commands(f"{program}.cli"):
+        for old, now in command.former.items():
+            with pytest.raises(SystemExit) as stopped:
+                make_parser(program, "", f"{program}.cli", PROGRAMS[program], [old, "anything"])
+            assert stopped.value.code == 2
+            assert f"'{old}' has become: {now}" in capsys.readouterr().err
+            assert now.startswith(f"{program} {command.name}")
