@@ -124,7 +124,7 @@ def strings(data: Any) -> Iterator[str]:
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize("output", CASES, indirect=True, ids=lambda key: " ".join(key))
+@pytest.mark.parametrize("output", CASES, indirect=True, ids=" ".join)
 def test_json_is_one_value_and_holds_what_the_text_holds(output: Output, capsys: pytest.CaptureFixture[str]) -> None:
     output.show("program", as_json=True)
     data = json.loads(capsys.readouterr().out)
@@ -139,7 +139,7 @@ def test_json_is_one_value_and_holds_what_the_text_holds(output: Output, capsys:
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("width", [60, 80, 120])
-@pytest.mark.parametrize("output", CASES, indirect=True, ids=lambda key: " ".join(key))
+@pytest.mark.parametrize("output", CASES, indirect=True, ids=" ".join)
 def test_no_line_is_wider_than_the_terminal(
     output: Output, width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
