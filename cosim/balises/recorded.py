@@ -68,34 +68,40 @@ class RecordedLocaliser(Localiser):
     """Steps the watched plant and gives the recorded crossings. False telegrams are crossings of nothing.
 
     Args:
-        watch: the plant. layout: what was told.
+        watch: the plant. layout: what was received.
+
+    `records` are the telegrams in order of their stamps, `next` is the number of the first one that lies ahead.
     """
 
     method: Method = "recorded"
 
     def __init__(self, watch: PlantMonitor, layout: RecordedLayout) -> None:
         super().__init__(watch, InstantLayout(layout.instants))
-        self._records, self._next = layout.records, 0
+        self.records, self.next = layout.records, 0
 
     def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:  # noqa: D102 - see Localiser
-        first = self._next
-        while self._next < len(self._records) and self._is_due(self._records[self._next], until):
-            self._next += 1
-        due = self._records[first : self._next]
+        first = self.next
+        while self.next < len(self.records) and self._is_due(self.records[self.next], until):
+            self.next += 1
+        due = self.records[first : self.next]
         start, found = self.watch.outputs.copy(), []
         there = {record.stamp: self._played_back(t, record.stamp, until) for record in due}
         self.watch.step(t, until)
         for record in due:
-            crossing = Crossing(record.stamp, record.position, record.identity, record.location_accuracy, record.method)
             outputs = there[record.stamp]
-            found.append((crossing, self._between(start, t, record.stamp, until) if outputs is None else outputs))
+            found.append(
+                (
+                    recorded_crossing(record),
+                    self._between(start, t, record.stamp, until) if outputs is None else outputs,
+                )
+            )
         return found
 
     def save(self) -> Any:  # noqa: D102 - see Localiser
-        return self._next
+        return self.next
 
     def restore(self, state: Any) -> None:  # noqa: D102 - see Localiser
-        self._next = state
+        self.next = state
 
     @staticmethod
     def _is_due(record: BaliseRecord, until: float) -> bool:
@@ -115,6 +121,7 @@ class RecordedLocaliser(Localiser):
         self.watch.step(t, stamp)
         there = self.watch.outputs.copy()
         self.watch.restore(state)
+        self.watch.release(state)
         self.watch.outputs[:] = outputs
         return there
 
@@ -123,6 +130,11 @@ class RecordedLocaliser(Localiser):
         share, own = min(max((stamp - t) / (until - t), 0.0), 1.0), self.watch.position_column
         position = start[own] + share * (self.watch.outputs[own] - start[own])
         return self.watch.between(start, share, float(position) * self.watch.position_scale)
+
+
+def recorded_crossing(record: BaliseRecord) -> Crossing:
+    """The crossing of a recorded telegram."""
+    return Crossing(record.stamp, record.position, record.identity, record.location_accuracy, record.method)
 
 
 @dataclass(frozen=True)

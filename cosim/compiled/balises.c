@@ -68,13 +68,13 @@ static bool crossed(const Program *program) {
 /* One more step of a slave within this one, sent, timed and counted; outputs are read. */
 static bool drive(Program *program, int64_t which, double t, double until) {
     Slave *slave = &program->slaves[which];
-    if (!send_inputs(program, which))
+    if (!send_inputs(program, which, t, until))
         return false;
     slave->calls_here++;
     if (!do_step(program, which, t, until - t))
         return false;
     slave->now = until;
-    return read_outputs(program, which);
+    return arrive(program, which, until) && read_outputs(program, which);
 }
 
 /* Restore or release a state: the one takes the state, the other where it is kept. */
@@ -190,6 +190,36 @@ static bool find_stamp(Over *over, void *state) {
     return number == 0 || (over->found && search(over, state, over->program->watch.places[over->which]));
 }
 
+static bool saved_plant(Over *over, void **state) {
+    Program *program = over->program;
+    const PlantMonitor *watch = &program->watch;
+    memcpy(program->balises.start, program->values + watch->first_output, (size_t)watch->output_count * sizeof(double));
+    program->status = ((SaveState)program->balises.save_state)(program->slaves[watch->slave].instance, state);
+    note(program, watch->slave, CALL_SAVE, 0)->state = *state;
+    return program->status <= STATUS_WARNING;
+}
+
+/* A plant that is played back, with its telegrams: it is looked at where one was sent, as `RecordedLocaliser` does. */
+static bool play_plant(Over *over) {
+    Program *program = over->program;
+    Balises *balises = &program->balises;
+    const PlantMonitor *watch = &program->watch;
+    double *outputs = program->values + watch->first_output;
+    size_t size = (size_t)watch->output_count * sizeof(double);
+    void *state = NULL;
+    over->found = true;
+    over->which = balises->next_instant;
+    over->stamp = balises->instants[over->which];
+    if (!saved_plant(over, &state) || !drive(program, watch->slave, over->t, over->stamp))
+        return false;
+    memcpy(balises->there, outputs, size);
+    if (!state_call(over, CALL_RESTORE, balises->restore_state, state))
+        return false;
+    program->slaves[watch->slave].now = over->t;
+    memcpy(outputs, balises->start, size);
+    return drive(program, watch->slave, over->t, over->until);
+}
+
 static bool move_plant(Over *over) {
     Program *program = over->program;
     Balises *balises = &program->balises;
@@ -199,10 +229,7 @@ static bool move_plant(Over *over) {
     void *state = NULL;
     over->p0 = position_of(program, program->values);
     over->v0 = speed_of(program, program->values);
-    memcpy(balises->start, outputs, size);
-    program->status = ((SaveState)balises->save_state)(program->slaves[watch->slave].instance, &state);
-    note(program, watch->slave, CALL_SAVE, 0)->state = state;
-    if (program->status > STATUS_WARNING || !drive(program, watch->slave, over->t, over->until))
+    if (!saved_plant(over, &state) || !drive(program, watch->slave, over->t, over->until))
         return false;
     over->p1 = position_of(program, program->values);
     over->v1 = speed_of(program, program->values);
@@ -249,17 +276,29 @@ static double snapped(const Over *over) {
     return told_at - over->t <= TIME_TOLERANCE ? over->t : told_at;
 }
 
-static bool tell_receiver(Over *over, int64_t which, Telegram *telegram) {
+static void fill_in(const Over *over, double *fields) {
     const Program *program = over->program;
+    const double *recorded = program->balises.recorded;
     const bool by_instant = program->balises.by_instant != 0;
+    fields[FIELD_DELIVERED_AT] = fields[FIELD_STAMP] = over->stamp + 0.0; /* the latency */
+    if (recorded != NULL) {
+        recorded += 3 * over->which;
+        fields[FIELD_POSITION] = recorded[0];
+        fields[FIELD_LOCATION_ACCURACY] = recorded[1];
+        fields[FIELD_ODOMETER_READING] = recorded[2];
+        return;
+    }
+    fields[FIELD_POSITION] = (by_instant ? over->position : program->watch.places[over->which]) + 0.0; /* as noise of zero is added */
+    fields[FIELD_LOCATION_ACCURACY] = by_instant ? 0.0 : program->balises.accuracies[over->which];
+    fields[FIELD_ODOMETER_READING] = over->reading;
+}
+
+static bool tell_receiver(Over *over, int64_t which, Telegram *telegram) {
     read_odometer(over);
     over->told_at = snapped(over);
     over->told = true;
     double fields[FIELDS];
-    fields[FIELD_POSITION] = (by_instant ? over->position : program->watch.places[over->which]) + 0.0; /* as noise of zero is added */
-    fields[FIELD_LOCATION_ACCURACY] = by_instant ? 0.0 : program->balises.accuracies[over->which];
-    fields[FIELD_ODOMETER_READING] = over->reading;
-    fields[FIELD_DELIVERED_AT] = fields[FIELD_STAMP] = over->stamp + 0.0; /* the latency */
+    fill_in(over, fields);
     for (int64_t i = 0; i < telegram->payload_count; i++)
         telegram->payload[i] = fields[telegram->fields[i]];
     const double times[3] = {over->t, over->told_at, over->until};
@@ -277,10 +316,10 @@ static bool move_all(Over *over) {
         Slave *slave = &program->slaves[i];
         Telegram *telegram = program->balises.telegrams[i];
         double begin = now();
-        gather(slave, program->values);
+        gather(slave, program->values, over->t, over->until);
         bool ordinary;
         if (i == program->watch.slave)
-            ordinary = move_plant(over);
+            ordinary = program->balises.recorded != NULL ? play_plant(over) : move_plant(over);
         else if (over->found && telegram != NULL)
             ordinary = tell_receiver(over, i, telegram);
         else

@@ -16,13 +16,16 @@ from operator import attrgetter
 from time import perf_counter
 from typing import Any
 
+from cosim.balises.recorded import RecordedLocaliser
 from cosim.balises.rollback import RollbackLocaliser
 from cosim.compiled.crossings import Crossings
 from cosim.compiled.library import load_stepper
 from cosim.compiled.notifying import CompiledDelivery, can_be_notified
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.recorded_returns import RecordedReturn, repeated
+from cosim.compiled.recordings import follows_recordings
 from cosim.components.component import Component
+from cosim.components.recording import RecordingSlave
 from cosim.coupling.chain import COMPILED_STAGE_TEXT, Mover, Position, Stage
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
@@ -46,10 +49,10 @@ GROWTH = 8
 ROWS_OF_EVENTS = 64
 """Room for those in a chunk that may hold some; where it is not enough, the chunk is shorter."""
 
-WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED})
+WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.ARRIVE, Stop.CROSSED})
 """The chunk ended within a step, at one of the slaves."""
 
-STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
+STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.ARRIVE, Stop.CROSSED})
 """That one has been called to do the step."""
 
 
@@ -79,13 +82,14 @@ class CompiledStepper:
         self._moves = [{"get": 0, "set": 0} for _ in self.plan.steps]
         self._longest = 1
         _check(control, self.system)
-        self._program = Program(self.plan, axis)
+        self._library = _load()
+        self._program = Program(self.plan, axis, self._library)
         self._program.head.seconds_at_most = SECONDS
         self._address = self._program.address
-        self._library = _load()
         self._repeating = False
         for place, step in enumerate(self.plan.steps):
-            self._quicken(place, step)
+            if step.interpolator is None:
+                self._quicken(place, step)
         self._crossings = self._watch_balises()
         self._first: int | None = None
         self._stops_at_packets = False
@@ -154,6 +158,8 @@ class CompiledStepper:
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
+        if self._crossings is not None:
+            limit = min(limit, self._crossings.idle_until)
         network = self.system.network
         if network is None or network.idle_until >= limit:
             return free if limit == NEVER else min(free, self._steps_before(k, limit))
@@ -201,6 +207,8 @@ class CompiledStepper:
             balises.begin(t, until)
         for place, step in enumerate(self.plan.steps[first:]):
             if place == 0:
+                if step.interpolator is not None:
+                    step.prepare(t, until)
                 self._repeated_move(step.move, t, until)
             else:
                 step.step(t, until)
@@ -226,7 +234,7 @@ class CompiledStepper:
                 slowly(t, until)
                 return
             begin = perf_counter()
-            if call(address, place, t, until - t, reads):
+            if call(address, place, t, until, reads):
                 component.time = until
                 component.calls += 1
                 moves["set"] += 1
@@ -245,7 +253,7 @@ class CompiledStepper:
         service = self.system.balises
         if service is None:
             return None
-        if not isinstance(service.localiser, RollbackLocaliser):
+        if not isinstance(service.localiser, RollbackLocaliser | RecordedLocaliser):
             raise NotCompilable(f"balises are localised by '{service.localiser.method}'")
         names, deliveries = [step.component.name for step in self.plan.steps], {}
         for receiver in service.receivers:
@@ -256,7 +264,7 @@ class CompiledStepper:
                     receiver, place, self._program, self._library, self._repeated, idle
                 )
                 receiver.compiled = deliveries[place].step
-        return Crossings(self._program, self.plan, service, deliveries)
+        return Crossings(self._program, self.plan, self.axis, service, deliveries)
 
     def _repeated_move(self, move: Mover, t: float, until: float) -> None:
         """Move a component in Python that the stepper has moved in part."""
@@ -273,7 +281,9 @@ class CompiledStepper:
         try:
             with ExitStack() as stack:
                 for place, said in answers.items():
-                    stack.enter_context(repeated(self.plan.steps[place].component.slave, said))
+                    slave = self.plan.steps[place].component.slave
+                    if not isinstance(slave, RecordingSlave):  # which goes to any time, whatever it was asked before
+                        stack.enter_context(repeated(slave, said))
                 yield
         finally:
             self._repeating = False
@@ -319,13 +329,13 @@ def _load() -> Any:
 def _check(control: StepControl, system: System) -> None:
     if type(control) is not FixedStep:
         raise NotCompilable(f"the step control '{control.name}' is Python's")
-    if system.divides_steps:
+    if system.meets_events:
         raise NotCompilable("events of the components are propagated")
     algorithm = system.algorithm
     if algorithm.name not in ("gauss-seidel", "jacobi") or getattr(algorithm, "threads", 1) != 1:
         raise NotCompilable(f"the algorithm '{algorithm.name}' is Python's")
     for step in system.plan.steps:
-        if step.inputs.gated:
+        if step.inputs.gated and len(step.inputs):
             raise NotCompilable(f"inputs of {step.component.name} are sent by something in Python")
         if any(stage.position not in (Position.BALISES, Position.COMPILED) for stage in step.stages):
             raise NotCompilable(f"{step.component.name} is moved by something in Python")
@@ -337,7 +347,7 @@ def _check(control: StepControl, system: System) -> None:
             raise NotCompilable("values that are no doubles are passed on")
         if step.inputs.tables:
             raise NotCompilable(f"inputs of {step.component.name} are mapped by tables of values")
-        if step.interpolator is not None:
+        if step.interpolator is not None and not follows_recordings(step.interpolator):
             raise NotCompilable(f"inputs of {step.component.name} follow lines between communication points")
         if step.substeps != 1:
             raise NotCompilable(f"{step.component.name} takes {step.substeps} steps for one")

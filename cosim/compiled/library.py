@@ -13,7 +13,14 @@ from fmus.toolchain.cached_library import cached_library
 from fmus.toolchain.compile import Compiler, find_compiler
 from plant_models.disk_cache.folder import cache_folder
 
-SOURCES = ("stepper.c", "balises.c", "notifying.c", "slave.c", "stepper.h")  # the first one includes the others
+SOURCES = (
+    "stepper.c",
+    "balises.c",
+    "notifying.c",
+    "slave.c",
+    "recording.c",
+    "stepper.h",
+)  # the first one includes the others
 
 
 def load_stepper() -> ctypes.CDLL:

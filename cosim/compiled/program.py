@@ -1,4 +1,5 @@
-"""The program of the stepper: the plan as the C structures of ``stepper.h``, over the functions of the loaded FMUs.
+"""The program of the stepper: the plan as the C structures of ``stepper.h``, over the functions of the loaded FMUs and
+of recordings.
 
 Everything a structure points to is kept alive here. Knows no balise service and no master.
 """
@@ -13,14 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from cosim.compiled.journal import CJournal, StepperCall, StepperJournal
+from cosim.compiled.journal import StepperCall, StepperJournal
 from cosim.compiled.recorded_returns import RecordedReturn
+from cosim.compiled.recordings import FollowedInputs, NativeRecording
+from cosim.compiled.structures import CPlantMonitor, CPort, CProgram, CSlave
 from cosim.components.component import Component
+from cosim.components.recording import RecordingSlave
+from cosim.components.recording_data import Recording
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
-from cosim.diagnostics.sampled_times import BINS
 from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
+from cosim.master.interpolation.interpolators import MeanInterpolator
 from cosim.process.last_call import LAST_CALL
 from fmus.fmi.elements import Element
 from fmus.fmi.ports import is_native
@@ -57,100 +62,12 @@ class Stop(IntEnum):
     CROSSED = 7
     NOT_FINITE = 8
     SENT = 9  # in Python only: the inputs were sent, and no more was to be done
-    HANDED = 10
+    ARRIVE = 10
+    HANDED = 11
 
 
 class NotCompilable(CosimError):  # noqa: N818 - no error unless somebody demanded the compiled stepper
     """A plan that the compiled stepper cannot execute; the message says why."""
-
-
-class CPort(ctypes.Structure):
-    """`Port`."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("function", "references", "values", "raw", "places", "elements")),
-        *((name, ctypes.c_int64) for name in ("count", "reference_count", "raw_count", "raw_bytes", "kind")),
-    )
-
-
-class CSlave(ctypes.Structure):
-    """`Slave`."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "writes", "reads")),
-        *(
-            (name, ctypes.c_int64)
-            for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")
-        ),
-        *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs")),
-        ("calls", ctypes.c_int64),
-        ("all_calls", ctypes.c_int64),
-        ("sampled_seconds", ctypes.c_double * BINS),
-        ("sampled_calls", ctypes.c_int64 * BINS),
-        ("now", ctypes.c_double),
-        ("calls_here", ctypes.c_int64),
-        ("more_calls", ctypes.c_int64),
-        ("seconds_over", ctypes.c_double),
-        ("numbers", ctypes.c_int64),
-    )
-
-
-class CPlantMonitor(ctypes.Structure):
-    """`PlantMonitor`."""
-
-    _fields_ = (
-        *((name, ctypes.c_int64) for name in ("slave", "first_output", "output_count", "position", "speed")),
-        *((name, ctypes.c_double) for name in ("position_scale", "speed_scale", "acceleration_limit")),
-        ("places", ctypes.c_void_p),
-        *((name, ctypes.c_int64) for name in ("place_count", "cursor")),
-    )
-
-
-class CPassed(ctypes.Structure):
-    """`Passed`."""
-
-    _fields_ = (
-        ("which", ctypes.c_int64),
-        *((name, ctypes.c_double) for name in ("stamp", "position", "speed", "reading")),
-    )
-
-
-class CBalises(ctypes.Structure):
-    """`Balises`."""
-
-    _fields_ = (
-        *((name, ctypes.c_int64) for name in ("on", "by_instant")),
-        ("instants", ctypes.c_void_p),
-        *((name, ctypes.c_int64) for name in ("instant_count", "next_instant")),
-        *((name, ctypes.c_void_p) for name in ("accuracies", "save_state", "restore_state", "release_state")),
-        ("odometer", ctypes.c_int64),
-        *((name, ctypes.c_void_p) for name in ("continuous", "telegrams", "start", "final", "there", "arrived")),
-        ("passed", ctypes.POINTER(CPassed)),
-        ("outcomes", ctypes.POINTER(ctypes.c_int64)),
-        *((name, ctypes.c_int64) for name in ("passed_count", "passed_limit", "steps")),
-    )
-
-
-class CProgram(ctypes.Structure):
-    """`Program`."""
-
-    _fields_ = (
-        *((name, ctypes.c_double) for name in ("start", "step")),
-        ("values", ctypes.c_void_p),
-        ("value_count", ctypes.c_int64),
-        ("slaves", ctypes.c_void_p),
-        ("slave_count", ctypes.c_int64),
-        ("watch", CPlantMonitor),
-        ("balises", CBalises),
-        ("journal", CJournal),
-        ("seconds_at_most", ctypes.c_double),
-        *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_told")),
-        ("rows_before", ctypes.c_int64),
-        ("rows_done", ctypes.c_int64),
-        ("seconds", ctypes.c_double),
-        *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
-        ("reached", ctypes.c_double),
-    )
 
 
 class Program:
@@ -158,7 +75,7 @@ class Program:
 
     Args:
         plan: prepared; components instantiated, and not to be instantiated anew.
-        axis: communication points.
+        axis: communication points. library: the stepper, which plays recordings back itself.
 
     Attributes `head` and `slaves` are the structures; `writes` and `reads` the names of the functions of each slave's
     ports.
@@ -167,8 +84,14 @@ class Program:
         NotCompilable: something in the plan has no place in it; it is named.
     """
 
-    def __init__(self, plan: Plan, axis: TimeAxis) -> None:
+    def __init__(self, plan: Plan, axis: TimeAxis, library: Any) -> None:
         self.plan = plan
+        self._recordings = {
+            step.component.name: NativeRecording(step.component.slave, library)
+            for step in plan.steps
+            if isinstance(step.component.slave, RecordingSlave)
+        }
+        self._followed: dict[str, FollowedInputs] = {}
         self._kept: list[Any] = []
         self.writes: list[list[str]] = []
         self.reads: list[list[str]] = []
@@ -177,6 +100,8 @@ class Program:
         self.head.values, self.head.value_count = plan.values.ctypes.data, len(plan.values)
         self.head.slaves, self.head.slave_count = ctypes.addressof(self.slaves), len(plan.steps)
         self.head.watch.slave = -1
+        if plan.can_be_missing.any():
+            self.head.can_be_missing = self.keep(plan.can_be_missing.astype(np.uint8))
         self.head.last_call = LAST_CALL.address
         self.head.last_time = LAST_CALL.address + 8
         self._nobody_reads = ctypes.c_int64()
@@ -272,9 +197,9 @@ class Program:
 
     def _slave(self, step: PlannedComponent) -> CSlave:
         component, inputs = step.component, step.inputs
-        _check(component)
+        instance = self._instance(component)
         outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
-        made = CSlave(instance=_address_of(component.slave.component), fmi_version=component.fmi_version)
+        made = CSlave(instance=instance, fmi_version=component.fmi_version)
         made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
         made.numbers = LAST_CALL.numbers(component.name)
         made.heeds_events = bool(getattr(component, "has_event_mode", False))
@@ -288,7 +213,21 @@ class Program:
         if np.any(inputs.factors != 1.0) or np.any(inputs.offsets != 0.0):
             made.factors, made.offsets = self.keep(inputs.factors), self.keep(inputs.offsets)
         made.inputs = self.keep(inputs.buffer)
+        if isinstance(step.interpolator, MeanInterpolator):
+            self._followed[component.name] = FollowedInputs(step.interpolator, inputs, self._native_of)
+            made.followed = self._followed[component.name].address
         return made
+
+    def _native_of(self, recording: Recording) -> int:
+        """Address of a recording of the plan."""
+        return next(native.address for native in self._recordings.values() if native.recording is recording)
+
+    def _instance(self, component: Component) -> int:
+        """Address of the instance in C."""
+        if component.name in self._recordings:
+            return self._recordings[component.name].address
+        _check(component)
+        return _address_of(component.slave.component)
 
     def _ports(
         self, component: Component, verb: str, names: Sequence[str], values: np.ndarray
@@ -331,6 +270,8 @@ class Program:
         Args:
             name: of a C function.
         """
+        if component.name in self._recordings:
+            return self._recordings[component.name].function(name)
         return _address_of(component.slave._functions[name])
 
     def keep(self, array: np.ndarray) -> int:

@@ -1,23 +1,5 @@
 /* One slave: its functions, its variables, one step of it. Part of `stepper.c`. */
-#if !defined(_WIN32)
-#define _POSIX_C_SOURCE 199309L /* clock_gettime */
-#endif
-#include "stepper.h"
-
-#include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <string.h>
-#include <time.h>
-
-#if defined(_WIN32)
-#define EXPORTED __declspec(dllexport)
-#else
-#define EXPORTED __attribute__((visibility("default")))
-#endif
-
-#define STATUS_WARNING 1 /* in all versions of FMI: more than this is a failure */
-#define TIME_TOLERANCE 1e-9 /* communication times closer than this are the same [s], as in the components */
+#include "recording.c"
 
 /* -- the journal: calls that Python may have to repeat ---------------------------------------------------------------- */
 
@@ -194,14 +176,36 @@ static void begin_step(Program *program) {
     memcpy(start_of(program), program->values, (size_t)program->value_count * sizeof(double));
 }
 
-static void gather(const Slave *slave, const double *values) {
+/* Take the inputs for a step from `t` to `until` [s]. */
+static void gather(const Slave *slave, const double *values, double t, double until) {
+    double *inputs = slave->followed == NULL ? slave->inputs : slave->followed->gathered;
+    if (slave->followed != NULL) {
+        slave->followed->begin = t;
+        slave->followed->end = until;
+    }
     if (slave->factors == NULL) {
         for (int64_t i = 0; i < slave->input_count; i++)
-            slave->inputs[i] = values[slave->sources[i]];
+            inputs[i] = values[slave->sources[i]];
         return;
     }
     for (int64_t i = 0; i < slave->input_count; i++)
-        slave->inputs[i] = values[slave->sources[i]] * slave->factors[i] + slave->offsets[i];
+        inputs[i] = values[slave->sources[i]] * slave->factors[i] + slave->offsets[i];
+}
+
+/* Inputs of which some follow columns of recordings: for a part of a step from `t` to `until` [s] their means where they act on
+   derivatives, else what they are at its end; as `MeanInterpolator`. */
+static void follow(const Slave *slave, double t, double until, bool arrived) {
+    const Followed *followed = slave->followed;
+    for (int64_t i = 0; i < slave->input_count; i++) { /* a line of slope zero, as in Python to the sign of zero */
+        double time = !arrived && followed->over[i] ? 0.5 * (t + until) : until;
+        slave->inputs[i] = followed->gathered[i] + 0.0 * (time - (followed->held[i] ? followed->begin : followed->end));
+    }
+    for (int64_t i = 0; i < followed->column_count; i++) {
+        const FollowedColumn *one = &followed->columns[i];
+        bool mean = !arrived && followed->over[one->input];
+        double value = mean ? column_mean(one->recording, one->column, t, until) : column_at(one->recording, one->column, until, true);
+        slave->inputs[one->input] = one->factor * value + one->offset;
+    }
 }
 
 /* -- one slave ----------------------------------------------------------------------------------------------------- */
@@ -213,7 +217,7 @@ static bool stopped(Program *program, int64_t stop, int64_t slave, int64_t port)
     return false;
 }
 
-static bool send_inputs(Program *program, int64_t which) {
+static bool send(Program *program, int64_t which) {
     const Slave *slave = &program->slaves[which];
     for (int64_t i = 0; i < slave->write_count; i++) /* first of all, so that a refused value touches nothing */
         if (slave->writes[i].places != NULL && !pack(&slave->writes[i]))
@@ -227,6 +231,23 @@ static bool send_inputs(Program *program, int64_t which) {
             return stopped(program, STOP_WRITE, which, i);
     }
     return true;
+}
+
+/* The gathered inputs for a step, or a part of one, from `t` to `until` [s]. */
+static bool send_inputs(Program *program, int64_t which, double t, double until) {
+    const Slave *slave = &program->slaves[which];
+    if (slave->followed != NULL)
+        follow(slave, t, until, false);
+    return send(program, which);
+}
+
+/* It stands at `until` [s]: where only a mean was sent, outputs follow from the value there. */
+static bool arrive(Program *program, int64_t which, double until) {
+    const Slave *slave = &program->slaves[which];
+    if (slave->followed == NULL || !slave->followed->passes)
+        return true;
+    follow(slave, until, until, true);
+    return send(program, which) || stopped(program, STOP_ARRIVE, which, 0);
 }
 
 static bool read_outputs(Program *program, int64_t which) {
@@ -262,16 +283,16 @@ static void sample(Slave *slave, double seconds) {
     slave->sampled_calls[bin]++;
 }
 
-static bool move(Program *program, int64_t which, double t, double h, bool timed) {
+static bool move(Program *program, int64_t which, double t, double until, bool timed) {
     Slave *slave = &program->slaves[which];
-    if (!send_inputs(program, which))
+    if (!send_inputs(program, which, t, until))
         return false;
     slave->calls++;
     double begin = timed ? now() : 0.0;
-    bool ordinary = do_step(program, which, t, h);
+    bool ordinary = do_step(program, which, t, until - t);
     if (timed)
         sample(slave, now() - begin);
     if (!ordinary)
         return stopped(program, STOP_STEP, which, 0);
-    return read_outputs(program, which);
+    return arrive(program, which, until) && read_outputs(program, which);
 }

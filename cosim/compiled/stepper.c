@@ -6,13 +6,13 @@
 
 #define SAMPLING 17 /* every so many steps the clock is read; prime, so as not to follow a rhythm of the model */
 
-static bool step_plan(Program *program, double t, double h, bool timed) {
+static bool step_plan(Program *program, double t, double until, bool timed) {
     const PlantMonitor *watch = &program->watch;
     bool watched = watch->slave >= 0 && !program->balises.by_instant;
     begin_step(program);
     for (int64_t i = 0; i < program->slave_count; i++) {
-        gather(&program->slaves[i], program->values);
-        if (!move(program, i, t, h, timed))
+        gather(&program->slaves[i], program->values, t, until);
+        if (!move(program, i, t, until, timed))
             return false;
         if (watched && i == watch->slave && crossed(program)) {
             memcpy(program->values + watch->first_output, start_of(program) + watch->first_output, (size_t)watch->output_count * sizeof(double));
@@ -22,11 +22,13 @@ static bool step_plan(Program *program, double t, double h, bool timed) {
     return true;
 }
 
-/* Whether all values are finite: the difference of a number to itself is zero, else it is NaN. */
-static bool all_finite(const double *values, int64_t count) {
+/* Whether all values are finite, or missing where they can be: the difference of a number to itself is zero, else it is NaN. */
+static bool all_finite(const Program *program) {
+    const double *values = program->values;
     double sum = 0.0;
-    for (int64_t i = 0; i < count; i++)
-        sum += values[i] - values[i];
+    for (int64_t i = 0; i < program->value_count; i++)
+        if (program->can_be_missing == NULL || !program->can_be_missing[i] || !isnan(values[i]))
+            sum += values[i] - values[i];
     return sum == 0.0;
 }
 
@@ -57,14 +59,14 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
                 break;
             used += events;
         } else {
-            if (!step_plan(program, t, until - t, timed))
+            if (!step_plan(program, t, until, timed))
                 break;
         }
         double *row = rows + used++ * width;
         row[0] = until;
         memcpy(row + 1, program->values, bytes);
         *program->rows_told = program->rows_before + used;
-        if (!all_finite(program->values, program->value_count))
+        if (!all_finite(program))
             stopped(program, STOP_NOT_FINITE, 0, 0);
     }
     program->rows_done = used;

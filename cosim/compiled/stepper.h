@@ -4,8 +4,25 @@
 #ifndef STEPPER_H
 #define STEPPER_H
 
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 199309L /* clock_gettime */
+#endif
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
+#include <string.h>
+#include <time.h>
 
+#if defined(_WIN32)
+#define EXPORTED __declspec(dllexport)
+#else
+#define EXPORTED __attribute__((visibility("default")))
+#endif
+
+#define STATUS_WARNING 1 /* in all versions of FMI: more than this is a failure */
+#define STATUS_ERROR 3
+#define TIME_TOLERANCE 1e-9 /* communication times closer than this are the same [s], as in the components */
 #define BINS 40 /* of times of calls: 2 to 4 ns, 4 to 8 ns, ... as in sampled_times.py */
 
 /* Types of variables, by what the function of the library takes. */
@@ -28,6 +45,36 @@ typedef struct {
     int64_t kind;
 } Port;
 
+/* What is played back, with the surface of a slave. */
+typedef struct {
+    const double *time;      /* of the rows [s], not decreasing */
+    const double *rows;      /* values, row by row */
+    const uint8_t *held;     /* of each column; the others run on lines between rows */
+    int64_t row_count, column_count;
+    double *values;          /* where it stands */
+    double *stands;          /* the time [s], and 1 where it stands before an event of this time */
+    int64_t row;             /* near which the next search begins */
+    double saved[2];         /* where it stood */
+} Recording;
+
+/* An input that follows a column of a recording within a step: factor * column + offset. */
+typedef struct {
+    Recording *recording;
+    int64_t column, input;
+    double factor, offset;
+} FollowedColumn;
+
+/* Inputs of which some follow columns. */
+typedef struct {
+    const FollowedColumn *columns;
+    int64_t column_count;
+    double *gathered;      /* all inputs, as they are at the end or the start of the step */
+    const uint8_t *over;   /* of each input: it gets the mean over the step, not the value at the end */
+    const uint8_t *held;   /* of each input: it is that of the start */
+    int64_t passes;        /* some of these means have direct feedthrough: the value at the end follows */
+    double begin, end;     /* of the step [s] */
+} Followed;
+
 typedef struct {
     void *instance;
     void *do_step;
@@ -39,6 +86,7 @@ typedef struct {
     const int64_t *sources;            /* where they lie in the values of the plan, or in those at the start behind them */
     const double *factors, *offsets;   /* NULL: nothing is converted */
     double *inputs;                    /* gathered */
+    Followed *followed;                /* NULL: inputs are sent as they are gathered */
     int64_t calls;                     /* of doStep in the present chunk */
     int64_t all_calls;                 /* in all chunks before */
     double sampled_seconds[BINS];      /* of sampled calls, by bins of their length, added up; see sampled_times.py */
@@ -102,6 +150,7 @@ typedef struct {
     int64_t by_instant;     /* else by the places of the watch */
     const double *instants; /* [s], increasing */
     int64_t instant_count, next_instant;
+    const double *recorded; /* of each instant what its telegram said: position and accuracy [m], odometer reading; NULL: nobody recorded it */
     const double *accuracies; /* of the places [m] */
     void *save_state, *restore_state, *release_state; /* functions of the plant */
     int64_t odometer;       /* column, or -1 */
@@ -154,6 +203,7 @@ enum {
     STOP_CROSSED,    /* the plant passed a balise unforeseen; the slave is stepped, its outputs are those before the step */
     STOP_NOT_FINITE, /* a value is not finite; the step is done and recorded */
     STOP_SENT,       /* in Python only */
+    STOP_ARRIVE,     /* a function that sets the inputs of the end of the step failed; the slave is stepped */
     STOP_HANDED,     /* a step over a balise is not ordinary: the values are those before it, the calls are in the journal */
 };
 
@@ -171,6 +221,7 @@ typedef struct {
     double *last_time;
     int64_t *rows_told;         /* where the rows that are filled are counted, for the same */
     int64_t rows_before;        /* those that are filled before the chunk */
+    const uint8_t *can_be_missing; /* values that may be NaN; NULL: none */
     int64_t rows_done;          /* in the chunk: one for each step, and those of events */
     double seconds;             /* it lasted */
     /* where and why it ended */

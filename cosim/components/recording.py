@@ -30,14 +30,16 @@ class RecordingSlave:
 
     Args:
         recording: what is played back.
+
+    `values` are the columns where it stands, shape (n,), `stands` says where: the time [s], and 1 where it stands
+    before an event of this time. The compiled stepper moves both as well.
     """
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
         self.model_description = self.modelDescription = describe(recording)
         self.component = self
-        self._values = np.zeros(len(recording.signals))
-        self._time, self._before = 0.0, False
+        self.values, self.stands = np.zeros(len(recording.signals)), np.zeros(2)
 
     # -- life -------------------------------------------------------------------------------------------------------
 
@@ -56,11 +58,11 @@ class RecordingSlave:
         """
         self._go(startTime, before=False)
         for place, signal in enumerate(self.recording.signals):
-            self._values[place] = self.recording.before_start.get(signal.name, self._values[place])
+            self.values[place] = self.recording.before_start.get(signal.name, self.values[place])
 
     def exitInitializationMode(self) -> None:
         """The first row."""
-        self._go(self._time, before=False)
+        self._go(float(self.stands[0]), before=False)
 
     def terminate(self) -> None:
         """Nothing to do."""
@@ -83,8 +85,9 @@ class RecordingSlave:
 
     def updateDiscreteStates(self) -> tuple[bool, bool, bool, bool, bool, float]:
         """The row after the event, and when the next one is due."""
-        changed, following = self._before, self.recording.next_event(self._time)
-        self._go(self._time, before=False)
+        time, changed = self.getFMUState()
+        following = self.recording.next_event(time)
+        self._go(time, before=False)
         return False, False, False, changed, bool(np.isfinite(following)), following
 
     def enterStepMode(self) -> None:
@@ -92,7 +95,7 @@ class RecordingSlave:
 
     def getFMUState(self) -> tuple[float, bool]:
         """Where it stands."""
-        return self._time, self._before
+        return float(self.stands[0]), bool(self.stands[1])
 
     def setFMUState(self, state: tuple[float, bool]) -> None:
         """Go there.
@@ -110,8 +113,8 @@ class RecordingSlave:
         """
 
     def _go(self, t: float, *, before: bool) -> None:
-        self._values[:] = self.recording.at(t, before=before)
-        self._time, self._before = t, before
+        self.values[:] = self.recording.at(t, before=before)
+        self.stands[:] = t, before
 
     # -- values -----------------------------------------------------------------------------------------------------
 
@@ -122,7 +125,7 @@ class RecordingSlave:
             vr: value references.
             nValues: without effect: columns are scalars.
         """
-        return [float(self._values[reference - 1]) for reference in vr]
+        return [float(self.values[reference - 1]) for reference in vr]
 
     def getInt32(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
         """Values of columns of whole numbers.
@@ -131,7 +134,7 @@ class RecordingSlave:
             vr: value references.
             nValues: without effect: columns are scalars.
         """
-        return [int(self._values[reference - 1]) for reference in vr]
+        return [int(self.values[reference - 1]) for reference in vr]
 
     def prepared_get(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
         """A call that reads columns into `values`.
@@ -139,7 +142,7 @@ class RecordingSlave:
         Args:
             references: value references.
         """
-        places, held = np.array(references, dtype=np.intp) - 1, self._values
+        places, held = np.array(references, dtype=np.intp) - 1, self.values
 
         def read() -> None:
             held.take(places, out=values, mode="clip")

@@ -70,8 +70,8 @@ class System:
             network.attach(plan, () if balises is None else balises.receivers)
 
     @property
-    def divides_steps(self) -> bool:
-        """Whether a step is divided where an event of a component lies in it."""
+    def meets_events(self) -> bool:
+        """Whether a step is divided where a component meets an event that nobody knew of before it."""
         return False
 
     def advance(self, t: float, until: float) -> Sequence[Row]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from cosim.balises.service import Row
 from cosim.components.component import Component
+from cosim.components.recording import RecordingComponent
 from cosim.coupling.chain import Mover
 from cosim.coupling.planned import PlannedComponent
 from cosim.errors import RunError
@@ -53,9 +54,11 @@ class EventCoordinator:
         self.notes = self._remarks()
 
     @property
-    def only_network(self) -> bool:
-        """Whether it divides steps at the instants of the network alone."""
-        return not self._participants
+    def all_foreseen(self) -> bool:
+        """Whether it divides steps at the instants of the network and at events of recordings alone: their times are
+        known, and nothing that others do is an event for them.
+        """
+        return all(isinstance(participant.component, RecordingComponent) for participant in self._participants)
 
     # -- steps ------------------------------------------------------------------------------------------------------
 

@@ -82,7 +82,7 @@ class FirstOrderHold:
         continuous: np.ndarray,
         known: Sequence[KnownInputs] = (),
     ) -> None:
-        self.method, self.continuous, self._known = method, continuous, known
+        self.method, self.continuous, self.known = method, continuous, known
         self._distinct = list({id(c): c for c in sources}.values())
         self._source_of = np.array([[id(d) for d in self._distinct].index(id(c)) for c in sources], dtype=np.intp)
         count = len(continuous)
@@ -130,21 +130,21 @@ class FirstOrderHold:
             begins: of values that jump there those after the jump, not those before it.
         """
         values: np.ndarray = self._history.later + self.slope * (time - self._history.later_at)
-        for known in self._known:
+        for known in self.known:
             values[known.places] = known.converted(known.course.at(time, before=not begins))
         return values
 
     def mean(self, t: float, until: float) -> np.ndarray:
         """Means of the inputs from `t` to `until` [s], shape (m,)."""
         values = self.at(0.5 * (t + until))
-        for known in self._known:
+        for known in self.known:
             values[known.places] = known.converted(known.course.mean(t, until))
         return values
 
     def slopes(self, t: float, until: float) -> np.ndarray:
         """Slopes of the inputs from `t` to `until` [s], shape (m,)."""
         slopes = self.slope.copy()
-        for known in self._known:
+        for known in self.known:
             ends = known.course.at(t, before=False), known.course.at(until, before=True)
             slopes[known.places] = known.factors * (ends[1] - ends[0]) / (until - t)
         return slopes

@@ -79,6 +79,8 @@ class MeanInterpolator(InputInterpolator):
 
     Args:
         hold: of the inputs. inputs: the connected inputs of the component. component: that receives them.
+
+    `over` is the mask of the inputs that get the mean, `passes` of those that outputs show, shape (m,).
     """
 
     name = "mean"
@@ -90,15 +92,15 @@ class MeanInterpolator(InputInterpolator):
         if acting is None:
             acting = set(inputs.names) - direct
         over = [name in acting and not component.can_be_missing(name) for name in inputs.names]  # those are samples
-        self._over = np.array(over, dtype=bool)
-        self._passes = self._over & np.array([name in direct for name in inputs.names], dtype=bool)
+        self.over = np.array(over, dtype=bool)
+        self.passes = self.over & np.array([name in direct for name in inputs.names], dtype=bool)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        self._inputs.buffer[:] = np.where(self._over, self.hold.mean(t, until), self.hold.at(until))
+        self._inputs.buffer[:] = np.where(self.over, self.hold.mean(t, until), self.hold.at(until))
         self._inputs.send()
 
     def arrive(self, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        if self._passes.any():
+        if self.passes.any():
             self._inputs.buffer[:] = self.hold.at(until)
             self._inputs.send()
 

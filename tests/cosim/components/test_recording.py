@@ -248,10 +248,3 @@ def test_it_is_shown_and_not_exported(tmp_path: Path) -> None:
     assert "rec" in scenario.structure().text()
     with pytest.raises(ScenarioError, match="a recording is no FMU"):
         scenario.export_ssp(tmp_path / "x.ssp")
-
-
-def test_the_compiled_stepper_says_why_it_is_not_used(tmp_path: Path) -> None:
-    scenario = listening(tmp_path, write(tmp_path, "time,speed\n0,1\n1,2\n"))
-    assert "recording" in scenario.run().result.summary["master"]["stepper"]["reason"]
-    with pytest.raises(CouplingError, match="runs in Python"):
-        scenario.copy().master(stepper="compiled").run()

@@ -1,0 +1,101 @@
+"""Structures of ``stepper.h``: what is handed to the stepper, field by field."""
+
+from __future__ import annotations
+
+import ctypes
+
+from cosim.compiled.journal import CJournal
+from cosim.diagnostics.sampled_times import BINS
+
+
+class CPort(ctypes.Structure):
+    """`Port`."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("function", "references", "values", "raw", "places", "elements")),
+        *((name, ctypes.c_int64) for name in ("count", "reference_count", "raw_count", "raw_bytes", "kind")),
+    )
+
+
+class CSlave(ctypes.Structure):
+    """`Slave`."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "writes", "reads")),
+        *(
+            (name, ctypes.c_int64)
+            for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")
+        ),
+        *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs", "followed")),
+        ("calls", ctypes.c_int64),
+        ("all_calls", ctypes.c_int64),
+        ("sampled_seconds", ctypes.c_double * BINS),
+        ("sampled_calls", ctypes.c_int64 * BINS),
+        ("now", ctypes.c_double),
+        ("calls_here", ctypes.c_int64),
+        ("more_calls", ctypes.c_int64),
+        ("seconds_over", ctypes.c_double),
+        ("numbers", ctypes.c_int64),
+    )
+
+
+class CPlantMonitor(ctypes.Structure):
+    """`PlantMonitor`."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("slave", "first_output", "output_count", "position", "speed")),
+        *((name, ctypes.c_double) for name in ("position_scale", "speed_scale", "acceleration_limit")),
+        ("places", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("place_count", "cursor")),
+    )
+
+
+class CPassed(ctypes.Structure):
+    """`Passed`."""
+
+    _fields_ = (
+        ("which", ctypes.c_int64),
+        *((name, ctypes.c_double) for name in ("stamp", "position", "speed", "reading")),
+    )
+
+
+class CBalises(ctypes.Structure):
+    """`Balises`."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("on", "by_instant")),
+        ("instants", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("instant_count", "next_instant")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("recorded", "accuracies", "save_state", "restore_state", "release_state")
+        ),
+        ("odometer", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("continuous", "telegrams", "start", "final", "there", "arrived")),
+        ("passed", ctypes.POINTER(CPassed)),
+        ("outcomes", ctypes.POINTER(ctypes.c_int64)),
+        *((name, ctypes.c_int64) for name in ("passed_count", "passed_limit", "steps")),
+    )
+
+
+class CProgram(ctypes.Structure):
+    """`Program`."""
+
+    _fields_ = (
+        *((name, ctypes.c_double) for name in ("start", "step")),
+        ("values", ctypes.c_void_p),
+        ("value_count", ctypes.c_int64),
+        ("slaves", ctypes.c_void_p),
+        ("slave_count", ctypes.c_int64),
+        ("watch", CPlantMonitor),
+        ("balises", CBalises),
+        ("journal", CJournal),
+        ("seconds_at_most", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_told")),
+        ("rows_before", ctypes.c_int64),
+        ("can_be_missing", ctypes.c_void_p),
+        ("rows_done", ctypes.c_int64),
+        ("seconds", ctypes.c_double),
+        *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
+        ("reached", ctypes.c_double),
+    )
