@@ -71,7 +71,7 @@ static bool drive(Program *program, int64_t which, double t, double until) {
     if (!send_inputs(program, which, t, until))
         return false;
     slave->calls_here++;
-    if (!do_step(program, which, t, until - t))
+    if (!do_step(program, which, t, until))
         return false;
     slave->now = until;
     return arrive(program, which, until) && read_outputs(program, which);
@@ -402,7 +402,7 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
         return -1;
     Over over = {.program = program, .t = t, .until = until};
     for (int64_t i = 0; i < program->slave_count; i++) {
-        program->slaves[i].calls_here = 0;
+        program->slaves[i].calls_here = program->slaves[i].returns_here = 0;
         program->slaves[i].now = t;
     }
     begin_step(program);
@@ -418,6 +418,7 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
     for (int64_t i = 0; i < program->slave_count; i++) {
         program->slaves[i].calls++;
         program->slaves[i].more_calls += program->slaves[i].calls_here - 1;
+        program->slaves[i].returns += program->slaves[i].returns_here;
     }
     stopped(program, STOP_DONE, 0, 0);
     balises->steps++;

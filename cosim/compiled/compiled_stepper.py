@@ -226,7 +226,7 @@ class CompiledStepper:
 
     def _quicken(self, place: int, step: PlannedComponent) -> None:
         """In the steps that are Python's a component still moves by one call into the stepper."""
-        component, moves = step.component, self._moves[place]
+        component, moves, slave = step.component, self._moves[place], self._program.slaves[place]
         call, address = self._library.stepper_move, self._address
 
         def move(reads: bool, slowly: Mover, t: float, until: float) -> None:
@@ -236,7 +236,7 @@ class CompiledStepper:
             begin = perf_counter()
             if call(address, place, t, until, reads):
                 component.time = until
-                component.calls += 1
+                component.calls += 1 + slave.returns_here
                 moves["set"] += 1
                 moves["get"] += reads
                 component.seconds += perf_counter() - begin
@@ -298,7 +298,9 @@ class CompiledStepper:
         if head.stop in WITHIN:
             for step in self.plan.steps[: head.slave]:
                 step.component.time = self.axis[k + 1]
-            self._program.slaves[head.slave].calls -= head.stop in STEPPED
+            if head.stop in STEPPED:  # Python counts them when they are repeated
+                self._program.slaves[head.slave].calls -= 1
+                self._program.slaves[head.slave].returns -= head.return_count
 
     def close(self) -> None:
         """Add what was done here to the counters of the components."""
@@ -309,14 +311,14 @@ class CompiledStepper:
                 step.component.call_statistics[kind].add(0.0, count)
                 moves[kind] = 0
             component, calls, over = step.component, slave.calls + slave.all_calls, self._program.head.balises.steps
-            component.calls += calls + slave.more_calls
+            component.calls += calls + slave.more_calls + slave.returns
             for kind in ("get", "set") if len(step.inputs) else ("get",):
                 component.call_statistics[kind].add(
                     0.0, calls + slave.more_calls
                 )  # so short in C that only doStep is timed
             component.seconds += slave.seconds_over
             component.seconds += max(calls - over, 0) * typical_seconds(slave.sampled_calls, slave.sampled_seconds)
-            slave.calls = slave.all_calls = slave.more_calls = 0
+            slave.calls = slave.all_calls = slave.more_calls = slave.returns = 0
 
 
 def _load() -> Any:

@@ -18,6 +18,8 @@ end.
 """
 
 CALLS_OF_EVENT = 12
+EARLY_RETURNS = 1024
+"""Room for those of all slaves in a step; a step with more of them is Python's."""
 FMI2, FMI3 = 2, 3
 
 
@@ -81,7 +83,7 @@ class CJournal(ctypes.Structure):
     _fields_ = (
         ("on", ctypes.c_int64),
         ("notes", ctypes.POINTER(CNote)),
-        ("count", ctypes.c_int64),
+        *((name, ctypes.c_int64) for name in ("count", "returns_up_to")),
         ("bytes", ctypes.c_void_p),
         ("used", ctypes.c_int64),
     )
@@ -96,7 +98,8 @@ class StepperJournal:
 
     def __init__(self, head: CJournal, calls: int, values: int) -> None:
         self._head = head
-        self._notes = (CNote * (STEPS_AT_MOST * (calls + CALLS_OF_EVENT)))()
+        self._notes = (CNote * (STEPS_AT_MOST * (calls + CALLS_OF_EVENT) + EARLY_RETURNS))()
+        head.returns_up_to = EARLY_RETURNS
         self._bytes = np.zeros(STEPS_AT_MOST * (values + 64), dtype=np.uint8)
         head.notes, head.bytes = ctypes.cast(self._notes, ctypes.POINTER(CNote)), self._bytes.ctypes.data
 

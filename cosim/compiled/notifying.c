@@ -1,19 +1,20 @@
 /* Telling: a receiver with event mode is stepped through one telegram. Part of `stepper.c`. */
 #include "slave.c"
 
-/* One slave alone, with its gathered inputs, from `t` to `until` [s]; its outputs are read where that is wanted. Counts nothing. Returns 1
-   where that was ordinary, else 0 and says why in the program. */
-EXPORTED int64_t stepper_move(Program *program, int64_t which, double t, double until, int64_t reads) {
-    *program->last_time = t;
+static bool move_alone(Program *program, int64_t which, double t, double until) {
     if (!send_inputs(program, which, t, until))
-        return 0;
-    if (!do_step(program, which, t, until - t))
+        return false;
+    if (!do_step(program, which, t, until))
         return stopped(program, STOP_STEP, which, 0);
-    return arrive(program, which, until) && (!reads || read_outputs(program, which));
+    return arrive(program, which, until);
 }
 
-static bool simple_move(Program *program, int64_t which, double t, double until) {
-    return stepper_move(program, which, t, until, 0) != 0;
+/* One slave alone, with its gathered inputs, from `t` to `until` [s]; its outputs are read where that is wanted. Counts early returns
+   alone. Returns 1 where that was ordinary, else 0 and says why in the program. */
+EXPORTED int64_t stepper_move(Program *program, int64_t which, double t, double until, int64_t reads) {
+    *program->last_time = t;
+    program->slaves[which].returns_here = 0;
+    return move_alone(program, which, t, until) && (!reads || read_outputs(program, which));
 }
 
 static bool succeeded(Program *program, int64_t which, int64_t call, int status) {
@@ -74,7 +75,7 @@ static bool tell_stage(Program *program, int64_t which, Telegram *telegram, cons
     about_to(program, &program->slaves[which], LAST_EVENT);
     switch (stage) {
     case STAGE_SEND: return send_inputs(program, which, times[0], times[2]);
-    case STAGE_ARRIVE: return !arrives || simple_move(program, which, times[0], times[1]);
+    case STAGE_ARRIVE: return !arrives || move_alone(program, which, times[0], times[1]);
     case STAGE_COUNT: return !arrives || count(program, which, telegram, false);
     case STAGE_BEFORE: return copy_outputs(program, which, telegram->before);
     case STAGE_ENTER: return succeeded(program, which, CALL_ENTER_EVENT, ((Enter)telegram->enter_event)(instance));
@@ -90,7 +91,7 @@ static bool tell_stage(Program *program, int64_t which, Telegram *telegram, cons
     case STAGE_LEAVE: return succeeded(program, which, CALL_ENTER_STEP, ((Enter)telegram->enter_step)(instance));
     case STAGE_COUNT_TOLD: return count(program, which, telegram, true);
     case STAGE_AFTER: return copy_outputs(program, which, telegram->after);
-    case STAGE_GO_ON: return !goes_on || simple_move(program, which, times[1], times[2]);
+    case STAGE_GO_ON: return !goes_on || move_alone(program, which, times[1], times[2]);
     case STAGE_COUNT_LATE: return !goes_on || count(program, which, telegram, true);
     default: return !goes_on || read_outputs(program, which);
     }
@@ -118,6 +119,7 @@ static void begin_alone(const Slave *slave, double t, double until) {
    outputs there go to `before` and `after`. Returns 1 where all was ordinary, else 0: the calls are in the journal. Counts nothing. */
 EXPORTED int64_t stepper_deliver(Program *program, int64_t which, Telegram *telegram, const double times[3]) {
     begin_alone(&program->slaves[which], times[0], times[2]);
+    program->slaves[which].returns_here = 0;
     program->journal.count = program->journal.used = 0;
     program->journal.on = 1;
     bool ordinary = tell(program, which, telegram, times);

@@ -125,6 +125,7 @@ class CompiledDelivery:
                 return self._slowly(t, until, telegrams)
         before, after = self._before.copy(), self._after.copy()
         component.time, component.calls = until, component.calls + (notified_at > t) + (until > notified_at)
+        component.calls += self.program.slaves[self.place].returns_here
         component.seconds += perf_counter() - begin
         delivery = Delivery(notified_at, before, after)
         self.end()

@@ -175,9 +175,9 @@ class Program:
         results: tuple[Any, ...] = (False, False, False, math.inf)  # arrived, as it did
         if stop is Stop.STEP:
             results = bool(head.event), bool(head.terminate), bool(head.early), float(head.reached)
-        said[f"fmi{version}DoStep"] = [
-            RecordedReturn(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())
-        ]
+        early = [RecordedReturn(0, (False, False, True, reached)) for reached in head.returns[: head.return_count]]
+        last = RecordedReturn(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())
+        said[f"fmi{version}DoStep"] = [*early, last]
         if stop is Stop.READ:
             said[reads[head.port]] = [RecordedReturn(head.status)]
         return said

@@ -66,21 +66,40 @@ static void about_to(const Program *program, const Slave *slave, int64_t what) {
     *program->last_call = slave->numbers + what;
 }
 
-/* True where the step was taken as asked and nothing is to be seen to. */
-static bool do_step(Program *program, int64_t which, double t, double h) {
-    const Slave *slave = &program->slaves[which];
-    about_to(program, slave, LAST_STEP);
-    bool ordinary = called_step(program, slave, t, h);
-    if (program->journal.on) {
-        Note *made = note(program, which, CALL_STEP, 0); /* nothing said: as far as it was asked to go */
-        if (!ordinary && slave->fmi_version == 3) {
-            made->flags[0] = program->event;
-            made->flags[1] = program->terminate;
-            made->flags[2] = program->early;
-            made->number = program->reached;
-        }
+/* Whether a slave has only stopped on the way to `until` [s], as FMI 3 allows it, and nothing is to be seen to: it is stepped on. */
+static bool returned_early(const Program *program, const Slave *slave, double t, double until) {
+    if (slave->fmi_version != 3 || program->status > STATUS_WARNING || !program->early || program->terminate || (program->event && slave->heeds_events))
+        return false;
+    return program->reached > t + TIME_TOLERANCE && program->reached < until - TIME_TOLERANCE;
+}
+
+static void note_step(Program *program, int64_t which, bool ordinary) {
+    Note *made = note(program, which, CALL_STEP, 0); /* nothing said: as far as it was asked to go */
+    if (!ordinary && program->slaves[which].fmi_version == 3) {
+        made->flags[0] = program->event;
+        made->flags[1] = program->terminate;
+        made->flags[2] = program->early;
+        made->number = program->reached;
     }
-    return ordinary;
+}
+
+/* From `t` to `until` [s], in as many calls as the slave needs. True where nothing is to be seen to. */
+static bool do_step(Program *program, int64_t which, double t, double until) {
+    Slave *slave = &program->slaves[which];
+    about_to(program, slave, LAST_STEP);
+    program->return_count = 0;
+    for (;;) {
+        bool ordinary = called_step(program, slave, t, until - t);
+        if (program->journal.on)
+            note_step(program, which, ordinary);
+        if (ordinary || !returned_early(program, slave, t, until))
+            return ordinary;
+        if (program->return_count == RETURNS_AT_MOST || (program->journal.on && program->journal.count >= program->journal.returns_up_to))
+            return false;
+        t = program->reached;
+        program->returns[program->return_count++] = t;
+        slave->returns_here++;
+    }
 }
 
 /* -- variables ----------------------------------------------------------------------------------------------------- */
@@ -288,10 +307,12 @@ static bool move(Program *program, int64_t which, double t, double until, bool t
     if (!send_inputs(program, which, t, until))
         return false;
     slave->calls++;
+    slave->returns_here = 0;
     double begin = timed ? now() : 0.0;
-    bool ordinary = do_step(program, which, t, until - t);
+    bool ordinary = do_step(program, which, t, until);
     if (timed)
         sample(slave, now() - begin);
+    slave->returns += slave->returns_here;
     if (!ordinary)
         return stopped(program, STOP_STEP, which, 0);
     return arrive(program, which, until) && read_outputs(program, which);

@@ -95,6 +95,7 @@ typedef struct {
     double now;                        /* where it stands [s] */
     int64_t calls_here, more_calls;    /* of doStep in the present step; in all of them, beyond one for each step */
     double seconds_over;
+    int64_t returns_here, returns;     /* calls of doStep after an early return: in the present step; in all steps but those of events */
     int64_t numbers;                   /* of its calls, as `LastCall` counts them: the first one is that of setting inputs */
 } Slave;
 
@@ -110,7 +111,7 @@ typedef struct {
     int64_t cursor;                     /* places[cursor - 1] < position <= places[cursor], kept from step to step */
 } PlantMonitor;
 
-enum { OUTCOMES_AT_MOST = 8 };
+enum { OUTCOMES_AT_MOST = 8, RETURNS_AT_MOST = 256 };
 
 /* Fields of a telegram that a receiver may be told. */
 enum { FIELD_POSITION, FIELD_LOCATION_ACCURACY, FIELD_ODOMETER_READING, FIELD_DELIVERED_AT, FIELD_STAMP, FIELDS };
@@ -186,7 +187,7 @@ typedef struct {
 typedef struct {
     int64_t on;
     Note *notes;
-    int64_t count;
+    int64_t count, returns_up_to; /* early returns are followed while there are no more notes than this */
     uint8_t *bytes;
     int64_t used;
 } Journal;
@@ -228,6 +229,8 @@ typedef struct {
     int64_t stop, slave, port, status;
     int64_t event, terminate, early; /* results of doStep */
     double reached;
+    double returns[RETURNS_AT_MOST]; /* where the slave that was stepped last returned early on its way [s] */
+    int64_t return_count;
 } Program;
 
 #endif

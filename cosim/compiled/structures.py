@@ -7,6 +7,8 @@ import ctypes
 from cosim.compiled.journal import CJournal
 from cosim.diagnostics.sampled_times import BINS
 
+RETURNS_AT_MOST = 256
+
 
 class CPort(ctypes.Structure):
     """`Port`."""
@@ -35,7 +37,7 @@ class CSlave(ctypes.Structure):
         ("calls_here", ctypes.c_int64),
         ("more_calls", ctypes.c_int64),
         ("seconds_over", ctypes.c_double),
-        ("numbers", ctypes.c_int64),
+        *((name, ctypes.c_int64) for name in ("returns_here", "returns", "numbers")),
     )
 
 
@@ -98,4 +100,6 @@ class CProgram(ctypes.Structure):
         ("seconds", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
         ("reached", ctypes.c_double),
+        ("returns", ctypes.c_double * RETURNS_AT_MOST),
+        ("return_count", ctypes.c_int64),
     )

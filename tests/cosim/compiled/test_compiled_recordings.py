@@ -17,7 +17,16 @@ from cosim import Scenario
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.results_folder import write_results
 from fmus.build import build_fmu
-from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, memory, output_signal, state
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    TriggeredEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+)
 
 STEP, COUNT = 0.1, 12
 STOP = STEP * COUNT
@@ -27,13 +36,17 @@ NEXT_TO = (0.0, 0.0, 0.5e-9, -0.5e-9, 1.5e-9, -1.5e-9, 0.013, 0.05, 0.077)
 
 
 class Follower(HybridSystem):
-    """Integrates an input that its output shows as well, shows another one, and keeps what a telegram says."""
+    """Integrates an input that its output shows as well, samples another one within the step, where it returns early,
+    shows a third one, and keeps what a telegram says.
+    """
 
     name = "follower"
-    states = (state("travelled", "1"), memory("told", "1"), memory("reading", "1"))
+    states = (state("travelled", "1"), memory("told", "1"), memory("reading", "1"), memory("sum", "1"))
+    parameters = (parameter("period", "s", 0.03),)
     inputs = (input_signal("effort", "1"), input_signal("speed", "1"), input_signal("number", "1"))
     outputs = (output_signal("shown", "1"), output_signal("kept", "1"), output_signal("distance", "1"))
     events = (
+        PeriodicEvent("sample", "period"),
         TriggeredEvent("balise", tuple(input_signal(f"balise_{f}", "1", variability="discrete") for f in FIELDS)),
     )
     internal_step = 0.1
@@ -42,10 +55,16 @@ class Follower(HybridSystem):
         return {"travelled": u.effort - 0.5 * x.travelled}
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        if event == "sample":
+            return {"sum": x.sum + u.number}
         return {"told": u.balise_position + u.balise_location_accuracy, "reading": u.balise_odometer_reading + u.speed}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"shown": u.effort + u.speed - u.number, "kept": x.told - x.reading, "distance": x.travelled}
+        return {
+            "shown": u.effort + u.speed - u.number,
+            "kept": x.told - x.reading + 1e-3 * x.sum,
+            "distance": x.travelled,
+        }
 
 
 @dataclass(frozen=True)
