@@ -158,7 +158,7 @@ class CompiledStepper:
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
-        if self._crossings is not None:
+        if self._crossings is not None and self._crossings.recorded:
             limit = min(limit, self._crossings.idle_until)
         network = self.system.network
         if network is None or network.idle_until >= limit:

@@ -57,15 +57,17 @@ class Crossings:
         self._places = {delivery.component.name: place for place, delivery in sorted(deliveries.items())}
         self._possible = set(self._places) == {r.planned.component.name for r in service.receivers} and self._is_plain()
         self._ordinary = np.zeros(0, dtype=bool)
+        self.recorded = isinstance(self.localiser, RecordedLocaliser)
         if isinstance(self.localiser, RecordedLocaliser):
             self._ordinary = _are_ordinary(self.localiser.records, axis) & self._possible
         self._prepare(program, plan)
 
     @property
     def idle_until(self) -> float:
-        """Up to here [s] no recorded telegram is due but those that the stepper delivers."""
-        if not isinstance(self.localiser, RecordedLocaliser):
-            return NEVER
+        """Up to here [s] no recorded telegram is due but those that the stepper delivers; where there are `recorded`
+        ones.
+        """
+        assert isinstance(self.localiser, RecordedLocaliser)
         ahead = np.flatnonzero(~self._ordinary[self.localiser.next :])
         return self.localiser.records[self.localiser.next + int(ahead[0])].stamp if len(ahead) else NEVER
 
