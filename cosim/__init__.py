@@ -6,8 +6,9 @@ compiler: what does the work is loaded when it is first used.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
     from cosim.comparison.compare import compare
@@ -52,33 +53,29 @@ __all__ = [
     "whole",
 ]
 
-_HOMES = {
-    "Comparison": "cosim.comparison.verdict",
-    "CosimError": "cosim.errors",
-    "Outcome": "cosim.run.outcome",
-    "Result": "cosim.results.result",
-    "Scenario": "cosim.simulation.scenario",
-    "Sweep": "cosim.studies.sweep",
-    "SweepResult": "cosim.studies.sweep_result",
-    "Tolerance": "cosim.comparison.tolerance",
-    "Tolerances": "cosim.comparison.tolerance",
-    "Tuning": "cosim.tuning.tuning_result",
-    "UnmetError": "cosim.errors",
-    "benchmark_observers": "cosim.observer_benchmark.benchmark",
-    "compare": "cosim.comparison.compare",
-    "load_result": "cosim.results.load_result",
-    "log_uniform": "cosim.studies.sampling_plans",
-    "rerun": "cosim.provenance",
-    "save_result": "cosim.results.save",
-    "shipped_scenarios": "cosim.scenario.shipped",
-    "tune": "cosim.tuning.tune",
-    "uniform": "cosim.studies.sampling_plans",
-    "whole": "cosim.studies.sampling_plans",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
-    return value
+__getattr__ = lazy_imports(
+    __name__,
+    {
+        "Comparison": "cosim.comparison.verdict",
+        "CosimError": "cosim.errors",
+        "Outcome": "cosim.run.outcome",
+        "Result": "cosim.results.result",
+        "Scenario": "cosim.simulation.scenario",
+        "Sweep": "cosim.studies.sweep",
+        "SweepResult": "cosim.studies.sweep_result",
+        "Tolerance": "cosim.comparison.tolerance",
+        "Tolerances": "cosim.comparison.tolerance",
+        "Tuning": "cosim.tuning.tuning_result",
+        "UnmetError": "cosim.errors",
+        "benchmark_observers": "cosim.observer_benchmark.benchmark",
+        "compare": "cosim.comparison.compare",
+        "load_result": "cosim.results.load_result",
+        "log_uniform": "cosim.studies.sampling_plans",
+        "rerun": "cosim.provenance",
+        "save_result": "cosim.results.save",
+        "shipped_scenarios": "cosim.scenario.shipped",
+        "tune": "cosim.tuning.tune",
+        "uniform": "cosim.studies.sampling_plans",
+        "whole": "cosim.studies.sampling_plans",
+    },
+)

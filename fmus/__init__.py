@@ -6,8 +6,9 @@ use `plant_models` and `fmu_observer`, never `cosim`.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
     from fmus.batch.error import BatchError
@@ -33,23 +34,19 @@ __all__ = [
     "recipe",
 ]
 
-_HOMES = {
-    "RECIPES": "fmus.recipes",
-    "Batch": "fmus.batch.members",
-    "BatchError": "fmus.batch.error",
-    "CompilationError": "fmus.toolchain.compile",
-    "CompilerMissing": "fmus.toolchain.compile",
-    "GenerationError": "fmus.content.generate",
-    "UnknownRecipeError": "fmus.recipes",
-    "build_fmu": "fmus.build",
-    "cache_folder": "plant_models.disk_cache.folder",
-    "cached_fmu": "fmus.cache",
-    "recipe": "fmus.recipes",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
-    return value
+__getattr__ = lazy_imports(
+    __name__,
+    {
+        "RECIPES": "fmus.recipes",
+        "Batch": "fmus.batch.members",
+        "BatchError": "fmus.batch.error",
+        "CompilationError": "fmus.toolchain.compile",
+        "CompilerMissing": "fmus.toolchain.compile",
+        "GenerationError": "fmus.content.generate",
+        "UnknownRecipeError": "fmus.recipes",
+        "build_fmu": "fmus.build",
+        "cache_folder": "plant_models.disk_cache.folder",
+        "cached_fmu": "fmus.cache",
+        "recipe": "fmus.recipes",
+    },
+)

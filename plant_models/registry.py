@@ -12,16 +12,18 @@ import builtins
 import logging
 import re
 import sys
-from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from plant_models.explained_error import explained
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint, EntryPoints
 
 T = TypeVar("T")
 LOG = logging.getLogger("plant_models")
@@ -257,8 +259,10 @@ def announced(group: str) -> EntryPoints:
 @cache
 def _all_announced(_: tuple[str, ...]) -> EntryPoints:
     """Read once for the folders that modules come from, and not for each registry."""
+    from importlib.metadata import entry_points  # noqa: PLC0415 - reads e-mails, and costs as much as all the rest
+
     found: Any = entry_points()  # the type hints speak of Python 3.9
-    return cast(EntryPoints, found)
+    return cast("EntryPoints", found)
 
 
 @cache
@@ -285,6 +289,23 @@ def lazy_names(room: str) -> Callable[[str], Any]:
                 if definition.search(path.read_text(encoding="utf-8")):
                     return getattr(import_module(f"{room}.{path.stem}"), name)
         raise AttributeError(f"module {room!r} has no attribute {name!r}")
+
+    return get
+
+
+def lazy_imports(room: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """A ``__getattr__`` for a package that offers names of other modules: one is imported when a name is asked for.
+
+    Args:
+        room: name of the package. homes: module of each name.
+    """
+
+    def get(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {room!r} has no attribute {name!r}")
+        found = getattr(import_module(homes[name]), name)
+        setattr(sys.modules[room], name, found)
+        return found
 
     return get
 

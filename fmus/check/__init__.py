@@ -6,8 +6,9 @@ Importing it costs nothing; what does the work is loaded when it is first used. 
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
     from fmus.check.findings import Class, Finding, Verdict
@@ -15,17 +16,13 @@ if TYPE_CHECKING:
 
 __all__ = ["CheckReport", "Class", "Finding", "Verdict", "check_fmu"]
 
-_HOMES = {
-    "CheckReport": "fmus.check.run",
-    "Class": "fmus.check.findings",
-    "Finding": "fmus.check.findings",
-    "Verdict": "fmus.check.findings",
-    "check_fmu": "fmus.check.run",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
-    return value
+__getattr__ = lazy_imports(
+    __name__,
+    {
+        "CheckReport": "fmus.check.run",
+        "Class": "fmus.check.findings",
+        "Finding": "fmus.check.findings",
+        "Verdict": "fmus.check.findings",
+        "check_fmu": "fmus.check.run",
+    },
+)

@@ -5,17 +5,13 @@ Importing this package costs nothing; `build_hosted_fmu` is loaded when it is fi
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
     from fmus.hosted.hosted_fmu import HostedExportError, build_hosted_fmu
 
 __all__ = ["HostedExportError", "build_hosted_fmu"]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module("fmus.hosted.hosted_fmu"), name)
-    return value
+__getattr__ = lazy_imports(__name__, dict.fromkeys(__all__, "fmus.hosted.hosted_fmu"))

@@ -5,8 +5,7 @@ What traces and runs systems loads CasADi, so it is loaded when it is first used
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from plant_models.hybrid.arrays import Array, matrix, vector
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
@@ -24,6 +23,7 @@ from plant_models.hybrid.signal import (
     width,
 )
 from plant_models.hybrid.system import HybridSystem
+from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
     from plant_models.hybrid.kernel import NumpyKernel, TracedKernel, make_kernel
@@ -61,20 +61,16 @@ __all__ = [
     "width",
 ]
 
-_HOMES = {
-    "NumpyKernel": "kernel",
-    "Runtime": "runtime",
-    "Snapshot": "runtime",
-    "TracedKernel": "kernel",
-    "TracedSystem": "tracing",
-    "TracingError": "tracing_error",
-    "make_kernel": "kernel",
-    "traced_once": "tracing",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    return value
+__getattr__ = lazy_imports(
+    __name__,
+    {
+        "NumpyKernel": "plant_models.hybrid.kernel",
+        "Runtime": "plant_models.hybrid.runtime",
+        "Snapshot": "plant_models.hybrid.runtime",
+        "TracedKernel": "plant_models.hybrid.kernel",
+        "TracedSystem": "plant_models.hybrid.tracing",
+        "TracingError": "plant_models.hybrid.tracing_error",
+        "make_kernel": "plant_models.hybrid.kernel",
+        "traced_once": "plant_models.hybrid.tracing",
+    },
+)
