@@ -8,7 +8,7 @@ wrong or may not come to its end. A crash is never less than a limit.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, Finding, Verdict
@@ -31,10 +31,12 @@ NO_BYTES = "do not store its states or take them to another instance"
 class Check(ABC):
     """A check. A class of it in a file of `fmus.check.checks` is made of each FMU.
 
-    Attributes:
-        name: as it is reported. failing: what a failure means. advice: what to do then.
+    It states its `name`, as it is reported, and the rest as keywords: ``class OutputsCheck(Check, failing=NOTE)``.
+
+    Args:
+        failing: what a failure means. advice: what to do then.
         basis: where it is distrusted, the FMU cannot be run at all and the rest is skipped.
-        compares: compares two runs, which tells nothing where equal runs differ anyway.
+        compares: compares two runs, which says nothing where equal runs differ anyway.
         interface: that it is about. place: when it is made, from small to large.
     """
 
@@ -46,9 +48,16 @@ class Check(ABC):
     interface: ClassVar[str] = CO_SIMULATION
     place: ClassVar[float] = 100.0
 
-    @staticmethod
+    def __init_subclass__(cls, **stated: Any) -> None:
+        super().__init_subclass__()
+        for name, value in stated.items():
+            if name not in Check.__annotations__:
+                raise TypeError(f"{cls.__name__}: a check has no {name!r}; it has {', '.join(Check.__annotations__)}.")
+            setattr(cls, name, value)
+
+    @classmethod
     @abstractmethod
-    def run(context: Context) -> CheckOutcome:
+    def run(cls, context: Context) -> CheckOutcome:
         """Make it.
 
         Args:

@@ -81,13 +81,13 @@ class FmuInstance(Instance):
         self.guard("freeInstance", lambda: call(self.slave.component))
         self.slave.component = None
 
-    def failure(self, reason: str, t: float | None = None) -> SlaveError:  # noqa: D102 - see Instance
+    def failure(self, reason: str, t: float | None = None) -> SlaveError:
         place = "" if t is None else f" at t = {t:g} s"
         return SlaveError(
             reason.rstrip(".") + place + (f"; the FMU says: {self.messages[-1]}" if self.messages else "")
         )
 
-    def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:  # noqa: D102 - see Instance
+    def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
         text = one_line(message.decode("utf-8", "replace") if isinstance(message, bytes) else message or "")
         if text:
             self.messages.append(text)

@@ -10,9 +10,11 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription
 
+from fmus.check.checked_instance import FmuInstance
 from fmus.check.checked_slave import FmuSlave, make_slave
 from fmus.check.exchange_model import FmuModel, make_model
 from fmus.check.runner import Runner
+from fmus.fmi.standard import MODEL_EXCHANGE
 
 SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
@@ -59,6 +61,14 @@ class Context:
     def model(self) -> FmuModel:
         """A fresh model exchange instance, not yet instantiated."""
         return make_model(self.folder, self.description, INSTANCE)
+
+    def instance(self, interface: str) -> FmuInstance:
+        """A fresh instance of an interface type, not yet instantiated.
+
+        Args:
+            interface: ``coSimulation`` or ``modelExchange``.
+        """
+        return self.model() if interface == MODEL_EXCHANGE else self.slave()
 
     def quiet_runner(self) -> Runner:
         """A runner that has not been stepped to find an excitation; the caller puts it away."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
+from fmpy.model_description import ModelVariable
 
 from fmus.check.findings import CheckOutcome, failed, passed
 
@@ -30,6 +31,12 @@ _SCATTERED = 0.5 + np.sqrt(np.arange(2.0, 10.0)) % 1.0
 """Steps, as multiples of that of the differences, at which the rounding of a column is looked at: unevenly spaced, for
 steps that fall on the grid of what is rounded show nothing.
 """
+
+
+def nominal_of(variable: ModelVariable) -> float:
+    """The nominal value of a variable, 1 where it declares none."""
+    declared = getattr(variable, "nominal", None)
+    return abs(float(declared)) if declared else 1.0
 
 
 def compare(

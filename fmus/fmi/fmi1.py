@@ -87,13 +87,13 @@ class FMI1Slave(WholeStepSlave):
     def _after_discard(self, error: FMICallException, t: float, until: float) -> None:
         raise self._not_done(error, t, until, status_of(self.slave.getRealStatus, fmi1LastSuccessfulTime)) from error
 
-    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
         raise self.failure(f"an FMI 1.0 slave takes no events (got '{event.name}')", t)
 
-    def save(self) -> Any:  # noqa: D102 - see Instance
+    def save(self) -> Any:
         raise self.failure("an FMI 1.0 slave cannot save its state")
 
-    def restore(self, state: Any) -> None:  # noqa: D102 - see Instance
+    def restore(self, state: Any) -> None:
         raise self.failure("an FMI 1.0 slave cannot restore a state")
 
     def release(self, state: Any) -> None:
@@ -128,11 +128,11 @@ class FMI1Slave(WholeStepSlave):
             given = f"{self.name}.{variable.name} declares the start value {text!r}"
             raise ValueError(f"{given}, which is no {variable.type}.") from error
 
-    def exact_reader(self, name: str) -> Callable[[], Values]:  # noqa: D102 - see Instance
+    def exact_reader(self, name: str) -> Callable[[], Values]:
         read = super().exact_reader(name)
         return lambda: read() if self._initialized else (self._known(name),)
 
-    def exact_writer(self, name: str) -> Callable[[Sequence[Any]], None]:  # noqa: D102 - see Instance
+    def exact_writer(self, name: str) -> Callable[[Sequence[Any]], None]:
         write = super().exact_writer(name)
 
         def write_and_hold(values: Sequence[Any]) -> None:

@@ -40,7 +40,7 @@ class FMI2Instance(Instance):
                 )
         return events
 
-    def begin_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Instance
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:
         slave = self.slave
         tolerance, words = self.tolerance_argument()
         self.guard(
@@ -66,11 +66,11 @@ class FMI2Slave(FMI2Instance, WholeStepSlave):
     def _forget(self) -> None:
         self._counts = dict.fromkeys(self.events, 0)
 
-    def exit_initialization(self) -> None:  # noqa: D102 - see Slave
+    def exit_initialization(self) -> None:
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
 
-    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
         self._counts[event.name] += 1
         fields, count = event.fields(stamp, payload), self._counts[event.name]
         self.guard(f"payload of event '{event.name}'", self.slave.setReal, list(fields), list(fields.values()))

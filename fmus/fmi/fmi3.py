@@ -53,7 +53,7 @@ class FMI3Instance(Instance):
                 )
         return events
 
-    def begin_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Instance
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:
         call = self.slave.enterInitializationMode
         tolerance, words = self.tolerance_argument()
         self.guard(
@@ -90,7 +90,7 @@ class FMI3Slave(FMI3Instance, Slave):
             quicken_fmi3(self.slave)
             quicken_states(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
 
-    def exit_initialization(self) -> None:  # noqa: D102 - see Slave
+    def exit_initialization(self) -> None:
         if self.clocks:
             self.guard("intervals of clocks", self.clocks.begin, self.time)
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
@@ -136,7 +136,7 @@ class FMI3Slave(FMI3Instance, Slave):
             return self.explained("doStep", error, t)
         return self.discarded(error, f"asked for {until:g} s", t)
 
-    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
+    def advance(self, t: float, until: float) -> None:
         if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens
             reached, event = self.step(t, until)
             if event and self.has_event_mode and not self.terminated:
@@ -207,7 +207,7 @@ class FMI3Slave(FMI3Instance, Slave):
         """
         return [bool(x) for x in self.guard("getClock", self.slave.getClock, list(references))]
 
-    def update_discrete_states(self) -> bool:  # noqa: D102 - see Instance
+    def update_discrete_states(self) -> bool:
         again, terminate, _, _, defined, next_time = self.guard("updateDiscreteStates", self.slave.updateDiscreteStates)
         self.terminated |= bool(terminate)
         if defined and math.isnan(next_time):
@@ -251,7 +251,7 @@ class FMI3Slave(FMI3Instance, Slave):
         self.set_clocks([self.events[clock].trigger])
         self.settle()
 
-    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
         self.guard(f"event '{event.name}'", self._deliver, event, stamp, payload)
 
     def _deliver(self, event: EventPort, stamp: float, payload: Mapping[str, float]) -> None:

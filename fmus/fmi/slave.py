@@ -179,7 +179,7 @@ class Slave(Instance):
 class WholeStepSlave(Slave):
     """A slave of FMI 1 or 2: a step gets to its end or is refused."""
 
-    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
+    def advance(self, t: float, until: float) -> None:
         note = self._call_note
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()

@@ -23,9 +23,8 @@ from fmus.check.check import NOTE, Check
 from fmus.check.findings import noted
 
 
-class OutputsCheck(Check):
+class OutputsCheck(Check, failing=NOTE):
     name = "outputs"
-    failing = NOTE
 
     @staticmethod
     def run(context):
@@ -93,3 +92,8 @@ def test_a_check_that_no_other_process_finds_is_refused() -> None:
         check_fmu(cached_fmu(recipe("odometer")))
     with pytest.raises(ValueError, match=r"the check 'number' is no subclass of fmus\.check\.check\.Check"):
         CHECKS["number"] = 3  # type: ignore[assignment]
+
+
+def test_a_misspelt_keyword_of_a_check_is_refused() -> None:
+    with pytest.raises(TypeError, match="MisspeltCheck: a check has no 'advise'; it has name, failing, advice, basis"):
+        type("MisspeltCheck", (Check,), {}, advise="none")

@@ -10,27 +10,17 @@ from fmus.check.check import LIMIT, Check
 from fmus.check.checks.life_checks import real_names
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, skipped
-from fmus.check.finite_differences import compare
+from fmus.check.finite_differences import compare, nominal_of
 from fmus.check.runner import WARM_UP_STEPS
 
 
-def nominal_of(variable: object) -> float:
-    """The nominal value of a variable, 1 where it declares none."""
-    declared = getattr(variable, "nominal", None)
-    return abs(float(declared)) if declared else 1.0
-
-
-class DirectionalDerivativesCheck(Check):
+class DirectionalDerivativesCheck(Check, failing=LIMIT, advice="do not use its derivatives", place=18):
     """Directional derivatives of the outputs along the inputs between two steps."""
 
     name = "directional derivatives"
-    failing = LIMIT
-    advice = "do not use its derivatives"
-    place = 18
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if not context.description.coSimulation.providesDirectionalDerivative:
             return skipped("does not declare providesDirectionalDerivative")
         runner = context.runner

@@ -86,16 +86,13 @@ def _crossing(runner: Runner, name: str, before: Sequence[float], after: Sequenc
     return runner.steps(after)[-1]
 
 
-class EventsCheck(Check):
+class EventsCheck(Check, failing=DISTRUST, place=17):
     """Every declared event happens once, and the run goes on."""
 
     name = "events"
-    failing = DISTRUST
-    place = 17
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         slave = context.runner.component
         names = list(slave.events)
         if not names:

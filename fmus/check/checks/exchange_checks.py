@@ -7,13 +7,12 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from fmus.check.check import DISTRUST, LIMIT, MISSING, Check
-from fmus.check.checks.derivative_checks import nominal_of
-from fmus.check.checks.life_checks import by, exported_symbols, listed, not_finite, real_names
+from fmus.check.check import DISTRUST, LIMIT, Check
+from fmus.check.checks.life_checks import ExportedSymbolsCheck, LoadingCheck, by, listed, not_finite, real_names
 from fmus.check.context import Context
 from fmus.check.exchange_model import FmuModel
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
-from fmus.check.finite_differences import compare
+from fmus.check.finite_differences import compare, nominal_of
 from fmus.fmi.standard import MODEL_EXCHANGE
 
 _NO_STATES = "has no continuous states"
@@ -65,70 +64,50 @@ def _path(model: FmuModel, context: Context) -> np.ndarray:
     return np.array(rows)
 
 
+def _compared(first: np.ndarray, second: np.ndarray, when: str, good: str) -> CheckOutcome:
+    """Whether two paths have the identical derivatives, each of shape (steps, n)."""
+    same = np.array_equal(first, second, equal_nan=True)
+    return by("" if same else f"{when} the same states have other derivatives", good)
+
+
 def _numbered(count: int) -> list[str]:
     return [f"[{k}]" for k in range(1, count + 1)]
 
 
-class ModelExchangeLoadingCheck(Check):
-    """The library can be loaded here, with all that it needs."""
+class ModelExchangeLoadingCheck(LoadingCheck, interface=MODEL_EXCHANGE):
+    """The same for model exchange."""
 
     name = "model exchange: loading"
-    failing = DISTRUST
-    basis = True
-    interface = MODEL_EXCHANGE
-    place = 1
-
-    @staticmethod
-    def run(context: Context) -> CheckOutcome:
-        """Make it."""
-        context.model().free()
-        return passed("the library and what it needs are loaded")
 
 
-class ModelExchangeExportedSymbolsCheck(Check):
-    """`exported_symbols` for model exchange."""
+class ModelExchangeExportedSymbolsCheck(ExportedSymbolsCheck, interface=MODEL_EXCHANGE):
+    """The same for model exchange."""
 
     name = "model exchange: exported symbols"
-    failing = LIMIT
-    advice = MISSING
-    interface = MODEL_EXCHANGE
-    place = 2
-
-    @staticmethod
-    def run(context: Context) -> CheckOutcome:
-        """Make it."""
-        return exported_symbols(context.model())
 
 
-class ModelExchangeInitialiseCheck(Check):
+class ModelExchangeInitialiseCheck(
+    Check, failing=DISTRUST, advice="give start values, if it needs some", basis=True, interface=MODEL_EXCHANGE, place=3
+):
     """Instantiate, initialise, reach continuous-time mode, terminate, free."""
 
     name = "model exchange: initialise"
-    failing = DISTRUST
-    advice = "give start values, if it needs some"
-    basis = True
-    interface = MODEL_EXCHANGE
-    place = 3
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         with started(context) as model:
             return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
 
 
-class ModelExchangeValuesAtStartCheck(Check):
+class ModelExchangeValuesAtStartCheck(
+    Check, failing=DISTRUST, advice="give start values", interface=MODEL_EXCHANGE, place=4
+):
     """Outputs, derivatives and event indicators are finite at the start."""
 
     name = "model exchange: values at start"
-    failing = DISTRUST
-    advice = "give start values"
-    interface = MODEL_EXCHANGE
-    place = 4
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         with started(context) as model:
             outputs = model.names("output")
             values = {
@@ -148,17 +127,13 @@ class ModelExchangeValuesAtStartCheck(Check):
         return passed("outputs, derivatives and event indicators are finite at the start")
 
 
-class ModelExchangeStatesCheck(Check):
+class ModelExchangeStatesCheck(Check, failing=DISTRUST, interface=MODEL_EXCHANGE, place=5):
     """States that are set are read back, and derivatives depend on nothing else."""
 
     name = "model exchange: states"
-    failing = DISTRUST
-    interface = MODEL_EXCHANGE
-    place = 5
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         with started(context) as model:
             if not model.state_count:
                 return skipped(_NO_STATES)
@@ -175,18 +150,15 @@ class ModelExchangeStatesCheck(Check):
         return passed("states are read back, derivatives at the same states are identical")
 
 
-class ModelExchangeResetAndReRunCheck(Check):
+class ModelExchangeResetAndReRunCheck(
+    Check, failing=LIMIT, advice="make a new instance for each run", interface=MODEL_EXCHANGE, place=6
+):
     """After a reset the same path has the identical derivatives."""
 
     name = "model exchange: reset and re-run"
-    failing = LIMIT
-    advice = "make a new instance for each run"
-    interface = MODEL_EXCHANGE
-    place = 6
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         with started(context) as model:
             if not model.state_count:
                 return skipped(_NO_STATES)
@@ -195,25 +167,18 @@ class ModelExchangeResetAndReRunCheck(Check):
             model.reset()
             _start(model, context)
             second = _path(model, context)
-        same = np.array_equal(first, second, equal_nan=True)
-        return by(
-            "" if same else "after a reset the same states have other derivatives",
-            "the same after a reset is identical",
-        )
+        return _compared(first, second, "after a reset", "the same after a reset is identical")
 
 
-class ModelExchangeStateRoundTripCheck(Check):
+class ModelExchangeStateRoundTripCheck(
+    Check, failing=LIMIT, advice="do not rely on saved states", interface=MODEL_EXCHANGE, place=7
+):
     """Save, integrate on, restore, integrate again: bit-identical."""
 
     name = "model exchange: state round trip"
-    failing = LIMIT
-    advice = "do not rely on saved states"
-    interface = MODEL_EXCHANGE
-    place = 7
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         with started(context) as model:
             if not model.can_save:
                 return skipped("does not declare canGetAndSetFMUstate")
@@ -226,24 +191,18 @@ class ModelExchangeStateRoundTripCheck(Check):
                 second = _path(model, context)
             finally:
                 model.release(state)
-        same = np.array_equal(first, second, equal_nan=True)
-        return by(
-            "" if same else "after a restored state the same states have other derivatives", "what follows is identical"
-        )
+        return _compared(first, second, "after a restored state", "what follows is identical")
 
 
-class ModelExchangeDirectionalDerivativesCheck(Check):
+class ModelExchangeDirectionalDerivativesCheck(
+    Check, failing=LIMIT, advice="do not use its derivatives", interface=MODEL_EXCHANGE, place=8
+):
     """Directional derivatives of derivatives and outputs along states and inputs."""
 
     name = "model exchange: directional derivatives"
-    failing = LIMIT
-    advice = "do not use its derivatives"
-    interface = MODEL_EXCHANGE
-    place = 8
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if not context.description.modelExchange.providesDirectionalDerivative:
             return skipped("does not declare providesDirectionalDerivative")
         with started(context) as model:

@@ -9,9 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 
-from fmus.check.behaviour import difference
 from fmus.check.check import LIMIT, ONE_INSTANCE, Check
-from fmus.check.checks.life_checks import SHARE_OF_BUDGET, by
+from fmus.check.checks.life_checks import SHARE_OF_BUDGET, compared
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
 from fmus.check.runner import WARM_UP_STEPS, elsewhere, end_of_experiment
@@ -63,18 +62,13 @@ def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | No
     return passed(f"{last[0]} instances, {', '.join(said)}")
 
 
-class TwoInstancesCheck(Check):
+class TwoInstancesCheck(Check, failing=LIMIT, advice=ONE_INSTANCE, compares=True, place=14):
     """Two instances at once, under different inputs, step by step in turn: the first one must not notice."""
 
     name = "two instances"
-    failing = LIMIT
-    advice = ONE_INSTANCE
-    compares = True
-    place = 14
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if context.only_once:
             return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         runner, other = context.runner, context.fresh_runner()
@@ -90,21 +84,18 @@ class TwoInstancesCheck(Check):
                 beside += runner.steps((runner.h,))
         finally:
             other.put_away()
-        problem = difference(runner, alone, beside)
-        return by(problem and f"beside a second instance {problem}", "a second instance changes nothing in the first")
+        return compared(
+            runner, (alone, beside), "beside a second instance", "a second instance changes nothing in the first"
+        )
 
 
-class RepeatedInstantiationCheck(Check):
+class RepeatedInstantiationCheck(Check, failing=LIMIT, advice="do not make many instances in one process", place=15):
     """Many instances, one after the other: memory and open files must not grow."""
 
     name = "repeated instantiation"
-    failing = LIMIT
-    advice = "do not make many instances in one process"
-    place = 15
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if context.only_once:
             return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         slave = context.slave()

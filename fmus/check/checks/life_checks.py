@@ -13,10 +13,10 @@ from fmpy.model_description import ModelVariable
 from fmu_observer.annotated_variable import can_be_missing
 from fmus.check.behaviour import difference, repeatable
 from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
-from fmus.check.checked_instance import FmuInstance, SlaveError
+from fmus.check.checked_instance import SlaveError
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, Verdict, failed, limited, noted, passed, skipped
-from fmus.check.runner import SLOW_STEPS, WARM_UP_STEPS
+from fmus.check.runner import SLOW_STEPS, WARM_UP_STEPS, Runner
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import functions_of_capabilities
 from fmus.fmi.types import FLOATING_TYPES
@@ -25,28 +25,6 @@ SHARE_OF_BUDGET = 0.4
 _TIMED_STEPS = 200
 UNSEEN = "what it does when it moves was not seen: give start values (--start) or a longer step (--step)"
 NAMES_SHOWN = 4
-
-
-def exported_symbols(instance: FmuInstance) -> CheckOutcome:
-    """The functions of the standard that the library exports, against what the FMU declares.
-
-    Args:
-        instance: loaded, not instantiated; it is freed here.
-    """
-    try:
-        missing = {name.lower(): name for name in instance.missing_functions}
-    finally:
-        instance.free()
-    if not missing:
-        return passed("the library exports every function of the interface")
-    needed: dict[str, str] = {}
-    for capability, function in functions_of_capabilities(instance.description, instance.interface):
-        needed.setdefault(missing.pop(function, ""), capability)
-    needed.pop("", None)
-    if needed:
-        lies = "; ".join(f"declares {capability} but does not export {name}" for name, capability in needed.items())
-        return failed(lies)
-    return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
 
 
 def _unreadable(slave: Instance, variable: ModelVariable) -> str:
@@ -98,6 +76,17 @@ def by(problem: str, good: str) -> CheckOutcome:
     return failed(problem) if problem else passed(good)
 
 
+def compared(runner: Runner, runs: Sequence[Sequence[np.ndarray]], when: str, good: str) -> CheckOutcome:
+    """Whether two runs gave the identical outputs.
+
+    Args:
+        runner: the instance under test. runs: outputs after each step, each of shape (q,), of both.
+        when: they differ, in words. good: what to say where they do not.
+    """
+    problem = difference(runner, *runs)
+    return by(problem and f"{when} {problem}", good)
+
+
 def not_finite(
     names: Sequence[str], values: np.ndarray, variables: Mapping[str, ModelVariable] | None = None
 ) -> list[str]:
@@ -134,47 +123,48 @@ def real_names(instance: Instance, causality: str) -> list[str]:
     return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]
 
 
-class LoadingCheck(Check):
+class LoadingCheck(Check, failing=DISTRUST, basis=True, place=1):
     """The library can be loaded here, with all that it needs."""
 
     name = "loading"
-    failing = DISTRUST
-    basis = True
-    place = 1
 
-    @staticmethod
-    def run(context: Context) -> CheckOutcome:
-        """Make it."""
-        context.slave().free()
+    @classmethod
+    def run(cls, context: Context) -> CheckOutcome:
+        context.instance(cls.interface).free()
         return passed("the library and what it needs are loaded")
 
 
-class ExportedSymbolsCheck(Check):
-    """`exported_symbols` for co-simulation."""
+class ExportedSymbolsCheck(Check, failing=LIMIT, advice=MISSING, place=2):
+    """The functions of the standard that the library exports, against what the FMU declares."""
 
     name = "exported symbols"
-    failing = LIMIT
-    advice = MISSING
-    place = 2
 
-    @staticmethod
-    def run(context: Context) -> CheckOutcome:
-        """Make it."""
-        return exported_symbols(context.slave())
+    @classmethod
+    def run(cls, context: Context) -> CheckOutcome:
+        instance = context.instance(cls.interface)
+        try:
+            missing = {name.lower(): name for name in instance.missing_functions}
+        finally:
+            instance.free()
+        if not missing:
+            return passed("the library exports every function of the interface")
+        needed: dict[str, str] = {}
+        for capability, function in functions_of_capabilities(instance.description, instance.interface):
+            needed.setdefault(missing.pop(function, ""), capability)
+        needed.pop("", None)
+        if needed:
+            lies = "; ".join(f"declares {capability} but does not export {name}" for name, capability in needed.items())
+            return failed(lies)
+        return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
 
 
-class InitialiseCheck(Check):
+class InitialiseCheck(Check, failing=DISTRUST, advice="give start values, if it needs some", basis=True, place=3):
     """Instantiate, initialise, terminate, free."""
 
     name = "initialise"
-    failing = DISTRUST
-    advice = "give start values, if it needs some"
-    basis = True
-    place = 3
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.quiet_runner()
         try:
             runner.begin(excited=False)
@@ -183,17 +173,15 @@ class InitialiseCheck(Check):
         return passed("instantiates, initialises, terminates and is freed")
 
 
-class ValuesAtStartCheck(Check):
+class ValuesAtStartCheck(
+    Check, failing=LIMIT, advice="give start values, so that what it feeds does not begin with these", place=4
+):
     """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs."""
 
     name = "values at start"
-    failing = LIMIT
-    advice = "give start values, so that what it feeds does not begin with these"
-    place = 4
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.quiet_runner()
         try:
             runner.begin(excited=False)
@@ -210,17 +198,13 @@ class ValuesAtStartCheck(Check):
         return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
 
 
-class GettersCheck(Check):
+class GettersCheck(Check, failing=LIMIT, advice="leave these variables out of connections and recordings", place=5):
     """Every variable can be read by the getter of its type."""
 
     name = "getters"
-    failing = LIMIT
-    advice = "leave these variables out of connections and recordings"
-    place = 5
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.quiet_runner()
         try:
             runner.begin(excited=False)
@@ -237,19 +221,15 @@ class GettersCheck(Check):
         return passed(f"{len(readable)} variables are read{note}")
 
 
-class SteppingCheck(Check):
+class SteppingCheck(Check, failing=DISTRUST, basis=True, place=6):
     """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
     values.
     """
 
     name = "stepping"
-    failing = DISTRUST
-    basis = True
-    place = 6
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.runner
         try:
             return _run(context)
@@ -265,53 +245,40 @@ class SteppingCheck(Check):
         )
 
 
-class RepeatedRunCheck(Check):
+class RepeatedRunCheck(
+    Check, failing=LIMIT, advice="give each run a fresh process, and compare no two runs digit by digit", place=7
+):
     """Two instances, one after the other, under the same inputs: identical outputs."""
 
     name = "repeated run"
-    failing = LIMIT
-    advice = "give each run a fresh process, and compare no two runs digit by digit"
-    place = 7
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.runner
         pattern = (runner.h,) * (2 * WARM_UP_STEPS)
         runner.begin()
         first = runner.steps(pattern)
         runner.begin()
-        problem = difference(runner, first, runner.steps(pattern))
-        return by(problem and f"in a second run {problem}", "a second run is identical")
+        return compared(runner, (first, runner.steps(pattern)), "in a second run", "a second run is identical")
 
 
-class ResetAndReRunCheck(Check):
+class ResetAndReRunCheck(Check, failing=LIMIT, advice="make a new instance for each run", compares=True, place=8):
     """After a reset the same steps give the identical outputs."""
 
     name = "reset and re-run"
-    failing = LIMIT
-    advice = "make a new instance for each run"
-    compares = True
-    place = 8
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         return by(repeatable(context.runner), "the same run after a reset is identical")
 
 
-class LoggingCheck(Check):
+class LoggingCheck(Check, failing=LIMIT, advice="leave its logging off", compares=True, place=16):
     """The outputs must not depend on whether the FMU is asked to log."""
 
     name = "logging"
-    failing = LIMIT
-    advice = "leave its logging off"
-    compares = True
-    place = 16
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if context.only_once:
             return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         runner = context.runner
@@ -323,20 +290,16 @@ class LoggingCheck(Check):
             loud = talking.steps((runner.h,) * WARM_UP_STEPS)
         finally:
             talking.put_away()
-        problem = difference(runner, quiet, loud)
-        return by(problem and f"with logging on {problem}", "logging changes no output")
+        return compared(runner, (quiet, loud), "with logging on", "logging changes no output")
 
 
-class TimePerStepCheck(Check):
+class TimePerStepCheck(Check, failing=NOTE, place=24):
     """Median time of one step."""
 
     name = "time per step"
-    failing = NOTE
-    place = 24
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.runner
         runner.begin()
         seconds: list[float] = []

@@ -61,18 +61,13 @@ def _restore(slave: Slave, content: bytes) -> None:
         slave.release(state)
 
 
-class StateRoundTripCheck(Check):
+class StateRoundTripCheck(Check, failing=LIMIT, advice=NO_REDOING, compares=True, place=11):
     """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else."""
 
     name = "state round trip"
-    failing = LIMIT
-    advice = NO_REDOING
-    compares = True
-    place = 11
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if not context.runner.component.can_save:
             return skipped(_NO_STATE)
         found = restoring(context.runner)
@@ -85,33 +80,23 @@ class StateRoundTripCheck(Check):
         return failed(f"not restored: {found.problem}")
 
 
-class SerialisedStateCheck(Check):
+class SerialisedStateCheck(Check, failing=LIMIT, advice=NO_BYTES, compares=True, place=12):
     """The same through bytes, in the same instance."""
 
     name = "serialised state"
-    failing = LIMIT
-    advice = NO_BYTES
-    compares = True
-    place = 12
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         return _through_bytes(context, elsewhere=False)
 
 
-class StateInAnotherInstanceCheck(Check):
+class StateInAnotherInstanceCheck(Check, failing=LIMIT, advice=NO_BYTES, compares=True, place=13):
     """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from."""
 
     name = "state in another instance"
-    failing = LIMIT
-    advice = NO_BYTES
-    compares = True
-    place = 13
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if context.only_once:
             return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         return _through_bytes(context, elsewhere=True)

@@ -69,18 +69,13 @@ def _must_refuse(what: str, moved: bool, bad: str) -> CheckOutcome:
     return noted(f"accepts {what} instead of refusing it; {effect}")
 
 
-class DividedStepsCheck(Check):
+class DividedStepsCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, place=9):
     """A step of h against 2 x h/2 and an uneven split, for several h."""
 
     name = "divided steps"
-    failing = LIMIT
-    advice = FIXED_STEP
-    compares = True
-    place = 9
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         runner = context.runner
         if not runner.component.can_vary_step:
             return skipped(_NO_VARIABLE_STEP)
@@ -91,91 +86,66 @@ class DividedStepsCheck(Check):
         return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * runner.h:g}' for s in SCALES)} s")
 
 
-class ShortStepCheck(Check):
+class ShortStepCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, place=10):
     """The first change after a short step."""
 
     name = "short step"
-    failing = LIMIT
-    advice = FIXED_STEP
-    compares = True
-    place = 10
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if not context.runner.component.can_vary_step:
             return skipped(_NO_VARIABLE_STEP)
         return by(short_step(context.runner), "tiny steps after a short one move the outputs by their share")
 
 
-class TinyStepCheck(Check):
+class TinyStepCheck(Check, failing=LIMIT, advice="use no step far below its communication step", place=19):
     """A step of a billionth of a second."""
 
     name = "tiny step"
-    failing = LIMIT
-    advice = "use no step far below its communication step"
-    place = 19
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         if not context.runner.component.can_vary_step:
             return skipped(_NO_VARIABLE_STEP)
         return _odd(context, lambda _h: TINY, _done_or_refused)
 
 
-class HugeStepCheck(Check):
+class HugeStepCheck(Check, failing=NOTE, advice="use no step far above its communication step", place=20):
     """A step a thousand times the communication step, or to the end of the experiment."""
 
     name = "huge step"
-    failing = NOTE
-    advice = "use no step far above its communication step"
-    place = 20
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         left = context.runner.end - context.start_time - _BEFORE * context.step
         return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
 
 
-class ZeroStepCheck(Check):
+class ZeroStepCheck(Check, failing=NOTE, advice="never send a step of length zero, as some masters do", place=21):
     """A step of length zero, which the standard does not know."""
 
     name = "zero step"
-    failing = NOTE
-    advice = "never send a step of length zero, as some masters do"
-    place = 21
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         return _odd(context, lambda _h: 0.0, _still_or_refused)
 
 
-class NegativeStepCheck(Check):
+class NegativeStepCheck(Check, failing=NOTE, advice="never send a negative step", place=22):
     """A step back in time, which the standard forbids."""
 
     name = "negative step"
-    failing = NOTE
-    advice = "never send a negative step"
-    place = 22
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         return _odd(context, lambda h: -h, _must_refuse)
 
 
-class StepFromElsewhereCheck(Check):
+class StepFromElsewhereCheck(Check, failing=NOTE, advice="never step it from where it does not stand", place=23):
     """A step from a currentCommunicationPoint where the FMU does not stand."""
 
     name = "step from elsewhere"
-    failing = NOTE
-    advice = "never step it from where it does not stand"
-    place = 23
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        """Make it."""
         return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
