@@ -11,29 +11,15 @@
 #include "step.h"
 #include "variables.h"
 
-#define REQUIRE(component, modes)                                                \
-    do {                                                                         \
-        if (instance_require((component), __func__, (modes)) != STATUS_OK)       \
-            return fmi2Error;                                                    \
-    } while (0)
+#define FMI(name) fmi2##name
+#define FMI_STATE(before, after) fmi2##before##FMUstate##after
+#define FMI_INSTANCE fmi2Component
+#define FMI_REAL fmi2Real
+#define FMI_DESERIALIZE fmi2DeSerializeFMUstate
+#define FMI_GET_DERIVATIVES fmi2GetDerivatives
+#define FMI_SAYS_CATEGORIES false
+#include "face.h"
 
-#define REFUSE(component, reason)                                                        \
-    do {                                                                                 \
-        if ((component) != NULL)                                                         \
-            instance_fail((component), "%s: not supported: %s", __func__, (reason));     \
-        return fmi2Error;                                                                \
-    } while (0)
-
-/* What a solver asks for is there once initialisation has begun. */
-#define REQUIRE_EXCHANGE(component)                                                                   \
-    do {                                                                                              \
-        REQUIRE(component, MODE_INITIALIZATION | EXCHANGING | MODE_TERMINATED);                       \
-        if (!((Instance *)(component))->exchange)                                                     \
-            REFUSE(component, "the instance was made for co-simulation");                             \
-    } while (0)
-
-#define EXCHANGING (MODE_EVENT | MODE_CONTINUOUS)
-#define RUNNING (MODE_STEP | EXCHANGING)
 #define READABLE (MODE_INSTANTIATED | MODE_INITIALIZATION | RUNNING | MODE_TERMINATED)
 
 static void log_fmi2(const Instance *instance, Status status, const char *category, const char *message) {
@@ -55,15 +41,6 @@ const char *fmi2GetTypesPlatform(void) {
     return fmi2TypesPlatform;
 }
 
-const char *fmi2GetVersion(void) {
-    return fmi2Version;
-}
-
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[]) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_set_logging(c, __func__, false, loggingOn, nCategories, categories);
-}
-
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn) {
     (void)visible;
@@ -77,19 +54,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     instance->exchange = fmuType == fmi2ModelExchange;
     if (instance->exchange)
         status = exchange_check_model(instance, __func__);
-    if (status == STATUS_OK && !instance_token_fits(fmuGUID))
-        status = instance_fail(instance, "fmi2Instantiate: GUID %s was expected, %s was given; library and modelDescription.xml do not belong together",
-                               model.token, fmuGUID != NULL ? fmuGUID : "none");
-    if (status == STATUS_OK)
-        status = resource_load(instance, fmuResourceLocation);
-    if (status == STATUS_OK)
-        return instance;
-    instance_free(instance);
-    return NULL;
-}
-
-void fmi2FreeInstance(fmi2Component c) {
-    instance_free(c);
+    return admit(instance, status, __func__, "GUID", fmuGUID, fmuResourceLocation);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
@@ -108,17 +73,6 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     REQUIRE(c, MODE_INITIALIZATION);
     return (fmi2Status)(((Instance *)c)->exchange ? exchange_start(c) : instance_start(c, MODE_STEP));
-}
-
-fmi2Status fmi2Terminate(fmi2Component c) {
-    REQUIRE(c, RUNNING);
-    ((Instance *)c)->mode = MODE_TERMINATED;
-    return fmi2OK;
-}
-
-fmi2Status fmi2Reset(fmi2Component c) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_reset(c);
 }
 
 /* -- variables --------------------------------------------------------------------------------------------------- */
@@ -160,61 +114,18 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
     return fmi2OK;
 }
 
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
-    (void)vr, (void)value;
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_no_variables(c, __func__, nvr);
-}
+/* The other types: no variable of this model has them. */
+#define NO_VARIABLES(get_or_set, type, array)                                                                                 \
+    fmi2Status fmi2##get_or_set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, array value[]) {            \
+        (void)vr, (void)value;                                                                                                \
+        REQUIRE(c, MODE_ANY);                                                                                                 \
+        return (fmi2Status)instance_no_variables(c, __func__, nvr);                                                           \
+    }
 
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
-    (void)vr, (void)value;
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_no_variables(c, __func__, nvr);
-}
-
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
-    (void)vr, (void)value;
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_no_variables(c, __func__, nvr);
-}
-
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]) {
-    (void)vr, (void)value;
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_no_variables(c, __func__, nvr);
-}
-
-/* -- state ------------------------------------------------------------------------------------------------------- */
-
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_save(c, __func__, FMUstate);
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_restore(c, __func__, FMUstate);
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_forget(FMUstate);
-}
-
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_serialized_size(c, __func__, FMUstate, size);
-}
-
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_serialize(c, __func__, FMUstate, serializedState, size);
-}
-
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate) {
-    REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_deserialize(c, __func__, serializedState, size, FMUstate);
-}
+NO_VARIABLES(Get, Boolean, fmi2Boolean)
+NO_VARIABLES(Set, Boolean, const fmi2Boolean)
+NO_VARIABLES(Get, String, fmi2String)
+NO_VARIABLES(Set, String, const fmi2String)
 
 /* -- co-simulation ----------------------------------------------------------------------------------------------- */
 
@@ -241,10 +152,15 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     REFUSE(c, "maxOutputDerivativeOrder = 0");
 }
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
-    (void)s, (void)value;
-    REFUSE(c, "steps are synchronous");
-}
+#define NO_STATUS(name, type, reason)                                                          \
+    fmi2Status fmi2Get##name(fmi2Component c, const fmi2StatusKind s, type *value) {           \
+        (void)s, (void)value;                                                                  \
+        REFUSE(c, reason);                                                                     \
+    }
+
+NO_STATUS(Status, fmi2Status, "steps are synchronous")
+NO_STATUS(IntegerStatus, fmi2Integer, "there is no status of this type")
+NO_STATUS(StringStatus, fmi2String, "there is no status of this type")
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
     REQUIRE(c, MODE_ANY);
@@ -254,22 +170,12 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
     return fmi2OK;
 }
 
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
-    (void)s, (void)value;
-    REFUSE(c, "there is no status of this type");
-}
-
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
     REQUIRE(c, MODE_ANY);
     if (s != fmi2Terminated || value == NULL)
         REFUSE(c, "only fmi2Terminated is known");
     *value = ((Instance *)c)->discarded;
     return fmi2OK;
-}
-
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
-    (void)s, (void)value;
-    REFUSE(c, "there is no status of this type");
 }
 
 /* -- directional derivatives ----------------------------------------------------------------------------------------------- */
@@ -324,29 +230,4 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
     REQUIRE(c, EXCHANGING);
     return (fmi2Status)exchange_set_time(c, __func__, time);
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    REQUIRE(c, MODE_CONTINUOUS);
-    return (fmi2Status)exchange_set_states(c, __func__, x, nx);
-}
-
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    REQUIRE_EXCHANGE(c);
-    return (fmi2Status)exchange_get_derivatives(c, __func__, derivatives, nx);
-}
-
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    REQUIRE_EXCHANGE(c);
-    return (fmi2Status)exchange_get_indicators(c, __func__, eventIndicators, ni);
-}
-
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    REQUIRE_EXCHANGE(c);
-    return (fmi2Status)exchange_get_states(c, __func__, x, nx);
-}
-
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    REQUIRE_EXCHANGE(c);
-    return (fmi2Status)exchange_get_nominals(c, __func__, x_nominal, nx);
 }

@@ -10,30 +10,16 @@
 #include "step.h"
 #include "variables.h"
 
-#define REQUIRE(component, modes)                                          \
-    do {                                                                   \
-        if (instance_require((component), __func__, (modes)) != STATUS_OK) \
-            return fmi3Error;                                              \
-    } while (0)
-
-#define REFUSE(component, reason)                                                    \
-    do {                                                                             \
-        if ((component) != NULL)                                                     \
-            instance_fail((component), "%s: not supported: %s", __func__, (reason)); \
-        return fmi3Error;                                                            \
-    } while (0)
+#define FMI(name) fmi3##name
+#define FMI_STATE(before, after) fmi3##before##FMUState##after
+#define FMI_INSTANCE fmi3Instance
+#define FMI_REAL fmi3Float64
+#define FMI_DESERIALIZE fmi3DeserializeFMUState
+#define FMI_GET_DERIVATIVES fmi3GetContinuousStateDerivatives
+#define FMI_SAYS_CATEGORIES true
+#include "face.h"
 
 #define REFUSE_SCHEDULED_EXECUTION(component) REFUSE(component, "there is no scheduled execution of this model")
-
-/* What a solver asks for is there once initialisation has begun. */
-#define REQUIRE_EXCHANGE(component)                                                                    \
-    do {                                                                                               \
-        REQUIRE(component, MODE_INITIALIZATION | MODE_EVENT | MODE_CONTINUOUS | MODE_TERMINATED);      \
-        if (!((Instance *)(component))->exchange)                                                      \
-            REFUSE(component, "the instance was made for co-simulation");                              \
-    } while (0)
-
-#define REFUSE_INTERVALS(component) REFUSE(component, "the clocks of this model are triggered, they have no interval")
 
 typedef void (*LogMessage)(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
 
@@ -46,15 +32,6 @@ static const Face face = {.solver_sets_reals = true, .log = log_fmi3};
 
 /* -- life -------------------------------------------------------------------------------------------------------- */
 
-const char *fmi3GetVersion(void) {
-    return fmi3Version;
-}
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_set_logging(instance, __func__, true, loggingOn, nCategories, categories);
-}
-
 static Instance *create(fmi3String name, bool co_simulation, fmi3Boolean loggingOn, fmi3InstanceEnvironment environment,
                         fmi3LogMessageCallback logMessage) {
     Instance *instance = instance_create(name != NULL && *name != '\0' ? name : model.name, &face, co_simulation);
@@ -64,25 +41,6 @@ static Instance *create(fmi3String name, bool co_simulation, fmi3Boolean logging
         instance->debug_logging = loggingOn;
     }
     return instance;
-}
-
-static Status check_token(const Instance *instance, const char *function, fmi3String token) {
-    if (instance_token_fits(token))
-        return STATUS_OK;
-    return instance_fail(instance, "%s: instantiation token %s was expected, %s was given; library and modelDescription.xml do not belong together",
-                         function, model.token, token != NULL ? token : "none");
-}
-
-/* The instance if it fits the model and its resources can be read; otherwise it is freed, after its reason is logged. */
-static Instance *admit(Instance *instance, Status status, const char *function, fmi3String token, fmi3String resourcePath) {
-    if (status == STATUS_OK)
-        status = check_token(instance, function, token);
-    if (status == STATUS_OK)
-        status = resource_load(instance, resourcePath);
-    if (status == STATUS_OK)
-        return instance;
-    instance_free(instance);
-    return NULL;
 }
 
 /* Log why there will be no instance. */
@@ -102,7 +60,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
     if (instance == NULL)
         return NULL;
     instance->exchange = true;
-    return admit(instance, exchange_check_model(instance, __func__), __func__, instantiationToken, resourcePath);
+    return admit(instance, exchange_check_model(instance, __func__), __func__, "instantiation token", instantiationToken, resourcePath);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
@@ -128,11 +86,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     Status status = STATUS_OK;
     if (nRequiredIntermediateVariables > 0)
         status = instance_fail(instance, "fmi3InstantiateCoSimulation: intermediate variables are not provided (providesIntermediateUpdate = false)");
-    return admit(instance, status, __func__, instantiationToken, resourcePath);
-}
-
-void fmi3FreeInstance(fmi3Instance instance) {
-    instance_free(instance);
+    return admit(instance, status, __func__, "instantiation token", instantiationToken, resourcePath);
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
@@ -160,17 +114,6 @@ static Status start(Instance *instance) {
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
     REQUIRE(instance, MODE_INITIALIZATION);
     return (fmi3Status)start(instance);
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance) {
-    REQUIRE(instance, MODE_STEP | MODE_EVENT | MODE_CONTINUOUS);
-    ((Instance *)instance)->mode = MODE_TERMINATED;
-    return fmi3OK;
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_reset(instance);
 }
 
 /* -- events ------------------------------------------------------------------------------------------------------ */
@@ -374,38 +317,6 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
     return (fmi3Status)instance_no_variables(instance, __func__, nValueReferences);
 }
 
-/* -- state ------------------------------------------------------------------------------------------------------- */
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_save(instance, __func__, FMUState);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_restore(instance, __func__, FMUState);
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_forget(FMUState);
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_serialized_size(instance, __func__, FMUState, size);
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_serialize(instance, __func__, FMUState, serializedState, size);
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size, fmi3FMUState *FMUState) {
-    REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_deserialize(instance, __func__, serializedState, size, FMUState);
-}
-
 /* -- co-simulation ----------------------------------------------------------------------------------------------- */
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
@@ -460,61 +371,49 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     REFUSE(instance, "providesAdjointDerivatives = false");
 }
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) {
-    REFUSE(instance, "there are no structural parameters");
-}
+#define NO_CONFIGURATION(function)                                       \
+    fmi3Status fmi3##function(fmi3Instance instance) {                   \
+        REFUSE(instance, "there are no structural parameters");          \
+    }
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
-    REFUSE(instance, "there are no structural parameters");
-}
+NO_CONFIGURATION(EnterConfigurationMode)
+NO_CONFIGURATION(ExitConfigurationMode)
+
+#define NO_INTERVALS "the clocks of this model are triggered, they have no interval"
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                                   fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]) {
     (void)valueReferences, (void)nValueReferences, (void)intervals, (void)qualifiers;
-    REFUSE_INTERVALS(instance);
+    REFUSE(instance, NO_INTERVALS);
 }
 
 fmi3Status fmi3GetIntervalFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                                    fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
     (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions, (void)qualifiers;
-    REFUSE_INTERVALS(instance);
+    REFUSE(instance, NO_INTERVALS);
 }
 
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                               fmi3Float64 shifts[]) {
-    (void)valueReferences, (void)nValueReferences, (void)shifts;
-    REFUSE_INTERVALS(instance);
-}
+#define NO_DECIMALS(function, type)                                                                                       \
+    fmi3Status fmi3##function(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences, \
+                              type values[]) {                                                                            \
+        (void)valueReferences, (void)nValueReferences, (void)values;                                                      \
+        REFUSE(instance, NO_INTERVALS);                                                                                   \
+    }
 
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                fmi3UInt64 counters[], fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    REFUSE_INTERVALS(instance);
-}
+NO_DECIMALS(GetShiftDecimal, fmi3Float64)
+NO_DECIMALS(SetIntervalDecimal, const fmi3Float64)
+NO_DECIMALS(SetShiftDecimal, const fmi3Float64)
 
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                  const fmi3Float64 intervals[]) {
-    (void)valueReferences, (void)nValueReferences, (void)intervals;
-    REFUSE_INTERVALS(instance);
-}
+#define NO_FRACTIONS(function, type)                                                                                      \
+    fmi3Status fmi3##function(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences, \
+                              type counters[], type resolutions[]) {                                                      \
+        (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;                                 \
+        REFUSE(instance, NO_INTERVALS);                                                                                   \
+    }
 
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    REFUSE_INTERVALS(instance);
-}
-
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                               const fmi3Float64 shifts[]) {
-    (void)valueReferences, (void)nValueReferences, (void)shifts;
-    REFUSE_INTERVALS(instance);
-}
-
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                                const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    REFUSE_INTERVALS(instance);
-}
+NO_FRACTIONS(GetShiftFraction, fmi3UInt64)
+NO_FRACTIONS(SetIntervalFraction, const fmi3UInt64)
+NO_FRACTIONS(SetShiftFraction, const fmi3UInt64)
 
 /* -- model exchange ----------------------------------------------------------------------------------------------- */
 
@@ -534,33 +433,8 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetF
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
     REQUIRE_EXCHANGE(instance);
-    REQUIRE(instance, MODE_EVENT | MODE_CONTINUOUS);
+    REQUIRE(instance, EXCHANGING);
     return (fmi3Status)exchange_set_time(instance, __func__, time);
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates) {
-    REQUIRE(instance, MODE_CONTINUOUS);
-    return (fmi3Status)exchange_set_states(instance, __func__, continuousStates, nContinuousStates);
-}
-
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t nContinuousStates) {
-    REQUIRE_EXCHANGE(instance);
-    return (fmi3Status)exchange_get_derivatives(instance, __func__, derivatives, nContinuousStates);
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators) {
-    REQUIRE_EXCHANGE(instance);
-    return (fmi3Status)exchange_get_indicators(instance, __func__, eventIndicators, nEventIndicators);
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates) {
-    REQUIRE_EXCHANGE(instance);
-    return (fmi3Status)exchange_get_states(instance, __func__, continuousStates, nContinuousStates);
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates) {
-    REQUIRE_EXCHANGE(instance);
-    return (fmi3Status)exchange_get_nominals(instance, __func__, nominals, nContinuousStates);
 }
 
 static fmi3Status count(Instance *instance, const char *function, size_t *place, int value) {

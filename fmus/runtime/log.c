@@ -12,36 +12,24 @@
 static const char *const category_names[] = {"logStatusError", "logStatusDiscard", "logStatusWarning", "logEvents"};
 enum { CATEGORY_ERROR, CATEGORY_DISCARD, CATEGORY_WARNING, CATEGORY_EVENTS, CATEGORY_COUNT };
 
-static Status log_message(const Instance *instance, Status status, int category, const char *format, va_list arguments) {
+static void log_message(const Instance *instance, Status status, int category, const char *format, va_list arguments) {
     char message[MESSAGE_LENGTH];
     vsnprintf(message, sizeof message, format, arguments);
     instance->face->log(instance, status, category_names[category], message);
-    return status;
 }
 
-PRIVATE Status instance_fail(const Instance *instance, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    Status status = log_message(instance, STATUS_ERROR, CATEGORY_ERROR, format, arguments);
-    va_end(arguments);
-    return status;
-}
+#define LOGGED(function, status, category)                                                  \
+    PRIVATE Status function(const Instance *instance, const char *format, ...) {            \
+        va_list arguments;                                                                  \
+        va_start(arguments, format);                                                        \
+        log_message(instance, status, category, format, arguments);                         \
+        va_end(arguments);                                                                  \
+        return status;                                                                      \
+    }
 
-PRIVATE Status instance_discard(const Instance *instance, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    Status status = log_message(instance, STATUS_DISCARD, CATEGORY_DISCARD, format, arguments);
-    va_end(arguments);
-    return status;
-}
-
-PRIVATE Status instance_warn(const Instance *instance, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    Status status = log_message(instance, STATUS_WARNING, CATEGORY_WARNING, format, arguments);
-    va_end(arguments);
-    return status;
-}
+LOGGED(instance_fail, STATUS_ERROR, CATEGORY_ERROR)
+LOGGED(instance_discard, STATUS_DISCARD, CATEGORY_DISCARD)
+LOGGED(instance_warn, STATUS_WARNING, CATEGORY_WARNING)
 
 PRIVATE void instance_note(const Instance *instance, const char *format, ...) {
     if (!instance->debug_logging)
