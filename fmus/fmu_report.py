@@ -12,16 +12,13 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
 
 from fmus.fmi.binaries import LIBRARY_SUFFIXES, why_not_here
+from fmus.fmi.capabilities import HELD_AS
 from fmus.fmi.description import read_description
+from fmus.fmi.standard import INTERFACES, fmi_version
 from fmus.fmi.types import enumeration_items
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
 
-_INTERFACES = (
-    ("coSimulation", "co-simulation"),
-    ("modelExchange", "model exchange"),
-    ("scheduledExecution", "scheduled execution"),
-)
 _CAPABILITIES = (
     "canHandleVariableCommunicationStepSize",
     "canGetAndSetFMUstate",
@@ -31,12 +28,6 @@ _CAPABILITIES = (
     "providesDirectionalDerivative",
     "completedIntegratorStepNotNeeded",
 )
-_NAMES_3 = {
-    "canGetAndSetFMUstate": "canGetAndSetFMUState",
-    "canSerializeFMUstate": "canSerializeFMUState",
-    "providesDirectionalDerivative": "providesDirectionalDerivatives",
-}
-"""Capabilities that FMI 3.0 spells differently from FMI 2.0 and fmpy."""
 _SHOWN = ("input", "output", "parameter")
 _FOLDERS = {
     "linux32": {"x86-linux"},
@@ -115,7 +106,7 @@ def _libraries(archive: zipfile.ZipFile) -> list[str]:
 
 
 def _on_this_machine(description: ModelDescription, names: Sequence[str]) -> str:
-    interfaces = (getattr(description, key) for key, _ in _INTERFACES)
+    interfaces = (getattr(description, key) for key in INTERFACES)
     reason = why_not_here(description, {i.modelIdentifier for i in interfaces if i is not None}, names)
     has_sources = any(name.startswith("sources/") and name.endswith(".c") for name in names)
     rebuild = " Its sources can be compiled." if reason and has_sources else ""
@@ -153,16 +144,17 @@ def _reason(error: Exception) -> str:
 
 
 def _interfaces(description: ModelDescription) -> list[str]:
-    return [text for name, text in _INTERFACES if getattr(description, name) is not None]
+    return [text for name, text in INTERFACES.items() if getattr(description, name) is not None]
 
 
 def _capabilities(description: ModelDescription) -> list[str]:
     """A line for each interface, in the words of the FMI version."""
-    renamed, lines = _NAMES_3 if str(description.fmiVersion).startswith("3") else {}, []
-    for held, text in _INTERFACES:
+    known = {held: name for name, held in HELD_AS.items()} if fmi_version(description) == 3 else {}
+    lines = []
+    for held, text in INTERFACES.items():
         interface = getattr(description, held)
         if interface is not None:
-            names = [renamed.get(name, name) for name in _CAPABILITIES if getattr(interface, name, False)]
+            names = [known.get(name, name) for name in _CAPABILITIES if getattr(interface, name, False)]
             lines.append(f"capabilities in {text}: {', '.join(names) or 'none'}")
     return lines
 

@@ -18,6 +18,7 @@ from cosim.scenario.package_names import is_package
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.fmi.capabilities import read_capabilities
+from fmus.fmi.standard import INTERFACES
 from fmus.tables.table import Table, name_column, pairs_table, text_column
 from plant_models.user_file import names_a_file, names_code
 
@@ -92,17 +93,12 @@ def describe_file(path: Path) -> dict[str, Any]:
         FmuLoadError: the file is missing or not an FMU.
     """
     description = read_description(path, "info")
-    interfaces = {
-        "coSimulation": "co-simulation",
-        "modelExchange": "model exchange",
-        "scheduledExecution": "scheduled execution",
-    }
     return {
         "file": str(path),
         "model": description.modelName,
         "description": description.description or "",
         "FMI version": description.fmiVersion,
-        "interfaces": [text for name, text in interfaces.items() if getattr(description, name) is not None],
+        "interfaces": [text for name, text in INTERFACES.items() if getattr(description, name) is not None],
         "platforms": list(fmpy.supported_platforms(str(path))),
         "runs here": runs_here(path),
         "tool": description.generationTool or "",

@@ -16,8 +16,7 @@ from cosim.errors import FmuLoadError, nearest
 from cosim.fmu_model.co_simulation import CoSimulationModel
 from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
-from fmus.check.checked_instance import SlaveError
-from fmus.check.checked_slave import make_slave
+from fmus.check.checked_instance import SlaveError, make_slave
 from fmus.check.exchange_model import make_model
 from fmus.fmi.archive import NotAnFmuError
 from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, fmi_version

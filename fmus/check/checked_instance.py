@@ -1,4 +1,4 @@
-"""Instances driven under test: what co-simulation and model exchange have in common, for FMI 2.0 and 3.0.
+"""Instances driven under test: what co-simulation and model exchange have in common, and slaves of FMI 2.0 and 3.0.
 
 Whatever the FMU or fmpy throws comes out as a `SlaveError` with what the FMU logged last; a mistake of the check stays
 what it is.
@@ -13,8 +13,11 @@ from pathlib import Path
 from fmpy.model_description import ModelDescription
 
 from fmus.fmi.elements import elements_of
+from fmus.fmi.fmi2 import FMI2Slave
+from fmus.fmi.fmi3 import FMI3Slave
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import load
+from fmus.fmi.standard import fmi_version
 from fmus.fmi.types import NUMERIC_TYPES
 from fmus.plain import one_line
 
@@ -91,3 +94,26 @@ class FmuInstance(Instance):
         text = one_line(message.decode("utf-8", "replace") if isinstance(message, bytes) else message or "")
         if text:
             self.messages.append(text)
+
+
+class FmuSlave2(FmuInstance, FMI2Slave):
+    """A co-simulation instance of FMI 2.0; arguments as for `FmuInstance`."""
+
+
+class FmuSlave3(FmuInstance, FMI3Slave):
+    """A co-simulation instance of FMI 3.0; arguments as for `FmuInstance`."""
+
+
+FmuSlave = FmuSlave2 | FmuSlave3
+
+
+def make_slave(
+    folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
+) -> FmuSlave:
+    """See `FmuInstance`: one for co-simulation, of the version of its description, not yet instantiated.
+
+    Raises:
+        SlaveError: the library cannot be loaded.
+    """
+    version = FmuSlave2 if fmi_version(description) == 2 else FmuSlave3
+    return version(folder, description, name, logging=logging)

@@ -5,13 +5,13 @@ process share.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from fmpy.model_description import ModelDescription
 
-from fmus.check.checked_instance import FmuInstance
-from fmus.check.checked_slave import FmuSlave, make_slave
+from fmus.check.checked_instance import FmuInstance, FmuSlave, make_slave
 from fmus.check.exchange_model import FmuModel, make_model
 from fmus.check.runner import Runner
 from fmus.fmi.standard import MODEL_EXCHANGE
@@ -24,6 +24,7 @@ INSTANCE = "checked"
 """Name of all instances, one after the other and beside each other."""
 
 
+@dataclass
 class Context:
     """What is checked and how.
 
@@ -37,18 +38,13 @@ class Context:
         steps: of the longest run.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        description: ModelDescription,
-        step: float,
-        start_time: float,
-        starts: Mapping[str, float],
-        budget: float,
-        steps: int,
-    ) -> None:
-        self.folder, self.description = folder, description
-        self.step, self.start_time, self.starts, self.budget, self.steps = step, start_time, dict(starts), budget, steps
+    folder: Path
+    description: ModelDescription
+    step: float
+    start_time: float
+    starts: Mapping[str, float]
+    budget: float
+    steps: int
 
     def slave(self, *, logging: bool = False) -> FmuSlave:
         """A fresh co-simulation instance, not yet instantiated. All have one name: what is drawn may follow from it.

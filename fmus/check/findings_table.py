@@ -6,7 +6,7 @@ from typing import Any
 
 from fmus.check.findings import Verdict
 from fmus.check.run import CheckReport
-from fmus.fmi.archive import INTERFACES
+from fmus.fmi.standard import INTERFACES
 from fmus.tables.table import Parts, Table, name_column, text_column
 
 _BULLET = "  - "

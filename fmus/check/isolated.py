@@ -16,7 +16,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any
@@ -76,7 +76,7 @@ def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> 
     left, running = job.checks, 0
     with TemporaryFile() as console:
         while left:
-            child = _run_child(job.only(left), console, progress)
+            child = _run_child(replace(job, checks=left), console, progress)
             found += child.findings
             running += child.left
             left = tuple(name for name in left if name not in {f.check for f in found})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,6 @@ class Job:
     steps: int
     starts: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)
-
-    def only(self, checks: tuple[str, ...]) -> Job:
-        """The same job with other checks."""
-        return replace(self, checks=checks)
 
     def to_json(self) -> str:
         """As one line of text."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from fmpy.model_description import ModelDescription
@@ -13,11 +12,12 @@ from fmus.documentation.licences import model_terms
 from fmus.documentation.prose import blocks, pieces
 from fmus.documentation.rebuild import rebuild_commands
 from fmus.documentation.variable_tables import certificate_rows, preset_rows, variable_rows
+from fmus.fmi.standard import INTERFACES
 from fmus.templates import environment
 from fmus.toolchain.targets import Target
 from plant_models.hybrid import HybridSystem
+from plant_models.installed import installed_version
 
-INTERFACES = (("coSimulation", "co-simulation"), ("modelExchange", "model exchange"))
 CAUSALITIES = ("input", "output", "parameter")
 PAGES = environment("fmus.documentation")
 PAGES.filters["pieces"] = pieces
@@ -43,7 +43,7 @@ def page(system: HybridSystem, description: ModelDescription, preset: str | None
         system=system,
         preset=preset if preset is not None else system.default_preset,
         targets=targets,
-        interfaces=[text for name, text in INTERFACES if getattr(description, name) is not None],
+        interfaces=[text for name, text in INTERFACES.items() if getattr(description, name) is not None],
         equations=_equations(system),
         names=by_name.keys(),
         late=LATE_POLICIES[int(policy.start) - 1] if policy is not None else None,
@@ -78,7 +78,5 @@ def _equations(system: HybridSystem) -> list[Any]:
 
 
 def _tool() -> str:
-    try:
-        return f"fmu-observer {version('fmu-observer')}"
-    except PackageNotFoundError:
-        return "fmu-observer"
+    version = installed_version("fmu-observer")
+    return "fmu-observer" if version is None else f"fmu-observer {version}"

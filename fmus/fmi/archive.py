@@ -16,16 +16,12 @@ from fmpy.model_description import ModelDescription
 from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
 from fmus.fmi.description import FILE, read_description, why_unreadable
 from fmus.fmi.sense import nonsense, tell_apart
+from fmus.fmi.standard import INTERFACES
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
 MAX_DESCRIPTION_BYTES = 256 * 1024**2
 ENCRYPTED = 1
-INTERFACES = {
-    "coSimulation": "co-simulation",
-    "modelExchange": "model exchange",
-    "scheduledExecution": "scheduled execution",
-}
 
 
 class NotAnFmuError(ValueError):

@@ -26,28 +26,7 @@ def is_native(slave: Any) -> bool:
     return hasattr(slave, "dll")
 
 
-def make_reader(
-    slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray
-) -> Callable[[], None]:
-    """A call that reads `variables` into `values`, shape (number of values of all,).
-
-    Args:
-        slave: instantiated, with fmpy's call surface.
-        fmi_version: 2 or 3.
-    """
-    return _make_port(slave, fmi_version, variables, values, "Get")
-
-
-def make_writer(
-    slave: Any, fmi_version: int, variables: Sequence[ModelVariable], buffer: np.ndarray
-) -> Callable[[], None]:
-    """A call that writes `variables` from `buffer`, shape (number of values of all,).
-
-    Args:
-        slave: instantiated, with fmpy's call surface.
-        fmi_version: 2 or 3.
-    """
-    return _make_port(slave, fmi_version, variables, buffer, "Set")
+Verb = Literal["Get", "Set"]
 
 
 @dataclass(frozen=True)
@@ -67,9 +46,17 @@ class _Group:
     has_arrays: bool
 
 
-def _make_port(
-    slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray, verb: Literal["Get", "Set"]
+def make_port(
+    slave: Any, fmi_version: int, verb: Verb, variables: Sequence[ModelVariable], values: np.ndarray
 ) -> Callable[[], None]:
+    """A call that reads variables into an array, or writes them from it.
+
+    Args:
+        slave: instantiated, with fmpy's call surface.
+        fmi_version: 1, 2 or 3.
+        verb: ``Get`` or ``Set``.
+        variables: whole ones. values: that array, shape (number of values of all,).
+    """
     groups = _groups(variables, fmi_version)
     if not groups:
         return _nothing
@@ -108,7 +95,7 @@ def _group(kind: str, members: Sequence[tuple[ModelVariable, range]]) -> _Group:
 
 
 def native_call(
-    slave: Any, fmi_version: int, verb: Literal["Get", "Set"], kind: str, references: Sequence[int], *rest: Any
+    slave: Any, fmi_version: int, verb: Verb, kind: str, references: Sequence[int], *rest: Any
 ) -> Callable[[], None]:
     """A getter or setter of the library with all its arguments.
 

@@ -10,6 +10,13 @@ if TYPE_CHECKING:
 
 CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION = "coSimulation", "modelExchange", "scheduledExecution"
 
+INTERFACES = {
+    CO_SIMULATION: "co-simulation",
+    MODEL_EXCHANGE: "model exchange",
+    SCHEDULED_EXECUTION: "scheduled execution",
+}
+"""Interface types as fmpy calls them, and in words."""
+
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 """Names of the FMI statuses, by number."""
 

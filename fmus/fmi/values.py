@@ -15,7 +15,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from fmus.fmi.described import Described
 from fmus.fmi.elements import Element, layout
 from fmus.fmi.exact_ports import Values, make_exact_reader, make_exact_writer
-from fmus.fmi.ports import make_reader, make_writer
+from fmus.fmi.ports import make_port
 
 Turn = Callable[[np.ndarray, np.ndarray], None]
 
@@ -45,7 +45,7 @@ def element_reader(instance: ValueHolder, names: Sequence[str], values: np.ndarr
     """
     spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
     whole = values if spread.is_whole else np.zeros(spread.total)
-    read = make_reader(instance.slave, instance.fmi_version, spread.variables, whole)
+    read = make_port(instance.slave, instance.fmi_version, "Get", spread.variables, whole)
     if whole is values and turn is None:
         return read
 
@@ -70,10 +70,10 @@ def element_writer(
     spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
     slave, version, buffer = instance.slave, instance.fmi_version, np.zeros(len(names)) if values is None else values
     if spread.is_whole and turn is None:
-        return make_writer(slave, version, spread.variables, buffer), buffer
+        return make_port(slave, version, "Set", spread.variables, buffer), buffer
     whole, signed = np.zeros(spread.total), np.zeros(len(names))
-    write = make_writer(slave, version, spread.variables, whole)
-    keep = make_reader(slave, version, spread.variables, whole) if spread.is_partial else None
+    write = make_port(slave, version, "Set", spread.variables, whole)
+    keep = make_port(slave, version, "Get", spread.variables, whole) if spread.is_partial else None
 
     def place_and_write() -> None:
         if keep is not None:

@@ -10,7 +10,6 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +19,7 @@ from fmpy.fmi1 import FMICallException
 import fmu_observer
 from fmu_observer.block import make_block
 from plant_models.hybrid import HybridSystem
+from plant_models.installed import installed_version
 
 OWN_VERSION = "0.1.0"
 _MODEL_FOLDER = "model"
@@ -85,10 +85,7 @@ class Host:
 
 def package_version() -> str:
     """Version of fmu-observer; where it is not installed but on the path, the version this file belongs to."""
-    try:
-        return version("fmu-observer")
-    except PackageNotFoundError:
-        return OWN_VERSION
+    return installed_version("fmu-observer") or OWN_VERSION
 
 
 def check_package(built_with: str) -> None:

@@ -35,6 +35,38 @@ def hold(names: dict[str, Any]) -> None:
     HELD.append(names)
 
 
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _getter(method: str, cast: Callable[[Any], Any], missing: Any) -> Callable[[Any, list[int]], list[Any]]:
+    """A getter of FMI, by the block's method for it; `missing` stands for each value where that fails."""
+
+    def get(self: Any, vrs: list[int]) -> list[Any]:
+        """Values of variables.
+
+        Args:
+            vrs: value references.
+        """
+        return list(map(cast, self._hand_on(method, [missing] * len(vrs), vrs)))
+
+    return get
+
+
+def _setter(method: str) -> Callable[[Any, list[int], list[Any]], None]:
+    """A setter of FMI, by the block's method for it."""
+
+    def set_values(self: Any, vrs: list[int], values: list[Any]) -> None:
+        """Set variables.
+
+        Args:
+            vrs: value references. values: one for each reference.
+        """
+        self._hand_on(method, None, vrs, values)
+
+    return set_values
+
+
 class Hosted(Fmi2Slave):
     """The object that pythonfmu's library calls; hands every call on to `fmus.hosted.host.Host`.
 
@@ -95,13 +127,10 @@ class Hosted(Fmi2Slave):
 
     # -- values -----------------------------------------------------------------------------------------------------
 
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """fmi2GetReal.
-
-        Args:
-            vrs: value references.
-        """
-        return list(map(float, self._hand_on("getReal", [nan] * len(vrs), vrs)))
+    get_real, set_real = _getter("getReal", float, nan), _setter("setReal")
+    get_boolean, set_boolean = _getter("getBoolean", bool, False), _setter("setBoolean")
+    get_string, set_string = _getter("getString", _text, ""), _setter("setString")
+    set_integer = _setter("setInteger")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         """fmi2GetInteger; without value references it only reports what else went wrong.
@@ -113,54 +142,6 @@ class Hosted(Fmi2Slave):
         if problem is not None:
             self._report(problem)
         return list(map(int, self._hand_on("getInteger", [0] * len(vrs), vrs))) if vrs else []
-
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """fmi2GetBoolean.
-
-        Args:
-            vrs: value references.
-        """
-        return list(map(bool, self._hand_on("getBoolean", [False] * len(vrs), vrs)))
-
-    def get_string(self, vrs: list[int]) -> list[str]:
-        """fmi2GetString.
-
-        Args:
-            vrs: value references.
-        """
-        return [_text(value) for value in self._hand_on("getString", [""] * len(vrs), vrs)]
-
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """fmi2SetReal.
-
-        Args:
-            vrs: value references. values: one for each reference.
-        """
-        self._hand_on("setReal", None, vrs, values)
-
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """fmi2SetInteger.
-
-        Args:
-            vrs: value references. values: one for each reference.
-        """
-        self._hand_on("setInteger", None, vrs, values)
-
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """fmi2SetBoolean.
-
-        Args:
-            vrs: value references. values: one for each reference.
-        """
-        self._hand_on("setBoolean", None, vrs, values)
-
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """fmi2SetString.
-
-        Args:
-            vrs: value references. values: one for each reference.
-        """
-        self._hand_on("setString", None, vrs, values)
 
     # -- state: all of it, not the registered variables that pythonfmu would save --------------------------------------
 
@@ -213,10 +194,6 @@ def _without_instance(function: str, otherwise: Any, call: Callable[[Any], Any])
     except BaseException as error:
         Hosted.problems[threading.get_ident()] = describe_failure(host, function, error, None)
         return otherwise
-
-
-def _text(value: Any) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def describe_failure(host: Any, function: str, error: BaseException, t: float | None) -> str:

@@ -17,8 +17,7 @@ from lying_fmus import build, description
 from test_fmus.typed import expected, typed_fmu
 
 from fmus.check import Class, Verdict, check_fmu
-from fmus.check.checked_instance import FmuInstance
-from fmus.check.checked_slave import make_slave
+from fmus.check.checked_instance import FmuInstance, make_slave
 from fmus.check.runner import END, Runner, end_of_experiment
 from fmus.fmi.archive import open_archive
 

@@ -8,7 +8,7 @@ import pytest
 
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.check import Class, Verdict, check_fmu
-from fmus.check.checked_slave import make_slave
+from fmus.check.checked_instance import make_slave
 from fmus.check.probe import probe
 from fmus.fmi.archive import open_archive
 

@@ -19,8 +19,7 @@ from cosim.components.fmi1 import FMI1Component
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.loading import load_fmu
-from fmus.check.checked_instance import FmuInstance
-from fmus.check.checked_slave import FmuSlave2, FmuSlave3, make_slave
+from fmus.check.checked_instance import FmuInstance, FmuSlave2, FmuSlave3, make_slave
 from fmus.check.exchange_model import FmuModel, FmuModel2, FmuModel3
 from fmus.fmi.description import read_description
 from fmus.fmi.library import MissingFunctionError, _Missing

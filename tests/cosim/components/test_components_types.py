@@ -20,7 +20,7 @@ from cosim.components.start_values import start_values
 from cosim.errors import CouplingError, RunError
 from fmus.fmi.elements import elements_of, layout
 from fmus.fmi.exact_ports import make_exact_reader
-from fmus.fmi.ports import make_reader
+from fmus.fmi.ports import make_port
 
 INTEGERS = {
     f"{sign}int{bits}": (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
@@ -177,7 +177,7 @@ class Sloppy:
 def test_a_slave_may_say_truth_with_any_number() -> None:
     flags = [variable(name, "output", i, "Boolean") for i, name in enumerate("abc")]
     values = np.zeros(3)
-    make_reader(Sloppy(), 2, flags, values)()
+    make_port(Sloppy(), 2, "Get", flags, values)()
     assert values.tolist() == [0.0, 1.0, 1.0]
     assert make_exact_reader(Sloppy(), 2, flags[0])() == (False,)
 

@@ -9,7 +9,7 @@ import pytest
 from coupled_runs import Pushed, block
 from mock_slaves import FMI2, Mock, component, variable
 
-from fmus.fmi.ports import make_reader, make_writer
+from fmus.fmi.ports import make_port
 
 
 class Mixed(Mock):
@@ -30,22 +30,22 @@ class Mixed2(FMI2, Mixed):
 def test_values_come_back_as_they_were_written(slave: Mock) -> None:
     variables = [slave.model_description.modelVariables[i] for i in (4, 0, 3, 1, 2, 5)]
     buffer = np.array([2.0, 1.5, 1.0, -3.0, 2.5, 7.0])
-    make_writer(slave, slave.version, variables, buffer)()
+    make_port(slave, slave.version, "Set", variables, buffer)()
     values = np.zeros(6)
-    make_reader(slave, slave.version, variables, values)()
+    make_port(slave, slave.version, "Get", variables, values)()
     np.testing.assert_array_equal(values, buffer)
 
 
 def test_whole_and_logical_inputs_are_rounded() -> None:
     slave = Mixed()
     variables = [slave.model_description.modelVariables[i] for i in (1, 3)]
-    make_writer(slave, 3, variables, np.array([2.6, 0.7]))()
+    make_port(slave, 3, "Set", variables, np.array([2.6, 0.7]))()
     assert (slave.v["x1"], slave.v["x3"]) == (3, True)
 
 
 def test_no_variables_is_no_call() -> None:
-    make_reader(object(), 3, [], np.zeros(0))()
-    make_writer(object(), 2, [], np.zeros(0))()
+    make_port(object(), 3, "Get", [], np.zeros(0))()
+    make_port(object(), 2, "Set", [], np.zeros(0))()
 
 
 @pytest.mark.parametrize("version", [2, 3])

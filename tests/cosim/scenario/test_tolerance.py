@@ -13,7 +13,7 @@ from test_fmus.adaptive import adaptive_fmu
 from cosim import Scenario
 from cosim.components.loading import load_fmu
 from cosim.errors import CosimError, ScenarioError
-from fmus.check.checked_slave import make_slave
+from fmus.check.checked_instance import make_slave
 
 pytestmark = pytest.mark.compiler
 
