@@ -16,8 +16,6 @@ typedef struct {
 
 #include "host.h"
 
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
 enum { TIME = 0, POSITION = 1, SPEED = 2, TOLD = 3 };
 
 static void model_start(Model *m) {

@@ -19,30 +19,19 @@ typedef struct {
     int32_t said;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
-#define SAME 1e-12
 enum { TIME = 0, U = 1, Y = 2 };
 
 static void model_start(Model *m) { m->u = 1.0; }
-static void model_begin(Model *m, double t0) { m->time = t0; }
+BEGINS_AT_ITS_TIME
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case U: return (Slot){.kind = F64, .role = INPUT, .at = &m->u, .size = 1};
-    case Y: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->y, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(U, F64, INPUT, u)
+    VARIABLE(Y, F64, OUTPUT, y))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 #if BEHAVIOUR == CHATTY
 static void talk(Model *m, const Host *host, double until) {
@@ -69,11 +58,7 @@ static Outcome model_step(Model *m, Host *host, double t, double until) {
         outcome.reached = outcome.early || FMI_VERSION < 3 ? AT : until;
     }
 #elif BEHAVIOUR == QUIT_UPDATE
-    if (over && host->event_mode) {
-        outcome.event = true;
-        outcome.early = host->early_allowed && until > AT + SAME;
-        outcome.reached = outcome.early ? AT : until;
-    }
+    outcome = arrived_at_event(host, over, AT, until);
 #elif BEHAVIOUR == REFUSE_STEP
     if (over && until - t > LONGEST_STEP + SAME) {
         SAY(host, DISCARD, "logStatusDiscard", "a step of %g s over %g s is too long, at most %g s", until - t, AT, LONGEST_STEP);

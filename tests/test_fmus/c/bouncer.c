@@ -11,15 +11,8 @@ typedef struct {
     bool kicked;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
-#define SAME 1e-12
 enum { TIME = 0, U = 1, Y = 2, CHANGES = 3, KICK_TIME = 4, ADD = 5, LIMIT = 6 };
 
 static void model_start(Model *m) {
@@ -28,33 +21,24 @@ static void model_start(Model *m) {
     m->limit = LIMIT_START;
 }
 
-static void model_begin(Model *m, double t0) { m->time = t0; }
+BEGINS_AT_ITS_TIME
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case U: return (Slot){.kind = F64, .role = INPUT, .at = &m->u, .size = 1};
-    case Y: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->y, .size = 1};
-    case CHANGES: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->changes, .size = 1};
-    case KICK_TIME: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->kick_time, .size = 1};
-    case ADD: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->add, .size = 1};
-    case LIMIT: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->limit, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(U, F64, INPUT, u)
+    VARIABLE(Y, F64, OUTPUT, y)
+    VARIABLE(CHANGES, I32, OUTPUT, changes)
+    VARIABLE(KICK_TIME, F64, PARAMETER, kick_time)
+    VARIABLE(ADD, F64, PARAMETER, add)
+    VARIABLE(LIMIT, F64, PARAMETER, limit))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 static bool to_be_kicked(const Model *m) { return m->kick_time >= 0.0 && !m->kicked; }
 
 static Outcome model_step(Model *m, Host *host, double t, double until) {
     (void)t;
-    Outcome outcome = arrived(until);
-    if (host->event_mode && to_be_kicked(m) && m->kick_time <= until + SAME) {
-        outcome.event = true;
-        outcome.early = host->early_allowed && m->kick_time < until - SAME;
-        outcome.reached = outcome.early ? m->kick_time : until;
-    }
+    const Outcome outcome = arrived_at_event(host, to_be_kicked(m), m->kick_time, until);
     m->time = outcome.reached;
     return outcome;
 }

@@ -13,15 +13,9 @@ typedef struct {
     bool start, alarm, armed, was_armed, repeat;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
 #define HAS_INTERVALS 1
-#define SAME 1e-12
 enum { TIME = 0, START = 1, ALARM = 2, DELAY = 3, ARM_TIME = 4, REPEAT = 5, ALARMS = 6, WHEN = 7, ARMED = 8 };
 
 static void model_start(Model *m) {
@@ -31,35 +25,26 @@ static void model_start(Model *m) {
     m->qualifier = NOT_YET_KNOWN;
 }
 
-static void model_begin(Model *m, double t0) { m->time = t0; }
+BEGINS_AT_ITS_TIME
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case START: return (Slot){.kind = CLOCK, .role = INPUT_CLOCK, .at = &m->start, .size = 1};
-    case ALARM: return (Slot){.kind = CLOCK, .role = INPUT_CLOCK, .at = &m->alarm, .size = 1};
-    case DELAY: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->delay, .size = 1};
-    case ARM_TIME: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->arm_time, .size = 1};
-    case REPEAT: return (Slot){.kind = BOOL, .role = PARAMETER, .at = &m->repeat, .size = 1};
-    case ALARMS: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->alarms, .size = 1};
-    case WHEN: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->when, .size = 1};
-    case ARMED: return (Slot){.kind = BOOL, .role = OUTPUT, .at = &m->armed, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(START, CLOCK, INPUT_CLOCK, start)
+    VARIABLE(ALARM, CLOCK, INPUT_CLOCK, alarm)
+    VARIABLE(DELAY, F64, PARAMETER, delay)
+    VARIABLE(ARM_TIME, F64, PARAMETER, arm_time)
+    VARIABLE(REPEAT, BOOL, PARAMETER, repeat)
+    VARIABLE(ALARMS, I32, OUTPUT, alarms)
+    VARIABLE(WHEN, F64, OUTPUT, when)
+    VARIABLE(ARMED, BOOL, OUTPUT, armed))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 static bool to_be_armed(const Model *m) { return m->arm_time >= 0.0 && !m->was_armed; }
 
 static Outcome model_step(Model *m, Host *host, double t, double until) {
     (void)t;
-    Outcome outcome = arrived(until);
-    if (host->event_mode && to_be_armed(m) && m->arm_time <= until + SAME) {
-        outcome.event = true;
-        outcome.early = host->early_allowed && m->arm_time < until - SAME;
-        outcome.reached = outcome.early ? m->arm_time : until;
-    }
+    const Outcome outcome = arrived_at_event(host, to_be_armed(m), m->arm_time, until);
     m->time = outcome.reached;
     return outcome;
 }

@@ -1,6 +1,9 @@
 /* The FMI 3.0 functions, co-simulation; those of the other interfaces refuse. Included by face.h. */
-#define STATUS(good) ((good) ? fmi3OK : fmi3Error)
-#define REFUSE return fmi3Error
+#define FMI(name) fmi3##name
+#define FMI_STATE(before, after) fmi3##before##FMUState##after
+#define FMI_INSTANCE fmi3Instance
+#define FMI_DESERIALIZE fmi3DeserializeFMUState
+#include "face_both.h"
 
 ACCESS(f64, F64, fmi3Float64, double)
 ACCESS(f32, F32, fmi3Float32, float)
@@ -15,12 +18,6 @@ ACCESS(u64, U64, fmi3UInt64, uint64_t)
 ACCESS(bool, BOOL, fmi3Boolean, bool)
 
 /* -- life ---------------------------------------------------------------------------------------------------------- */
-
-const char *fmi3GetVersion(void) { return fmi3Version; }
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String names[]) {
-    return STATUS(set_categories(&((Instance *)c)->host, on, n, names));
-}
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
                                          fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early,
@@ -52,7 +49,7 @@ void fmi3FreeInstance(fmi3Instance c) { free(c); }
 /* From one of `modes` to `next`. */
 static fmi3Status go(Instance *instance, int modes, Mode next, const char *function) {
     if (!may(instance, modes, function))
-        return fmi3Error;
+        REFUSE;
     instance->now.mode = next;
     return fmi3OK;
 }
@@ -61,10 +58,10 @@ fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) { return go(c, INSTANTIATE
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
     if (!may(c, CONFIGURATION, __func__))
-        return fmi3Error;
+        REFUSE;
 #if HAS_STRUCTURE
     if (!model_resize(&((Instance *)c)->now.model))
-        return fmi3Error;
+        REFUSE;
 #endif
     return go(c, CONFIGURATION, INSTANTIATED, __func__);
 }
@@ -72,38 +69,22 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance, fmi3Float64 start,
                                        fmi3Boolean stop_defined, fmi3Float64 stop) {
     Instance *instance = c;
-#if TAKES_TOLERANCE
-    if (!model_tolerance(&instance->now.model, tolerance_defined ? tolerance : 0.0)) {
-        SAY(&instance->host, ERROR, "logStatusError", "a tolerance of %g is too fine", tolerance);
-        return fmi3Error;
-    }
-#endif
+    if (!tolerated(instance, tolerance_defined, tolerance))
+        REFUSE;
     instance->now.time = start;
     return go(c, INSTANTIATED, INITIALIZATION, __func__);
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-    if (!may(c, INITIALIZATION, __func__))
-        return fmi3Error;
-    begin(c);
-    return fmi3OK;
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
     if (!((Instance *)c)->host.event_mode) {
         SAY(&((Instance *)c)->host, ERROR, "logStatusError", "fmi3EnterEventMode: the instance was made without event mode");
-        return fmi3Error;
+        REFUSE;
     }
     return go(c, STEP_MODE, EVENT_MODE, __func__);
 }
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c) { return go(c, EVENT_MODE, STEP_MODE, __func__); }
 fmi3Status fmi3Terminate(fmi3Instance c) { return go(c, RUNNING, STOPPED, __func__); }
-
-fmi3Status fmi3Reset(fmi3Instance c) {
-    restart(c);
-    return fmi3OK;
-}
 
 /* -- values -------------------------------------------------------------------------------------------------------- */
 
@@ -133,7 +114,7 @@ fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
     for (size_t i = 0; i < n; i++) {
         const Slot slot = find(c, vr[i], BLOB);
         if (slot.at == NULL || k + slot.size > count)
-            return fmi3Error;
+            REFUSE;
         for (size_t j = 0; j < slot.size; j++, k++) {
             sizes[k] = ((const Blob *)slot.at)[j].size;
             values[k] = ((const Blob *)slot.at)[j].bytes;
@@ -148,11 +129,11 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
     for (size_t i = 0; i < n; i++) {
         const Slot slot = find(c, vr[i], BLOB);
         if (slot.at == NULL || k + slot.size > count || !settable(c, &slot, vr[i]))
-            return fmi3Error;
+            REFUSE;
         for (size_t j = 0; j < slot.size; j++, k++) {
             Blob *blob = (Blob *)slot.at + j;
             if (sizes[k] > sizeof blob->bytes)
-                return fmi3Error;
+                REFUSE;
             blob->size = sizes[k];
             if (sizes[k] > 0)
                 memcpy(blob->bytes, values[k], sizes[k]);
@@ -165,11 +146,11 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 
 fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Clock values[]) {
     if (!may(c, INITIALIZATION | EVENT_MODE, __func__))
-        return fmi3Error;
+        REFUSE;
     for (size_t i = 0; i < n; i++) {
         const Slot slot = find(c, vr[i], CLOCK);
         if (slot.at == NULL)
-            return fmi3Error;
+            REFUSE;
         values[i] = *(const bool *)slot.at;
     }
     return fmi3OK;
@@ -177,11 +158,11 @@ fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
 
 fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Clock values[]) {
     if (!may(c, INITIALIZATION | EVENT_MODE, __func__))
-        return fmi3Error;
+        REFUSE;
     for (size_t i = 0; i < n; i++) {
         const Slot slot = find(c, vr[i], CLOCK);
         if (slot.at == NULL || slot.role != INPUT_CLOCK)
-            return fmi3Error;
+            REFUSE;
         *(bool *)slot.at = values[i];
     }
     return fmi3OK;
@@ -191,11 +172,11 @@ fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference vr[],
                                   fmi3IntervalQualifier qualifiers[]) {
 #if HAS_INTERVALS
     if (!may(c, INITIALIZATION | EVENT_MODE, __func__))
-        return fmi3Error;
+        REFUSE;
     for (size_t i = 0; i < n; i++) {
         Qualifier qualifier;
         if (!model_interval(&((Instance *)c)->now.model, vr[i], &intervals[i], &qualifier))
-            return fmi3Error;
+            REFUSE;
         qualifiers[i] = (fmi3IntervalQualifier)qualifier;
     }
     return fmi3OK;
@@ -208,7 +189,7 @@ fmi3Status fmi3GetShiftDecimal(fmi3Instance c, const fmi3ValueReference vr[], si
 #if HAS_INTERVALS
     for (size_t i = 0; i < n; i++)
         if (!model_shift(&((Instance *)c)->now.model, vr[i], &shifts[i]))
-            return fmi3Error;
+            REFUSE;
     return fmi3OK;
 #else
     REFUSE;
@@ -232,7 +213,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
                                     fmi3Boolean *values, fmi3Boolean *has_next, fmi3Float64 *next) {
     Instance *instance = c;
     if (!may(instance, EVENT_MODE, __func__))
-        return fmi3Error;
+        REFUSE;
     const Update update = model_update(&instance->now.model, &instance->host, instance->now.time);
     *again = update.again;
     *terminate = update.terminate;
@@ -248,7 +229,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
                       fmi3Boolean *early, fmi3Float64 *reached) {
     Instance *instance = c;
     if (!may(instance, STEP_MODE, __func__))
-        return fmi3Error;
+        REFUSE;
     const Outcome outcome = advance(instance, t, h);
     *event = outcome.event;
     *terminate = outcome.terminate;
@@ -257,75 +238,12 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
     return (fmi3Status)(outcome.status > FATAL ? ERROR : outcome.status);
 }
 
-/* -- states -------------------------------------------------------------------------------------------------------- */
-
-#if CAN_SAVE
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
-    Instance *instance = c;
-    if (*state == NULL)
-        *state = saved_copy(&instance->now);
-    else
-        memcpy(*state, &instance->now, sizeof instance->now);
-    return STATUS(*state != NULL);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-    memcpy(&((Instance *)c)->now, state, sizeof(Saved));
-    return fmi3OK;
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
-    free(*state);
-    *state = NULL;
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
-    *size = sizeof(Saved);
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-    if (size != sizeof(Saved))
-        return fmi3Error;
-    memcpy(bytes, state, size);
-    return fmi3OK;
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
-    if (size != sizeof(Saved))
-        return fmi3Error;
-    *state = saved_copy((const Saved *)(const void *)bytes);
-    return STATUS(*state != NULL);
-}
-#else
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) { REFUSE; }
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) { REFUSE; }
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) { REFUSE; }
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) { REFUSE; }
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) { REFUSE; }
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) { REFUSE; }
-#endif
-
 /* -- derivatives --------------------------------------------------------------------------------------------------- */
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t unknowns,
                                         const fmi3ValueReference known[], size_t knowns, const fmi3Float64 seed[], size_t n_seed,
                                         fmi3Float64 out[], size_t n_out) {
-#if HAS_DIRECTIONAL
-    for (size_t i = 0; i < unknowns; i++) {
-        out[i] = 0.0;
-        for (size_t j = 0; j < knowns; j++) {
-            double partial;
-            if (!model_sensitivity(&((Instance *)c)->now.model, unknown[i], known[j], &partial))
-                return fmi3Error;
-            out[i] += partial * seed[j];
-        }
-    }
-    return fmi3OK;
-#else
-    REFUSE;
-#endif
+    return STATUS(directional(c, unknown, unknowns, known, knowns, seed, out));
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t unknowns,
@@ -334,14 +252,7 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 order[],
                                     fmi3Float64 value[], size_t count) {
-#if HAS_OUTPUT_DERIVATIVES
-    for (size_t i = 0; i < n; i++)
-        if (order[i] != 1 || !model_rate(&((Instance *)c)->now.model, vr[i], &value[i]))
-            return fmi3Error;
-    return fmi3OK;
-#else
-    REFUSE;
-#endif
+    return STATUS(output_rates(c, vr, n, order, value));
 }
 
 /* -- what a co-simulation FMU need not do -------------------------------------------------------------------------- */

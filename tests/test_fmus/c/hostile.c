@@ -13,32 +13,22 @@ typedef struct {
     double time, deed, at, y;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
 #define LEAVING(event, model) leave(event, model)
 enum { TIME = 0, DEED = 1, AT_TIME = 2, Y = 3 };
 enum { TERMINATED, FREED };
 
 static void model_start(Model *m) { m->at = 0.25; }
-static void model_begin(Model *m, double t0) { m->time = t0; }
+BEGINS_AT_ITS_TIME
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case DEED: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->deed, .size = 1};
-    case AT_TIME: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->at, .size = 1};
-    case Y: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->y, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(DEED, F64, PARAMETER, deed)
+    VARIABLE(AT_TIME, F64, PARAMETER, at)
+    VARIABLE(Y, F64, OUTPUT, y))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 static void leave(int event, const Model *m) {
     int deed = (int)m->deed;
@@ -63,7 +53,7 @@ static void do_harm(Host *host, int deed) {
 }
 
 static Outcome model_step(Model *m, Host *host, double t, double until) {
-    if (t < m->at - 1e-12 && until >= m->at - 1e-12)
+    if (t < m->at - SAME && until >= m->at - SAME)
         do_harm(host, (int)m->deed);
     m->y += until - t;
     m->time = until;

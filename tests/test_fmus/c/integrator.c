@@ -6,14 +6,8 @@ typedef struct {
     int32_t changes;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
 enum { TIME = 0, U = 1, INTEGRAL = 2, CHANGES = 3, WHEN = 4 };
 
 static void model_start(Model *m) { m->when = -1.0; }
@@ -23,18 +17,14 @@ static void model_begin(Model *m, double t0) {
     m->seen = m->u;
 }
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case U: return (Slot){.kind = F64, .role = INPUT, .at = &m->u, .size = 1};
-    case INTEGRAL: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->integral, .size = 1};
-    case CHANGES: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->changes, .size = 1};
-    case WHEN: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->when, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(U, F64, INPUT, u)
+    VARIABLE(INTEGRAL, F64, OUTPUT, integral)
+    VARIABLE(CHANGES, I32, OUTPUT, changes)
+    VARIABLE(WHEN, F64, OUTPUT, when))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 static void notice(Model *m, double t) {
     if (m->u == m->seen)

@@ -29,8 +29,6 @@ typedef struct {
 
 #include "host.h"
 
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
 
 static void model_start(Model *m) {
     memcpy(m->value + FIRST_X0, X0, NX * sizeof(double));

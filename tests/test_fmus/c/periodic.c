@@ -11,30 +11,21 @@ typedef struct {
     bool tick;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
 #define HAS_INTERVALS 1
 enum { TIME = 0, TICK = 1, U = 2, COUNT = 3, WHEN = 4, SAMPLE = 5 };
 
 static void model_start(Model *m) { m->last_when = -1.0; }
 static void model_begin(Model *m, double t0) { m->time = m->start = t0; }
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case TICK: return (Slot){.kind = CLOCK, .role = INPUT_CLOCK, .at = &m->tick, .size = 1};
-    case U: return (Slot){.kind = F64, .role = INPUT, .at = &m->u, .size = 1};
-    case COUNT: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->count, .size = 1};
-    case WHEN: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->when, .size = 1};
-    case SAMPLE: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->sample, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(TICK, CLOCK, INPUT_CLOCK, tick)
+    VARIABLE(U, F64, INPUT, u)
+    VARIABLE(COUNT, I32, OUTPUT, count)
+    VARIABLE(WHEN, F64, OUTPUT, when)
+    VARIABLE(SAMPLE, F64, OUTPUT, sample))
 
 /* While the clock is active the outputs are already those of the tick. */
 static void model_refresh(Model *m) {

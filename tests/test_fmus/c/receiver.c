@@ -10,34 +10,24 @@ typedef struct {
     bool tick;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
 enum { TIME = 0, TICK = 1, VALUE = 2, COUNT = 3, HELD = 4, INTEGRAL = 5, WHEN = 6 };
 
 static void model_start(Model *m) { m->when = -1.0; }
-static void model_begin(Model *m, double t0) { m->time = t0; }
+BEGINS_AT_ITS_TIME
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case TICK: return (Slot){.kind = CLOCK, .role = INPUT_CLOCK, .at = &m->tick, .size = 1};
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(TICK, CLOCK, INPUT_CLOCK, tick)
     case VALUE:
         return (Slot){.kind = F64, .role = HAS_EVENT_MODE ? CLOCKED_INPUT : INPUT, .at = &m->value, .size = 1, .clock = &m->tick};
-    case COUNT: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->count, .size = 1};
-    case HELD: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->held, .size = 1};
-    case INTEGRAL: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->integral, .size = 1};
-    case WHEN: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->when, .size = 1};
-    default: return (Slot){0};
-    }
-}
+    VARIABLE(COUNT, I32, OUTPUT, count)
+    VARIABLE(HELD, F64, OUTPUT, held)
+    VARIABLE(INTEGRAL, F64, OUTPUT, integral)
+    VARIABLE(WHEN, F64, OUTPUT, when))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 static void take(Model *m, double t) {
     m->held = m->value;

@@ -10,40 +10,24 @@ typedef struct {
     int32_t jumps;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
-#define SAME 1e-12
 enum { TIME = 0, LEVEL = 1, COUNT = 2 };
 
 static void model_start(Model *m) { m->level = FIRST_LEVEL; }
-static void model_begin(Model *m, double t0) { m->time = t0; }
+BEGINS_AT_ITS_TIME
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case LEVEL: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->level, .size = 1};
-    case COUNT: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->jumps, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(LEVEL, F64, OUTPUT, level)
+    VARIABLE(COUNT, I32, OUTPUT, jumps))
 
-static void model_refresh(Model *m) { (void)m; }
+NOTHING_TO_REFRESH
 
 static Outcome model_step(Model *m, Host *host, double t, double until) {
     (void)t;
-    Outcome outcome = arrived(until);
-    if (host->event_mode && m->jumps < JUMPS && INSTANTS[m->jumps] <= until + SAME) {
-        const double next = INSTANTS[m->jumps];
-        outcome.event = true;
-        outcome.early = host->early_allowed && next < until - SAME;
-        outcome.reached = outcome.early ? next : until;
-    }
+    const bool more = m->jumps < JUMPS;
+    const Outcome outcome = arrived_at_event(host, more, more ? INSTANTS[m->jumps] : 0.0, until);
     m->time = outcome.reached;
     return outcome;
 }

@@ -10,15 +10,8 @@ typedef struct {
     bool crossing;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
+#include "plain.h"
 
-#include "host.h"
-
-#define HAS_STRUCTURE 0
-#define HAS_INTERVALS 0
-#define SAME 1e-12
 enum { TIME = 0, RATE = 1, LEVEL = 2, CROSSING = 3, VALUE = 4, COUNT = 5, RAMP = 6, WHEN = 7 };
 
 static void model_start(Model *m) {
@@ -34,19 +27,15 @@ static void model_begin(Model *m, double t0) {
     m->over = crossings(m, t0);
 }
 
-static Slot model_slot(Model *m, unsigned reference) {
-    switch (reference) {
-    case TIME: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->time, .size = 1};
-    case RATE: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->rate, .size = 1};
-    case LEVEL: return (Slot){.kind = F64, .role = PARAMETER, .at = &m->level, .size = 1};
-    case CROSSING: return (Slot){.kind = CLOCK, .role = OUTPUT_CLOCK, .at = &m->crossing, .size = 1};
-    case VALUE: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->value, .size = 1};
-    case COUNT: return (Slot){.kind = I32, .role = OUTPUT, .at = &m->count, .size = 1};
-    case RAMP: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->ramp, .size = 1};
-    case WHEN: return (Slot){.kind = F64, .role = OUTPUT, .at = &m->when, .size = 1};
-    default: return (Slot){0};
-    }
-}
+VARIABLES(
+    VARIABLE(TIME, F64, OUTPUT, time)
+    VARIABLE(RATE, F64, PARAMETER, rate)
+    VARIABLE(LEVEL, F64, PARAMETER, level)
+    VARIABLE(CROSSING, CLOCK, OUTPUT_CLOCK, crossing)
+    VARIABLE(VALUE, F64, OUTPUT, value)
+    VARIABLE(COUNT, I32, OUTPUT, count)
+    VARIABLE(RAMP, F64, OUTPUT, ramp)
+    VARIABLE(WHEN, F64, OUTPUT, when))
 
 static void model_refresh(Model *m) {
     m->ramp = m->rate * m->time;
@@ -58,13 +47,8 @@ static void model_refresh(Model *m) {
 
 static Outcome model_step(Model *m, Host *host, double t, double until) {
     (void)t;
-    const double next = m->level * (m->over + 1) / m->rate;
-    Outcome outcome = arrived(until);
-    if (host->event_mode && next <= until + SAME) {
-        outcome.event = m->crossing = true;
-        outcome.early = host->early_allowed && next < until - SAME;
-        outcome.reached = outcome.early ? next : until;
-    }
+    const Outcome outcome = arrived_at_event(host, true, m->level * (m->over + 1) / m->rate, until);
+    m->crossing = m->crossing || outcome.event;
     m->time = outcome.reached;
     return outcome;
 }

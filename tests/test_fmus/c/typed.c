@@ -41,14 +41,9 @@ typedef struct {
     Set u, y;
 } Model;
 
-typedef struct {
-    char none;
-} Scratch;
-
-#include "host.h"
+#include "plain.h"
 
 #define HAS_STRUCTURE 1
-#define HAS_INTERVALS 0
 enum { TIME = 0, LENGTH = 1, FIRST_U = 2, ONLY = 30, FIRST_Y = 32 };
 enum { S_F64, S_F32, S_I8, S_U8, S_I16, S_U16, S_I32, S_U32, S_I64, S_U64, S_BOOL, S_TEXT, S_BLOB, S_CHOICE, S_VECTOR, S_MATRIX,
        S_PAIR_I64, S_PAIR_U64, S_PAIR_BOOL, S_PAIR_TEXT, S_PAIR_BLOB, S_PAIR_F32 };
