@@ -1,4 +1,5 @@
-/* What a model exchange instance of FMI 2.0 and of FMI 3.0 does with the same words; included where `M` is its own type. */
+/* What a model exchange instance of FMI 2.0 and of FMI 3.0 does with the same words; included where `M` is its own type,
+   STATE(before, after) names a function for a state, FMI_STATE(, ) the type of one and FMI_BYTE that of its bytes. */
 #ifndef EXCHANGE_CALLS_H
 #define EXCHANGE_CALLS_H
 
@@ -39,5 +40,34 @@ static void close_model(Model *model) {
     M->FreeInstance(M->c);
     free(model);
 }
+
+static size_t save(Model *model, char **bytes) {
+    FMI_STATE(, ) state = NULL;
+    size_t size;
+    must("getting a state", (int)M->STATE(Get, )(M->c, &state));
+    must("asking for the size of a state", (int)M->STATE(Serialized, Size)(M->c, state, &size));
+    *bytes = malloc(size);
+    must("serialising a state", (int)M->STATE(Serialize, )(M->c, state, (FMI_BYTE *)*bytes, size));
+    must("freeing a state", (int)M->STATE(Free, )(M->c, &state));
+    return size;
+}
+
+static int try_restore(Model *model, const char *bytes, size_t size) {
+    FMI_STATE(, ) state = NULL;
+    int status = (int)M->DESERIALIZE(M->c, (const FMI_BYTE *)bytes, size, &state);
+    if (status > SLAVE_WARNING)
+        return status;
+    status = (int)M->STATE(Set, )(M->c, state);
+    must("freeing a state", (int)M->STATE(Free, )(M->c, &state));
+    return status;
+}
+
+/* The calls of the instance. */
+#define CALLS                                                                                                                \
+    (Model) {                                                                                                                \
+        enter_initialization, exit_initialization, set_reals, announce, update, enter_event_mode, enter_continuous_time_mode, \
+            set_time, set_states, get_states, get_derivatives, get_indicators, directional, do_step, save, try_restore,      \
+            close_model                                                                                                      \
+    }
 
 #endif
