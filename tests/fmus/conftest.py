@@ -16,6 +16,7 @@ from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 from shipped import shipped
+from toy_systems import Booster
 
 from fmu_observer.description import can_exchange
 from fmu_observer.event_protocol import EventProtocol
@@ -157,36 +158,6 @@ class Gain(HybridSystem):
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {"twice": 2.0 * u.force + t}
-
-
-class Booster(HybridSystem):
-    """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between
-    switches.
-    """
-
-    name = "booster"
-    states = (state("place", "m"), state("rate", "m/s", 1.0))
-    outputs = (output_signal("speed", "m/s"), output_signal("pushed", "m/s2"))
-    parameters = (parameter("stretch", "m", (0.25, 0.6), size=2), parameter("span", "s", (0.3141, 0.7), size=2))
-    switchings = ("stretch[1]", "stretch[2]", "span[1]", "span[2]")
-    internal_step = 0.01
-
-    def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        place, now = x.place, t + 0.0 * x.place
-        return vector(place - p.stretch[0], place - p.stretch[1], now - p.span[0], now - p.span[1])
-
-    def requirements(self, p: Any) -> dict[str, Any]:
-        return {"the stretch has no length": np.where(p.stretch[1] > p.stretch[0], 1.0, 0.0)}
-
-    def _push(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        passed = self.switches(t, x, u, p)
-        return 3.0 * (passed[0] - passed[1]) + 2.0 * (passed[2] - passed[3])
-
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"place": x.rate, "rate": self._push(t, x, u, p)}
-
-    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"speed": x.rate, "pushed": self._push(t, x, u, p)}
 
 
 class Hopper(HybridSystem):

@@ -189,31 +189,43 @@ def _fmi1_variable(v: Variable) -> str:
 # --------------------------------------------------------------------------------------------------------------
 
 
+def _types(model: Model, begin: str, end: str) -> str:
+    """The enumerations of a model; `begin` has a place for the attributes."""
+    return "".join(
+        f"    {begin.format(attributes(name=name))}"
+        + "".join(f"<Item{attributes(name=item, value=i)}/>" for i, item in enumerate(items, start=1))
+        + f"{end}\n"
+        for name, items in model.enumerations.items()
+    )
+
+
+def _document(model: Model, head: str, types: str, variables: str, structure: str) -> str:
+    """The text of FMI 2.0 and 3.0 from its parts."""
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        f'<fmiModelDescription{head} variableNamingConvention="structured">\n'
+        f"  <CoSimulation{attributes(modelIdentifier=model.name, **model.flags)}/>\n"
+        + _unit_definitions(model)
+        + (f"  <TypeDefinitions>\n{types}  </TypeDefinitions>\n" if types else "")
+        + _categories(model)
+        + f'  <DefaultExperiment startTime="0.0" stopTime="1.0"{attributes(tolerance=model.tolerance)}/>\n'
+        + f"  <ModelVariables>\n{variables}  </ModelVariables>\n"
+        + f"  <ModelStructure>\n{structure}  </ModelStructure>\n</fmiModelDescription>\n"
+    )
+
+
 def _fmi2(model: Model) -> str:
     kept = [v for v in model.variables if v.causality != "independent"]
     number = {v.name: i for i, v in enumerate(kept, start=1)}
     entries, unknowns = _structure(number, "index", kept)
     outputs = "".join(f"<Unknown{entry}/>" for entry in entries)
     initial = "".join(f"<Unknown{entry}/>" for entry in unknowns)
-    types = "".join(
-        f"    <SimpleType{attributes(name=name)}><Enumeration>"
-        + "".join(f"<Item{attributes(name=item, value=i)}/>" for i, item in enumerate(items, start=1))
-        + "</Enumeration></SimpleType>\n"
-        for name, items in model.enumerations.items()
-    )
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<fmiModelDescription fmiVersion="2.0"{attributes(modelName=model.name, guid=model.token)}'
-        ' variableNamingConvention="structured">\n'
-        f"  <CoSimulation{attributes(modelIdentifier=model.name, **model.flags)}/>\n"
-        + _unit_definitions(model)
-        + (f"  <TypeDefinitions>\n{types}  </TypeDefinitions>\n" if types else "")
-        + _categories(model)
-        + f'  <DefaultExperiment startTime="0.0" stopTime="1.0"{attributes(tolerance=model.tolerance)}/>\n'
-        + f"  <ModelVariables>\n{''.join(_fmi2_variable(v) for v in kept)}  </ModelVariables>\n  <ModelStructure>\n"
-        + (f"    <Outputs>{outputs}</Outputs>\n" if outputs else "")
-        + (f"    <InitialUnknowns>{initial}</InitialUnknowns>\n" if initial else "")
-        + "  </ModelStructure>\n</fmiModelDescription>\n"
+    types = _types(model, "<SimpleType{}><Enumeration>", "</Enumeration></SimpleType>")
+    variables = "".join(map(_fmi2_variable, kept))
+    structure = f"    <Outputs>{outputs}</Outputs>\n" if outputs else ""
+    structure += f"    <InitialUnknowns>{initial}</InitialUnknowns>\n" if initial else ""
+    return _document(
+        model, attributes(fmiVersion="2.0", modelName=model.name, guid=model.token), types, variables, structure
     )
 
 
@@ -234,24 +246,10 @@ def _fmi3(model: Model) -> str:
     entries, unknowns = _structure(number, "valueReference", model.variables)
     structure = "".join(f"    <Output{entry}/>\n" for entry in entries)
     structure += "".join(f"    <InitialUnknown{entry}/>\n" for entry in unknowns)
-    types = "".join(
-        f"    <EnumerationType{attributes(name=name)}>"
-        + "".join(f"<Item{attributes(name=item, value=i)}/>" for i, item in enumerate(items, start=1))
-        + "</EnumerationType>\n"
-        for name, items in model.enumerations.items()
-    )
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<fmiModelDescription fmiVersion="3.0"{attributes(modelName=model.name, instantiationToken=model.token)}'
-        ' variableNamingConvention="structured">\n'
-        f"  <CoSimulation{attributes(modelIdentifier=model.name, **model.flags)}/>\n"
-        + _unit_definitions(model)
-        + (f"  <TypeDefinitions>\n{types}  </TypeDefinitions>\n" if types else "")
-        + _categories(model)
-        + f'  <DefaultExperiment startTime="0.0" stopTime="1.0"{attributes(tolerance=model.tolerance)}/>\n'
-        + f"  <ModelVariables>\n{''.join(_fmi3_variable(v) for v in model.variables)}  </ModelVariables>\n"
-        + f"  <ModelStructure>\n{structure}  </ModelStructure>\n</fmiModelDescription>\n"
-    )
+    types = _types(model, "<EnumerationType{}>", "</EnumerationType>")
+    variables = "".join(map(_fmi3_variable, model.variables))
+    head = attributes(fmiVersion="3.0", modelName=model.name, instantiationToken=model.token)
+    return _document(model, head, types, variables, structure)
 
 
 def _fmi3_variable(v: Variable) -> str:
