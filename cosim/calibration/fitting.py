@@ -9,18 +9,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.calibration.least_squares import Fit, fit
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
-from cosim.calibration.runs import Runs
+from cosim.calibration.runs import Hidden, Runs
 from cosim.errors import nearest
-from fmu_observer.identification.least_squares import Fit, fit, unseen_directions
 from fmus.tables.numbers import number
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
 
 Array = NDArray[np.float64]
-LIMIT = 0.5
-"""Relative standard deviation beyond which a direction counts as not identified."""
-ALIKE = 0.3
-"""Correlation of neighbouring residuals from which the model is doubted."""
+_ESTIMATE = (
+    name_column("name", "parameter"),
+    Column("start", "start", meaning="First guess", digits=5),
+    Column("value", "estimate", digits=5),
+)
+_BEHIND = (
+    text_column("unit", "unit"),
+    text_column(
+        "identified",
+        "identified",
+        "Whether the recording shows the parameter",
+        write=lambda sure: "yes" if sure else "no",
+    ),
+)
+_SIGNALS = (
+    name_column("name", "signal"),
+    Column("noise", "residuals", meaning="Standard deviation of measured less fitted values"),
+    text_column("unit", "unit"),
+    Column("correlation", "correlation", meaning="Of neighbouring residuals", digits=2),
+    Column("samples_per_independent", "as one", meaning="Samples that say as much as one with white noise", digits=2),
+)
+_ROUNDING = 1e-6  # of what a signal varies: residuals below it are no noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +47,8 @@ class Calibration:
 
     Attributes:
         names: of the parameters. units: of them, by name. start: first guesses by name. fit: the numbers.
-        recorded: what was fitted. level: of the intervals. remarks: what to know.
+        recorded: what was fitted. level: of the intervals. hidden: what the recording does not show of the parameters.
+        remarks: what else to know. lines: values for a scenario by name, those that were not fitted among them.
     """
 
     names: tuple[str, ...]
@@ -38,7 +57,9 @@ class Calibration:
     fit: Fit
     recorded: RecordedSignals
     level: float
+    hidden: tuple[Hidden, ...]
     remarks: tuple[str, ...]
+    lines: Mapping[str, float]
 
     @property
     def values(self) -> dict[str, float]:
@@ -54,53 +75,76 @@ class Calibration:
 
     @property
     def identified(self) -> bool:
-        """Whether every direction of the parameters is seen."""
-        return self.fit.converged and not unseen_directions(self.fit, self.names, LIMIT)
+        """Whether all parameters are identified."""
+        return self.fit.converged and not self.hidden
+
+    @property
+    def not_identified(self) -> set[str]:
+        """Names of the parameters that are not identified."""
+        return {name for hidden in self.hidden for name in hidden.names}
 
     def toml(self) -> str:
         """Parameters for a scenario, to be pasted below ``[components.NAME]``."""
-        intervals = self.intervals
+        intervals, hidden = self.intervals, self.not_identified
         lines = []
-        for name, value in self.values.items():
-            low, high = intervals[name]
-            lines.append(
-                f"parameters.{_key(name)} = {value!r}  # {100.0 * self.level:g} %: {low:.6g} to {high:.6g} "
-                f"{self.units.get(name, '')}".rstrip()
-            )
+        for name, value in self.lines.items():
+            line = f"parameters.{_key(name)} = {value!r}"
+            if name in intervals:
+                low, high = intervals[name]
+                line += (
+                    f"  # {'not identified: ' if name in hidden else ''}{100.0 * self.level:g} %: {low:.6g} to "
+                    f"{high:.6g} {self.units.get(name, '')}"
+                )
+            lines.append(line.rstrip())
         return "\n".join(lines) + "\n"
+
+    def parameters(self) -> Table:
+        """Estimates with their intervals."""
+        intervals, hidden = self.intervals, self.not_identified
+        rows = [
+            [name, self.start[name], value, intervals[name], self.units.get(name, ""), name not in hidden]
+            for name, value in self.values.items()
+        ]
+        interval = Column("interval", f"{100.0 * self.level:g} % interval", digits=5)
+        return Table("parameters", (*_ESTIMATE, interval, *_BEHIND), rows)
+
+    def signals(self) -> Table:
+        """Residuals of what was fitted."""
+        found, units = self.fit, self.recorded.units
+        rows = [
+            [name, float(found.noise[i]), units.get(name, ""), float(found.correlation[i]), float(independent)]
+            for i, (name, independent) in enumerate(
+                zip(self.recorded.measured, found.samples_per_independent, strict=True)
+            )
+        ]
+        return Table("signals", _SIGNALS, rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the series as plain data."""
-        intervals = self.intervals
-        parameters = {
-            name: {"value": value, "low": intervals[name][0], "high": intervals[name][1], "start": self.start[name]}
-            for name, value in self.values.items()
-        }
-        signals = {
-            name: {"noise": float(self.fit.noise[i]), "correlation": float(self.fit.correlation[i])}
-            for i, name in enumerate(self.recorded.measured)
-        }
+        parameters = {row.pop("name"): _ends(row) for row in self.parameters().data()}
+        signals = {row.pop("name"): row for row in self.signals().data()}
         rest = {"level": self.level, "covariance": self.fit.covariance.tolist(), "runs": self.fit.runs}
-        state = {"identified": self.identified, "remarks": list(self.remarks)}
+        rest |= {"condition": self.fit.condition, "from": self.recorded.time[0], "to": self.recorded.time[-1]}
+        state = {"identified": self.identified, "remarks": [*(h.text for h in self.hidden), *self.remarks]}
         return {"parameters": parameters, "signals": signals} | rest | state
 
-    def text(self) -> str:
+    def parts(self) -> Parts:
         """Estimates, intervals, residuals and remarks for people."""
-        intervals = self.intervals
-        rows = [["parameter", "start", "estimate", f"{100.0 * self.level:g} % interval", "unit"]]
-        for name, value in self.values.items():
-            low, high = intervals[name]
-            interval = f"{number(low, 5)} to {number(high, 5)}"
-            rows.append([name, number(self.start[name], 5), number(value, 5), interval, self.units.get(name, "")])
-        noise = [["signal", "residuals", "unit", "correlation"]]
-        for i, name in enumerate(self.recorded.measured):
-            unit = self.recorded.units.get(name, "")
-            noise.append([name, number(float(self.fit.noise[i])), unit, number(float(self.fit.correlation[i]), 2)])
         time = self.recorded.time
         span = f"from {number(float(time[0]), 5)} to {number(float(time[-1]), 5)} s"
-        head = f"{len(time)} samples {span}, {self.fit.runs} runs"
-        tables = [*text_table(rows, left=(0, 4), heading=True), "", *text_table(noise, left=(0, 2), heading=True)]
-        return "\n".join([head, "", *tables, "", *(f"- {remark}" for remark in self.remarks)]).rstrip()
+        head = f"{len(time)} samples {span}, {self.fit.runs} runs, condition number {number(self.fit.condition, 2)}"
+        notes = [*(f"- Not identified: {hidden.text}" for hidden in self.hidden), *(f"- {r}" for r in self.remarks)]
+        return [head, self.parameters(), self.signals(), *(["\n".join(notes)] if notes else [])]
+
+    def text(self) -> str:
+        """All of it as one text."""
+        return joined(self.parts())
+
+
+def _ends(row: dict[str, Any]) -> dict[str, Any]:
+    """A row with the ends of its interval apart."""
+    low, high = row.pop("interval")
+    return {"value": row.pop("value"), "low": low, "high": high} | row
 
 
 def calibrate(
@@ -113,7 +157,7 @@ def calibrate(
     """Fit the parameters of runs to a recording.
 
     Args:
-        runs: what is run; its `start` names the parameters. recorded: what was measured.
+        runs: what is run; its first guesses name the parameters. recorded: what was measured.
         noise: standard deviations of the measured signals by name; what is left out is estimated from the residuals.
         level: probability with which an interval covers, between 0 and 1.
 
@@ -123,35 +167,43 @@ def calibrate(
     Raises:
         CalibrationError: a parameter changes nothing that was measured, the model gives no numbers, or too few samples.
     """
-    names = tuple(runs.start)
-    measured = np.array(list(recorded.measured.values()))
     if not 0.0 < level < 1.0:
         raise CalibrationError(f"level {level!r}: expected a probability between 0 and 1, for instance 0.95.")
+    recorded, start = runs.prepare(recorded)
+    names, measured = tuple(start), np.array(list(recorded.measured.values()))
     if np.isfinite(measured).sum() <= len(names):
         raise CalibrationError(
             f"{np.isfinite(measured).sum()} measured values for {len(names)} parameters; expected more of them."
         )
-    low, high = (np.array([runs.bounds[name][i] for name in names]) for i in (0, 1))
-    found = _fit(runs, recorded, measured, noise=_deviations(noise, recorded), low=low, high=high)
+    limits = [runs.bounds.get(name, (-np.inf, np.inf)) for name in names]
+    low, high = np.array(limits).T
+    found = _fit(runs, recorded, start, measured, noise=_deviations(noise, recorded), low=low, high=high)
     _demand_effects(found, names, recorded)
     units = {name: runs.unit(name) for name in names}
-    known = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in recorded.units.items()}
+    known = {name: recorded.units.get(name, "1") for name in recorded.measured}
+    known = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in known.items()}
     recorded = replace(recorded, units=known)  # a table without units has those of the model
     return Calibration(
-        names, units, dict(runs.start), found, recorded, level, tuple(_remarks(found, names, recorded, low, high))
+        names,
+        units,
+        dict(start),
+        found,
+        recorded,
+        level,
+        tuple(runs.hidden(found, names, recorded, level)),
+        (*runs.remarks(found, names, recorded), *_remarks(found, names, recorded, low, high)),
+        runs.parameter_lines(dict(zip(names, found.parameters.tolist(), strict=True))),
     )
 
 
-def _fit(runs: Runs, recorded: RecordedSignals, measured: Array, **limits: Any) -> Fit:
+def _fit(runs: Runs, recorded: RecordedSignals, start: Mapping[str, float], measured: Array, **limits: Any) -> Fit:
     """The fit, begun at the first guesses."""
-    names = tuple(runs.start)
-    start = np.array([runs.start[name] for name in names])
 
-    def simulate(parameters: Array) -> Array:
-        return runs.run(dict(zip(names, parameters.tolist(), strict=True)), recorded)
+    def simulate(points: Array) -> Array:
+        return runs.run_all([dict(zip(start, point, strict=True)) for point in points.tolist()], recorded)
 
     try:
-        return fit(simulate, start, measured, **limits)
+        return fit(simulate, np.array(list(start.values())), measured, **limits)
     except ValueError as error:
         if isinstance(error, CalibrationError):
             raise
@@ -186,18 +238,19 @@ def _deviations(noise: Mapping[str, float] | None, recorded: RecordedSignals) ->
 
 def _remarks(found: Fit, names: tuple[str, ...], recorded: RecordedSignals, low: Array, high: Array) -> list[str]:
     remarks = [] if found.converged else ["The fit did not come to rest; try other first guesses."]
-    remarks += [f"Not identified: {d.explain()}." for d in unseen_directions(found, names, LIMIT)]
     for i, name in enumerate(names):
         near = 1e-6 * found.sizes[i]
         if found.parameters[i] - low[i] <= near or high[i] - found.parameters[i] <= near:
             remarks.append(f"{name} stands at the end of its range; its interval says nothing.")
-    for i, signal in enumerate(recorded.measured):
-        if found.correlation[i] > ALIKE:
-            wider = np.sqrt((1.0 + min(found.correlation[i], 0.999)) / (1.0 - min(found.correlation[i], 0.999)))
+    for i, (signal, measured) in enumerate(recorded.measured.items()):
+        times = float(found.samples_per_independent[i])
+        if times > 1.0 and found.noise[i] > _ROUNDING * np.nanstd(measured):
             remarks.append(
-                f"Neighbouring residuals of {signal} are alike (correlation {found.correlation[i]:.2f}): a sensor that "
-                f"filters, or something that the model misses. Its share of the intervals is {wider:.2g} times wider; "
-                "that covers noise of a sensor, not a model that is wrong. Look at the residuals."
+                f"Residuals of {signal} are no white noise (correlation of neighbours {found.correlation[i]:.2f}): a "
+                "sensor that filters or aggregates, an input that is not as recorded, a gradient, slip, or something "
+                f"else that the model misses. {times:.2g} samples count as one, and its share of the intervals is "
+                f"{np.sqrt(times):.2g} times wider; that covers noise of a sensor, not a model that is wrong. Check "
+                "the residuals (--plot FILE)."
             )
     return remarks
 

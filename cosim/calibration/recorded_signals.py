@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,33 +35,58 @@ class RecordedSignals:
 
     time: Array
     measured: Mapping[str, Array]
-    inputs: Mapping[str, Array]
-    units: Mapping[str, str]
+    inputs: Mapping[str, Array] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     ends: Mapping[str, Array] = field(default_factory=dict)
+
+    def part(self, samples: NDArray[np.intp]) -> RecordedSignals:
+        """Some of the samples.
+
+        Args:
+            samples: their numbers, increasing.
+        """
+        measured, inputs = ({n: v[samples] for n, v in kind.items()} for kind in (self.measured, self.inputs))
+        ends = {name: values[:, samples[:-1]] for name, values in self.ends.items()}
+        return replace(self, time=self.time[samples], measured=measured, inputs=inputs, ends=ends)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What of a recording is used.
+
+    Attributes:
+        signals: those to fit, ``name`` or ``name=column``; None for all outputs that were recorded.
+        inputs: by name of an input the column that drives it, or a constant; others are driven by a column of their
+            own name.
+        begin, end: part to use [s].
+        between: whether inputs are held or run on lines between samples, said of all or of some by name. Of the others
+            a run of this package says it; of a table inputs that are no continuous ones are held.
+    """
+
+    signals: Sequence[str] | None = None
+    inputs: Mapping[str, str | float] = field(default_factory=dict)
+    begin: float = -np.inf
+    end: float = np.inf
+    between: Chosen = None
 
 
 def sort_columns(
     recording: Result,
     source: str,
-    outputs: Sequence[str],
+    outputs: Mapping[str, str],
     inputs: Sequence[str],
-    signals: Sequence[str] | None,
-    begin: float = -np.inf,
-    end: float = np.inf,
-    between: Chosen = None,
+    selection: Selection = Selection(),
     discrete: Collection[str] = (),
 ) -> RecordedSignals:
     """Find what drives the model and what it is held against.
 
-    A column fits a signal of its own name, with or without the component before the point. A signal may be given as
-    ``name=column`` where the names differ.
+    A column fits a signal of its own name, with or without the component before the point; the only output also the
+    only column of its unit.
 
     Args:
         recording: the table. source: its name, for messages.
-        outputs: signals that the model has. inputs: inputs that it takes.
-        signals: those to fit; None for all outputs that were recorded. begin, end: part of the recording to use [s].
-        between: whether inputs are held or run on lines between samples, said of all or of some by name. Of the others
-            a run of this package says it, else `discrete` does: inputs that are no continuous ones.
+        outputs: units by the names of the signals that the model has. inputs: that it takes.
+        selection: what is used. discrete: inputs that are no continuous ones.
 
     Returns:
         The columns.
@@ -69,12 +94,11 @@ def sort_columns(
     Raises:
         CalibrationError: a signal was not recorded, or nothing is in the part.
     """
-    columns = [signal.name for signal in recording.signals]
     units = {signal.name: signal.unit for signal in recording.signals}
-    chosen = _fitted(columns, source, outputs, signals)
-    rows = _rows_of(recording.time, begin, end, source)
-    driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
-    ends = _interval_ends(recording, driving, rows, said_of(between, list(driving), source), discrete)
+    chosen = _fitted(units, source, outputs, selection.signals)
+    rows = _rows_of(recording.time, selection.begin, selection.end, source)
+    driving, constants = _driving(list(units), source, inputs, selection.inputs)
+    ends = _interval_ends(recording, driving, rows, said_of(selection.between, list(driving), source), discrete)
 
     def sampled(names: Mapping[str, str]) -> dict[str, Array]:
         return {name: np.asarray(recording[column], dtype=float)[rows.first] for name, column in names.items()}
@@ -82,10 +106,27 @@ def sort_columns(
     return RecordedSignals(
         recording.time[rows.first],
         sampled(chosen),
-        sampled(driving),
+        sampled(driving) | {name: np.full(len(rows.first), value) for name, value in constants.items()},
         {name: units[column] for name, column in chosen.items()},
         ends,
     )
+
+
+def _driving(
+    columns: Sequence[str], source: str, inputs: Sequence[str], given: Mapping[str, str | float]
+) -> tuple[dict[str, str], dict[str, float]]:
+    """Columns and constants that drive inputs, by name."""
+    driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
+    constants = dict[str, float]()
+    for name, what in given.items():
+        if name not in inputs:
+            raise CalibrationError(f"The model has no input {name!r}; {nearest(name, inputs)}")
+        if isinstance(what, str):
+            driving[name] = _demanded(what, columns, source)
+        else:
+            driving.pop(name, None)
+            constants[name] = what
+    return driving, constants
 
 
 class _Rows(NamedTuple):
@@ -104,7 +145,10 @@ def _rows_of(times: Array, begin: float, end: float, source: str) -> _Rows:
     time, rows = np.unique(times, return_index=True)
     part = (time >= begin) & (time <= end)
     if np.count_nonzero(part) < 2:
-        raise CalibrationError(f"{source}: fewer than two samples in the part to use; there are {len(time)} in all.")
+        span = f", from {time[0]:g} to {time[-1]:g} s" if len(time) else ""
+        raise CalibrationError(
+            f"{source}: fewer than two samples in the part to use; there are {len(time)} in all{span}."
+        )
     last = np.append(rows[1:], len(times)) - 1
     return _Rows(rows[part], last[part])
 
@@ -130,28 +174,42 @@ def _interval_ends(
 
 
 def _fitted(
-    columns: Sequence[str], source: str, outputs: Sequence[str], signals: Sequence[str] | None
+    units: Mapping[str, str], source: str, outputs: Mapping[str, str], signals: Sequence[str] | None
 ) -> dict[str, str]:
     """The column of each signal to fit."""
-    chosen: dict[str, str] = {}
-    if signals is None:
-        chosen = {name: column for name in outputs if (column := _column(name, columns)) is not None}
-        if not chosen:
-            raise CalibrationError(
-                f"{source}: none of the model's outputs was recorded ({', '.join(outputs) or 'it has none'}). The "
-                f"recording holds: {', '.join(columns)}. Say which belong together: --signals NAME=COLUMN."
-            )
-    for given in signals or ():
-        name, sign, asked = given.partition("=")
-        if name not in outputs:
-            raise CalibrationError(f"The model has no output {name!r}; {nearest(name, outputs)}")
-        column = _column(asked if sign else name, columns)
-        if column is None:
-            raise CalibrationError(
-                f"{source}: signal {asked or name!r} was not recorded; {nearest(asked or name, columns)}"
-            )
-        chosen[name] = column
+    if signals is not None:
+        return dict(_asked(text, list(units), source, outputs) for text in signals)
+    chosen = {name: column for name in outputs if (column := _column(name, list(units))) is not None}
+    if not chosen and len(outputs) == 1:
+        (name, unit), *_ = outputs.items()
+        alike = [column for column, its in units.items() if its == unit] or list(units)
+        chosen = {name: alike[0]} if len(alike) == 1 else {}
+    if not chosen:
+        raise CalibrationError(
+            f"{source}: none of the model's outputs was recorded ({', '.join(outputs) or 'it has none'}). The "
+            f"recording holds: {', '.join(units) or 'nothing'}. Say which belong together: --signals NAME=COLUMN."
+        )
     return chosen
+
+
+def _asked(text: str, columns: Sequence[str], source: str, outputs: Mapping[str, str]) -> tuple[str, str]:
+    """The signal and the column of ``name`` or ``name=column``."""
+    name, _, column = text.partition("=")
+    if name not in outputs:
+        raise CalibrationError(f"The model has no output {name!r}; {nearest(name, outputs)}")
+    return name, _demanded(column or name, columns, source)
+
+
+def _demanded(name: str, columns: Sequence[str], source: str) -> str:
+    """The column of a name.
+
+    Raises:
+        CalibrationError: there is none, or more than one.
+    """
+    column = _column(name, columns)
+    if column is None:
+        raise CalibrationError(f"{source}: signal {name!r} was not recorded; {nearest(name, columns)}")
+    return column
 
 
 def _column(name: str, columns: Sequence[str]) -> str | None:

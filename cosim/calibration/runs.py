@@ -1,15 +1,17 @@
-"""Runs of what is calibrated: a sealed FMU, one loaded instance for all runs, or a scenario."""
+"""What is calibrated: a sealed FMU, one loaded instance for all runs, or a scenario."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.calibration.least_squares import Fit, unseen_directions
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.coupling.instants import is_continuous
 from cosim.errors import CosimError, nearest
@@ -18,23 +20,37 @@ from cosim.results.result import Result
 from cosim.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
+LIMIT = 0.5
+"""Standard deviation along a direction, relative to the sizes of the parameters, beyond which it is not identified."""
 
 
-class Runs(Protocol):
+class Hidden(NamedTuple):
+    """What a recording does not show of the parameters.
+
+    Attributes:
+        names: parameters that are not identified. text: a sentence with the reason.
+    """
+
+    names: tuple[str, ...]
+    text: str
+
+
+class Runs(ABC):
     """What can be run with other parameters.
 
     Attributes:
         outputs: signals that it has. inputs: inputs that a recording may drive. discrete: those that are no continuous
             ones. start: first guesses by name.
-        bounds: lowest and highest value by name.
+        bounds: lowest and highest value by name; those without an entry have none.
     """
 
     outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    discrete: tuple[str, ...]
-    start: dict[str, float]
-    bounds: dict[str, tuple[float, float]]
+    inputs: tuple[str, ...] = ()
+    discrete: tuple[str, ...] = ()
+    start: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
 
+    @abstractmethod
     def run(self, values: Mapping[str, float], recorded: RecordedSignals) -> Array:
         """Simulate with parameters.
 
@@ -45,6 +61,18 @@ class Runs(Protocol):
             The signals at the instants, shape (q, n).
         """
 
+    def run_all(self, points: Sequence[Mapping[str, float]], recorded: RecordedSignals) -> Array:
+        """Simulate with several sets of parameters.
+
+        Args:
+            points: parameters of each run, by name. recorded: as for `run`.
+
+        Returns:
+            The signals, shape (m, q, n).
+        """
+        return np.stack([self.run(values, recorded) for values in points])
+
+    @abstractmethod
     def unit(self, name: str) -> str:
         """Unit of a signal or of a value that is fitted, empty where it is not known.
 
@@ -52,11 +80,46 @@ class Runs(Protocol):
             name: of it.
         """
 
-    def close(self) -> None:
+    def prepare(self, recorded: RecordedSignals) -> tuple[RecordedSignals, Mapping[str, float]]:
+        """The part of a recording that is fitted, and first guesses by name, of what is fitted to it.
+
+        Args:
+            recorded: the whole.
+
+        Raises:
+            CalibrationError: nothing can be fitted to it.
+        """
+        return recorded, self.start
+
+    def hidden(self, found: Fit, names: Sequence[str], recorded: RecordedSignals, level: float) -> list[Hidden]:
+        """What the recording does not show: directions along which the parameters are uncertain by half their size.
+
+        Args:
+            found: the fit. names: of its parameters. recorded: what was fitted. level: of the intervals.
+        """
+        return [Hidden(tuple(d.shares), d.explain()) for d in unseen_directions(found, names, LIMIT)]
+
+    def remarks(self, found: Fit, names: Sequence[str], recorded: RecordedSignals) -> list[str]:
+        """What else there is to know of a fit.
+
+        Args:
+            found: the fit. names: of its parameters. recorded: what was fitted.
+        """
+        return []
+
+    def parameter_lines(self, values: Mapping[str, float]) -> dict[str, float]:
+        """What stands in a scenario, by name: values found, and those that belong to them.
+
+        Args:
+            values: by name.
+        """
+        return dict(values)
+
+    def close(self) -> None:  # noqa: B027 - most have opened nothing
         """Free what was opened."""
 
 
-class FmuRuns:
+class FmuRuns(Runs):
     """Runs of an FMU of either interface type: reset, parameters set, driven by the recorded inputs.
 
     Args:
@@ -137,7 +200,7 @@ class FmuRuns:
         self._model.close()
 
 
-class ScenarioRuns:
+class ScenarioRuns(Runs):
     """Runs of a scenario with other values of ``component.parameter``.
 
     Args:
@@ -148,13 +211,10 @@ class ScenarioRuns:
         CalibrationError: there is no first guess for a value.
     """
 
-    inputs: tuple[str, ...] = ()
-    discrete: tuple[str, ...] = ()
-
     def __init__(self, scenario: Scenario, names: Sequence[str], guesses: Mapping[str, float] | None = None) -> None:
         self.scenario = scenario
         table = scenario.table()
-        self.start, self.bounds = {}, dict.fromkeys(names, (-np.inf, np.inf))
+        self.start, self.bounds = {}, {}
         for name in names:
             component, _, key = name.partition(".")
             if component not in table.components:
@@ -195,9 +255,6 @@ class ScenarioRuns:
             name: of the signal or value.
         """
         return self._units.get(name, "")
-
-    def close(self) -> None:
-        """Nothing to free."""
 
 
 def _number(text: object, otherwise: float) -> float:

@@ -1,52 +1,90 @@
-"""``cosim calibrate SCENARIO|FMU RECORDING``: parameters from a recording, with confidence regions."""
+"""``cosim calibrate MODEL RECORDING``: parameters from a recording, with confidence regions."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
+from inspect import signature
 from math import inf
 from pathlib import Path
 from typing import Any
 
 from cosim import calibration
 from cosim.calibration.fitting import Calibration, calibrate
-from cosim.calibration.recorded_signals import CalibrationError, sort_columns
+from cosim.calibration.recorded_signals import CalibrationError, Selection, sort_columns
+from cosim.calibration.running_resistance import RunningResistance
 from cosim.calibration.runs import FmuRuns, Runs, ScenarioRuns
-from cosim.cli.arguments import JSON_NOT_TABLE, PARAMETERS_FILE, settings_argument
-from cosim.cli.output import print_json, save_figure, write_text
+from cosim.cli.arguments import PARAMETERS_FILE, settings_argument
+from cosim.cli.output import save_figure, write_text
 from cosim.cli.scenarios import between_samples, parse_setting, setting_number
+from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.results.load_result import load_result
+from cosim.results.result import Result
 from cosim.simulation.scenario import Scenario
+from fmus import cached_fmu
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
+from plant_models import PLANTS
 
-DONE, NOT_IDENTIFIED = 0, 1
+_DONE, _NOT_IDENTIFIED = 0, 1
+RUNNING_RESISTANCE = "running_resistance"
+_RUN_SECONDS, _RUN_STEP = 60.0, 0.05
 
 GROUP = "Study"
-HELP = "fit parameters of an FMU or a scenario to a recording"
+HELP = "fit parameters of an FMU, a train model or a scenario to a recording"
+FORMER = {
+    "identify": "cosim calibrate running_resistance RECORDING, with --signals speed=NAME for --speed NAME, --inputs "
+    "effort=N_OR_NAME for --effort, --set mass=KG for --mass, --set minimum_speed=M_S and --set resolution=M_S2 for "
+    "these options, and of an FMU --drive NAME=VALUE for --input NAME and --set"
+}
 PARSER = {
     "description": (
-        "Fit parameters of an FMU or a scenario to a recording by least squares, with confidence intervals, and tell "
-        "what cannot be identified. An FMU is driven by the columns of the recording that have the names of its inputs."
+        "Fit parameters of an FMU, a train model of the package or a scenario to a recording by least squares, with "
+        "confidence intervals, and say what cannot be identified. A model is driven by the columns of the recording "
+        "that have the names of its inputs. running_resistance, v' = effort/mass - w0 - w1 v - w2 v^2, fits davis_a, "
+        "davis_b and davis_c to a measured speed and needs neither guesses nor a compiler; its settings (--set) are "
+        "mass, minimum_speed and resolution."
     ),
     "epilog": "Exit codes: 0 all identified, 1 something is not, 2 error.",
 }
 ARGUMENTS = (
-    argument("model", metavar="SCENARIO|FMU", help="an .fmu file, or a scenario by name or file"),
-    argument("recording", metavar="RECORDING", help="results folder, or a table of any tool"),
+    argument(
+        "model",
+        metavar="MODEL",
+        help="an .fmu file, a plant by name, running_resistance, or a scenario by name or file",
+    ),
+    argument("recording", metavar="RECORDING", help="results folder, table of any tool, or an FMU, which is driven"),
     argument(
         "--parameters",
         nargs="+",
-        required=True,
         metavar="NAME[=GUESS]",
         help="to fit: parameters or start values of states; of a scenario component.parameter",
     ),
-    argument("--signals", nargs="+", metavar="NAME[=COLUMN]", help="to fit (default: all outputs recorded)"),
+    argument(
+        "--signals",
+        nargs="+",
+        metavar="NAME[=COLUMN]",
+        help="to fit (default: all outputs recorded, or the only column of the unit of the only output)",
+    ),
+    argument(
+        "--inputs",
+        nargs="+",
+        default=[],
+        metavar="NAME=COLUMN|NUMBER",
+        help="what drives an input (default: the column of its name)",
+    ),
     argument(
         "--noise", nargs="+", default=[], metavar="NAME=STD", help="standard deviations (default: from the residuals)"
     ),
     settings_argument("not fitted"),
     argument("--from", type=float, default=-inf, dest="begin", metavar="SECONDS", help="begin of the part to use"),
     argument("--to", type=float, default=inf, dest="end", metavar="SECONDS", help="end of the part to use"),
-    argument("--step", type=float, metavar="SECONDS", help="longest communication step (default: the sampling)"),
+    argument(
+        "--step",
+        type=float,
+        metavar="SECONDS",
+        help="longest communication step (default: the sampling); of an FMU that is driven its sampling (0.05)",
+    ),
     argument(
         "--between",
         nargs="+",
@@ -56,17 +94,21 @@ ARGUMENTS = (
     ),
     argument("--interface", choices=("co-simulation", "model-exchange"), help="of an FMU that has both"),
     argument("--level", type=float, default=0.95, help="of the intervals (default: 0.95)"),
+    argument(
+        "--drive",
+        nargs="+",
+        default=[],
+        metavar="NAME=VALUE",
+        help="of an FMU as the recording: constant inputs, and parameters; an input of the model of this name is known",
+    ),
+    argument("--stop", type=float, default=_RUN_SECONDS, help="of an FMU that is driven: end of the run [s] (60)"),
     argument("--plot", type=Path, metavar="FILE", help="write signals and residuals as a picture"),
     PARAMETERS_FILE,
-    JSON_NOT_TABLE,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Calibrate, print and write.
-
-    Args:
-        options: of the command line.
+def execute(options: argparse.Namespace) -> Output:
+    """The calibration, with picture and parameters written where they are asked for.
 
     Raises:
         CosimError: nothing can be calibrated from this recording.
@@ -76,62 +118,90 @@ def execute(options: argparse.Namespace) -> int:
         save_figure(_figure(found), options.plot)
     if options.toml is not None:
         write_text(options.toml, found.toml())
-    if options.json:
-        print_json(found.to_dict())
-    else:
-        note = f"\n- Not recorded, so held at its start: {', '.join(left)}." if left else ""
-        print(f"{found.text()}{note}\n\n{found.toml().rstrip()}")
-    return DONE if found.identified else NOT_IDENTIFIED
+    note = [f"- Not recorded, so held at its start: {', '.join(left)}."] if left else []
+    parts = [*found.parts(), *note, found.toml().rstrip()]
+    return Output(parts, found.to_dict(), code=_DONE if found.identified else _NOT_IDENTIFIED)
 
 
 def _calibrated(options: argparse.Namespace) -> tuple[Calibration, list[str]]:
     """The calibration, and the inputs that were not recorded."""
-    recording = load_result(options.recording)
-    runs = _runs(options)
+    recording, driven = _recording(options)
+    inputs = dict(map(parse_setting, options.inputs))
+    runs = _runs(options, inputs)
     try:
-        recorded = sort_columns(
-            recording,
-            options.recording,
-            runs.outputs,
-            runs.inputs,
+        selection = Selection(
             options.signals,
+            {name: value for name, value in driven.items() if name in runs.inputs} | inputs,
             options.begin,
             options.end,
             between_samples(options.between),
-            runs.discrete,
         )
-        noise = {name: setting_number("--noise", name, value) for name, value in map(parse_setting, options.noise)}
-        found = calibrate(runs, recorded, noise=noise, level=options.level)
+        outputs = {name: runs.unit(name) for name in runs.outputs}
+        recorded = sort_columns(recording, options.recording, outputs, runs.inputs, selection, runs.discrete)
+        found = calibrate(runs, recorded, noise=_numbers("--noise", options.noise), level=options.level)
         return found, [name for name in runs.inputs if name not in recorded.inputs]
     finally:
         runs.close()
 
 
-def _runs(options: argparse.Namespace) -> Runs:
+def _recording(options: argparse.Namespace) -> tuple[Result, dict[str, float]]:
+    """The recording, of an FMU the run under constant inputs, and these by name."""
+    driven = _numbers("--drive", options.drive)
+    if not str(options.recording).lower().endswith(".fmu"):
+        if driven:
+            raise ScenarioError(f"--drive belongs to an FMU; {options.recording} is a result.")
+        return load_result(options.recording), {}
+    if not driven:
+        raise ScenarioError(
+            f"{options.recording}: an FMU is driven; say by which input and how hard: --drive effort=60e3 [N]."
+        )
+    scenario = Scenario.fmu(options.recording, stop=options.stop, step=options.step or _RUN_STEP, parameters=driven)
+    outcome = scenario.run(warn=lambda _text: None)
+    if outcome.failure is not None:
+        raise CosimError(f"{options.recording}: {outcome.failure}")
+    return outcome.result, driven
+
+
+def _numbers(option: str, texts: Sequence[str]) -> dict[str, float]:
+    """Numbers by name, of an option ``NAME=VALUE``."""
+    return {name: setting_number(option, name, value) for name, value in map(parse_setting, texts)}
+
+
+def _runs(options: argparse.Namespace, inputs: Mapping[str, Any]) -> Runs:
     """What is run, with the first guesses given."""
-    names, guesses = [], {}
-    for text in options.parameters:
-        name, sign, _ = text.partition("=")
-        names.append(name)
-        if sign:
-            guesses[name] = setting_number("--parameters", *parse_setting(text))
+    names = [text.partition("=")[0] for text in options.parameters or ()]
     if len(set(names)) < len(names):
         raise CalibrationError(f"--parameters: each once (got {', '.join(names)}).")
-    settings = dict(map(parse_setting, options.settings))
-    if str(options.model).lower().endswith(".fmu"):
-        fixed = {name: setting_number("--set", name, value) for name, value in settings.items()}
-        return FmuRuns(
-            options.model,
-            names,
-            fixed=fixed,
-            guesses=guesses,
-            interface=options.interface,
-            step=options.step,
-        )
+    if options.model == RUNNING_RESISTANCE:
+        return _running_resistance(options, inputs)
+    if not names:
+        raise CalibrationError("--parameters: say what is fitted, such as --parameters mass=80e3.")
+    guesses = _numbers("--parameters", [text for text in options.parameters if "=" in text])
+    if str(options.model).lower().endswith(".fmu") or options.model in PLANTS:
+        path = cached_fmu(PLANTS[options.model](), fmi_version=3) if options.model in PLANTS else options.model
+        fixed = _numbers("--set", options.settings)
+        return FmuRuns(path, names, fixed=fixed, guesses=guesses, interface=options.interface, step=options.step)
     scenario = Scenario.load(options.model)
-    for name, value in settings.items():
+    for name, value in map(parse_setting, options.settings):
         scenario.set(name, value)
     return ScenarioRuns(scenario, names, guesses)
+
+
+def _running_resistance(options: argparse.Namespace, inputs: Mapping[str, Any]) -> RunningResistance:
+    """The model that needs no guesses."""
+    if options.parameters:
+        raise CalibrationError(f"--parameters: {RUNNING_RESISTANCE} fits all of its own and guesses them itself.")
+    settings = _numbers("--set", options.settings)
+    known = list(signature(RunningResistance).parameters)
+    for name in settings:
+        if name not in known:
+            raise CalibrationError(f"--set {name}: no setting of {RUNNING_RESISTANCE}; {nearest(name, known)}")
+    if "effort" in inputs and "mass" not in settings:
+        raise CalibrationError(
+            "An effort in newtons needs the mass [kg], rotating parts included: --set mass=KG; for efforts by mass "
+            "[m/s2] --set mass=1."
+        )
+    return RunningResistance(**settings)
 
 
 def _figure(found: Calibration) -> Any:

@@ -6,13 +6,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.identification import identify_davis, identify_davis_from_acceleration
-from fmu_observer.identification.acceleration_run import speeds_and_sensitivities
-from fmu_observer.identification.output_error import fit_runs
+from cosim.calibration.fitting import Calibration, calibrate
+from cosim.calibration.recorded_signals import RecordedSignals
+from cosim.calibration.running_resistance import ResistanceOfAcceleration, RunningResistance
 
 SETS = {"LoA": (0.46, 5.7e-3, -2.4e-4), "BaA": (0.35, 3e-3, -1e-4), "EBA": (0.25, 5e-3, -2e-4)}
 INDEPENDENT = {"LoA": (0.459, 5.80e-3, -2.415e-4)}
 NAMES, UNITS = ("w0", "w1", "w2"), ("m/s2", "1/s", "1/m")
+DAVIS = ("davis_a", "davis_b", "davis_c")
 EFFORT, NOISE, POINTS, RUNS = 1.2, 0.02, 800, 1000
 DRAWN = (
     "the measured runs are confidential; this one is synthetic, made with the published set, so that what comes out "
@@ -21,27 +22,26 @@ DRAWN = (
 
 
 def main() -> None:
-    """By acceleration as in (5.2), by speed as `cosim identify` does, coverage of the intervals."""
+    """By acceleration as in (5.2), by speed as `cosim calibrate` does, coverage of the intervals."""
     sheet = Sheet(__file__, "Friction identified from acceleration runs", "Aguiar Cota 2019, (5.1)-(5.2), Table 5.1")
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     rng = np.random.default_rng(51)
     speeds = np.linspace(5.0, 45.0, POINTS + 1)[1:]
     for name, w in SETS.items():
         exact = EFFORT - (w[0] + w[1] * speeds + w[2] * speeds**2)
-        found = identify_davis_from_acceleration(
-            speeds, exact + NOISE * rng.standard_normal(POINTS), effort=EFFORT, mass=1.0
-        )
+        drawn = {"acceleration": exact + NOISE * rng.standard_normal(POINTS)}
+        known = {"speed": speeds, "effort": np.full(POINTS, EFFORT)}
+        found = calibrate(ResistanceOfAcceleration(mass=1.0), RecordedSignals(np.arange(float(POINTS)), drawn, known))
         for i, (quantity, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-            value = found.coefficients[1 + i]
+            value, (low, high) = found.values[DAVIS[i]], found.intervals[DAVIS[i]]
             other = INDEPENDENT.get(name, (None,) * 3)[i]
-            inside = value.low < w[i] < value.high
-            reason = DRAWN if inside else "outside of its 95 % interval, as one of twenty is"
-            sheet.add(f"{quantity} of {name}, from accelerations", unit, w[i], value.value, reason, independent=other)
-            sheet.add(
-                f"half of its interval, {quantity} of {name}", unit, None, value.half_width, "the thesis gives none"
-            )
+            reason = DRAWN if low < w[i] < high else "outside of its 95 % interval, as one of twenty is"
+            sheet.add(f"{quantity} of {name}, from accelerations", unit, w[i], value, reason, independent=other)
+            half = 0.5 * (high - low)
+            sheet.add(f"half of its interval, {quantity} of {name}", unit, None, half, "the thesis gives none")
         axis.plot(speeds, w[0] + w[1] * speeds + w[2] * speeds**2, "k", linewidth=0.8)
-        axis.plot(speeds, found.resistance(speeds), label=f"{name}, identified")
+        w0, w1, w2 = (found.values[part] for part in DAVIS)
+        axis.plot(speeds, w0 + w1 * speeds + w2 * speeds**2, label=f"{name}, identified")
     _by_speed(sheet, rng)
     axis.set(xlabel="speed [m/s]", ylabel="resistance by mass [m/s2]")
     axis.grid(alpha=0.3)
@@ -53,21 +53,32 @@ def _by_speed(sheet: Sheet, rng: np.random.Generator) -> None:
     """The same set from a noisy speed, how often intervals cover, and a run that is too narrow."""
     time = np.linspace(0.0, 51.0, POINTS)
     w = SETS["LoA"]
-    true = np.array([EFFORT - w[0], w[1], w[2], 5.5])
-    exact = speeds_and_sensitivities(time, true[:, None])[0, 0]
-    found = identify_davis(time, exact + NOISE * rng.standard_normal(POINTS), effort=EFFORT, mass=1.0)
-    for i, (quantity, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-        sheet.add(f"{quantity} of LoA, from speeds", unit, w[i], found.coefficients[1 + i].value, DRAWN)
-    fits = fit_runs(time, exact + NOISE * rng.standard_normal((RUNS, POINTS)))
-    share = np.mean(np.abs(fits.parameters - true[:, None]) < fits.half_widths(0.95), axis=1)
-    for quantity, part in zip(("effort - w0", "w1", "w2"), share[:3], strict=True):
+    true = dict(zip((*DAVIS, "initial_speed"), (*w, 5.5), strict=True))
+    exact = RunningResistance(mass=1.0).run(true, _recorded(time, time))[0]
+    found = _calibrated(time, exact + NOISE * rng.standard_normal(POINTS))
+    for name, quantity, unit in zip(DAVIS, NAMES, UNITS, strict=True):
+        sheet.add(f"{quantity} of LoA, from speeds", unit, true[name], found.values[name], DRAWN)
+    runs = [_calibrated(time, speed) for speed in exact + NOISE * rng.standard_normal((RUNS, POINTS))]
+    for name, quantity in zip(DAVIS, ("effort - w0", "w1", "w2"), strict=True):
+        ends = np.array([run.intervals[name] for run in runs])
+        share = np.mean((ends[:, 0] < true[name]) & (true[name] < ends[:, 1]))
         why = f"{RUNS} synthetic runs; 1.4 % is two standard deviations of such a share"
-        sheet.add(f"95 % intervals that hold {quantity}", "%", None, 100.0 * part, why, independent=95.0)
+        sheet.add(f"95 % intervals that hold {quantity}", "%", None, 100.0 * share, why, independent=95.0)
     narrow = (exact > 25.0) & (exact < 30.0)
-    part = identify_davis(time[narrow], (exact + NOISE * rng.standard_normal(POINTS))[narrow])
+    noisy = exact + NOISE * rng.standard_normal(POINTS)
+    part = calibrate(RunningResistance(), RecordedSignals(time[narrow], {"speed": noisy[narrow]}))
     why = "one coefficient stands for the other in so narrow a run; the command says so and names a run that would do"
-    sheet.add("half of the interval of w1, from 25 to 30 m/s only", "1/s", None, part.davis_b.half_width, why)
+    low, high = part.intervals["davis_b"]
+    sheet.add("half of the interval of w1, from 25 to 30 m/s only", "1/s", None, 0.5 * (high - low), why)
     sheet.add("identified from 25 to 30 m/s", "", None, "all" if part.identified else "not all", why)
+
+
+def _recorded(time: np.ndarray, speed: np.ndarray) -> RecordedSignals:
+    return RecordedSignals(time, {"speed": speed}, {"effort": np.full(len(time), EFFORT)})
+
+
+def _calibrated(time: np.ndarray, speed: np.ndarray) -> Calibration:
+    return calibrate(RunningResistance(mass=1.0), _recorded(time, speed))
 
 
 if __name__ == "__main__":

@@ -31,6 +31,7 @@ LINES = {
         "baseline embed": "baseline embed FMUBASE.json LAG.fmu -o OUT.fmu",
         "baseline extract": "baseline extract HOLDS.fmu OUT_taken.json",
         "benchmark-observers": "benchmark-observers TRAIN --observers takagi_sugeno_cdo,multirate_cdo --out OUT_page",
+        "calibrate": "calibrate running_resistance RESULTS --signals speed=locomotive.speed --set minimum_speed=0.1",
         "compare": "compare RESULTS OTHER --verbose --html OUT.html --plots OUT_pictures",
         "export of a result": "export RESULTS OUT.npy",
         "export of a scenario": "export TRAIN OUT.ssp",
@@ -54,7 +55,7 @@ LINES = {
         "list": "list",
     },
 }
-PENDING = {"bound", "calibrate", "identify", "limits", "tune"}
+PENDING = {"bound", "limits", "tune"}
 """Commands that print by themselves."""
 PROGRAMS = {"cosim": cosim.cli.GROUPS, "fmus": fmus.cli.GROUPS}
 

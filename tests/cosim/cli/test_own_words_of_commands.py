@@ -39,7 +39,7 @@ ASKING = {
     "export": "export TRACED OUT.ssp",
 }
 # they step and ask nothing: they read results or what is declared
-READING = {"compare", "identify", "report", "new", "list", "info"}
+READING = {"compare", "report", "new", "list", "info"}
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def hosted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     "words",
     [
-        "identify davis HOSTED --mass 1 --effort 1 --speed y --input measured --stop 1 --step 0.1",
+        "calibrate running_resistance HOSTED --signals speed=y --drive measured=1 --stop 1 --step 0.1",
         "calibrate HOSTED RESULTS --parameters gain=1.5 --signals y=boiler.y",
         "linearise HOSTED --at 0.5",
         "baseline make HOSTED OUT --stop 1 --step 0.1",

@@ -21,9 +21,9 @@ from cosim import Scenario
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.subject import make_subject
 from cosim.calibration.fitting import calibrate
-from cosim.calibration.recorded_signals import sort_columns
+from cosim.calibration.recorded_signals import Selection, sort_columns
 from cosim.calibration.runs import FmuRuns
-from cosim.cli import identify_command as identify
+from cosim.cli import calibrate_command
 from cosim.errors import CosimError
 from cosim.results.load_result import load_result
 from cosim.run.outcome import Outcome
@@ -374,17 +374,19 @@ def test_parameters_are_identified_as_the_effort_acted(tmp_path: Path, algorithm
     quietly(scenario.connect("driver.effort -> train.effort", "train.speed -> driver.odometer")).write(
         tmp_path / "run", report=False
     )
-    words = ["identify", "davis", str(tmp_path / "run"), "--speed", "train.speed", "--effort", "driver.effort"]
+    words = ["calibrate", "running_resistance", str(tmp_path / "run"), "--signals", "speed=train.speed"]
     parser = argparse.ArgumentParser()
-    add_command(parser.add_subparsers(), "identify", identify)
-    found = identify._identified(parser.parse_args([*words, "--mass", "80e3"]))
-    values = {c.name: c.value for c in found.coefficients}
+    add_command(parser.add_subparsers(), "calibrate", calibrate_command)
+    found, _ = calibrate_command._calibrated(parser.parse_args([*words, "--set", "mass=80e3"]))
     for name in ("davis_a", "davis_b", "davis_c"):
-        assert values[name] == pytest.approx(true[name], rel=1e-5)
+        assert found.values[name] == pytest.approx(true[name], rel=1e-5)
     fmu = cached_fmu(PLANTS["longitudinal_train"](), fmi_version=2)
     fixed = more | {name: value for name, value in true.items() if name != "mass"}
     runs = FmuRuns(fmu, ["mass"], fixed=fixed, guesses={"mass": 70e3})
-    recorded = sort_columns(load_result(tmp_path / "run"), "run", runs.outputs, runs.inputs, ["speed=train.speed"])
+    selection = Selection(["speed=train.speed"])
+    recorded = sort_columns(
+        load_result(tmp_path / "run"), "run", dict.fromkeys(runs.outputs, ""), runs.inputs, selection
+    )
     mass = calibrate(runs, recorded).values["mass"]
     runs.close()
     assert mass == pytest.approx(80e3, rel=1e-9)

@@ -1,4 +1,4 @@
-"""Least squares on any simulation: estimates, confidence regions and what cannot be told apart. Arrays in, a fit out;
+"""Least squares on any simulation: estimates, confidence regions and what is not identified. Arrays in, a fit out;
 knows no FMU and no file.
 """
 
@@ -11,41 +11,58 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from fmu_observer.identification.acceleration_run import Array
+Array = NDArray[np.float64]
 
-Simulation = Callable[[Array], Array]  # parameters of shape (p,) -> signals of shape (q, n)
+Simulation = Callable[[Array], Array]
+"""Parameters of several runs, shape (m, p), to their signals, shape (m, q, n)."""
 
 _DIFFERENCE = 1e-4
 """Step of central differences, as a share of a parameter's size: a solver in the simulation may round at 1e-9."""
 _ALMOST_ONE = 0.999
+_CHANCE, _LATER_CHANCE = 2.0, 3.0
+"""Standard deviations of a correlation of white noise, 1 / sqrt(n), beyond which it counts: of samples, and of means of
+2, 4, ... of them, which are several tests more."""
+_FEWEST_MEANS = 16
 _UNSEEN = 1e12
 """Variance, in squared sizes of the parameters, of a direction that no signal shows."""
 _REPEATS = 3  # the noise is estimated anew after each fit
 
 
-def serial_enlargement(residuals: Array) -> Array:
-    """How much wider variances become where neighbouring residuals are alike: ``(1 + r) / (1 - r)``, as for noise of
-    first order.
+def serial_correlation(residuals: Array) -> float:
+    """Correlation of neighbouring residuals.
 
     Args:
-        residuals: shape (..., n).
-
-    Returns:
-        Factors of at least 1, shape (...): 1 where the correlation r is no larger than chance makes it.
+        residuals: shape (n,).
     """
-    correlation = serial_correlation(residuals)
-    alike = np.where(correlation > 2.0 / np.sqrt(residuals.shape[-1]), np.minimum(correlation, _ALMOST_ONE), 0.0)
-    return np.asarray((1.0 + alike) / (1.0 - alike))
+    squares = float(np.sum(residuals**2))
+    return float(np.sum(residuals[1:] * residuals[:-1])) / squares if squares > 0.0 else 0.0
 
 
-def serial_correlation(residuals: Array) -> Array:
-    """Correlation of neighbouring residuals, shape (...).
+def samples_per_independent(residuals: Array, parameters: float) -> float:
+    """How many samples say as much as one with white noise, at least 1: by so much variances are larger.
+
+    Of noise of first order with correlation r it is (1 + r) / (1 - r), and means of m neighbours have m times their
+    variance over that of a sample in the place of 1. That is taken of means of 1, 2, 4, ... neighbours and the largest
+    counts, so that a slow part below faster noise is found too. Only correlations above what chance makes of white
+    noise count; negative ones, which make variances smaller, do not. A fit makes correlations smaller, by about
+    p (1 + r) / n.
 
     Args:
-        residuals: shape (..., n).
+        residuals: of one signal, shape (n,). parameters: p, how many were fitted by them.
+
+    Source: Bartlett, J. Roy. Stat. Soc. 98 (1935) 536, for the factor; means, thresholds and the correction are ours,
+    their two error rates stand in docs/identification.md.
     """
-    squares = np.sum(residuals**2, axis=-1)
-    return np.asarray(np.sum(residuals[..., 1:] * residuals[..., :-1], axis=-1) / np.where(squares > 0.0, squares, 1.0))
+    count, found, size = len(residuals), 1.0, 1
+    while size == 1 or count >= _FEWEST_MEANS * size:
+        means = residuals[: count // size * size].reshape(-1, size).mean(axis=1)
+        correlation = serial_correlation(means)
+        if correlation > (_CHANCE if size == 1 else _LATER_CHANCE) / np.sqrt(len(means)):
+            correlation = min(correlation + parameters * (1.0 + correlation) / len(means), _ALMOST_ONE)
+            share = size * float(np.mean(means**2) / np.mean(residuals**2))
+            found = max(found, share * (1.0 + correlation) / (1.0 - correlation))
+        size *= 2
+    return float(min(found, max(1.0, count / (parameters + 1.0))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +73,8 @@ class Fit:
         parameters: estimates, shape (p,). covariance: of them, shape (p, p).
         sizes: sizes of the parameters by which directions are compared, shape (p,).
         residuals: measured less simulated, shape (q, n). noise: their standard deviations, shape (q,).
-        correlation: of neighbouring residuals, shape (q,). jacobian: of the signals by the parameters, shape (q, n, p).
+        correlation: of neighbouring residuals, shape (q,). samples_per_independent: see the function, shape (q,).
+        jacobian: of the signals by the parameters, shape (q, n, p).
         freedom: samples less parameters. runs: simulations that it took. converged: whether it came to rest.
     """
 
@@ -66,10 +84,20 @@ class Fit:
     residuals: Array
     noise: Array
     correlation: Array
+    samples_per_independent: Array
     jacobian: Array
     freedom: int
     runs: int
     converged: bool
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the Jacobian over the noise, each column scaled to length 1."""
+        columns = (self.jacobian / np.where(self.noise > 0.0, self.noise, 1.0)[:, None, None]).reshape(
+            -1, len(self.sizes)
+        )
+        lengths = np.linalg.norm(columns, axis=0)
+        return float(np.linalg.cond(columns / np.where(lengths > 0.0, lengths, 1.0)))
 
     def half_widths(self, level: float) -> Array:
         """Half of the confidence intervals, one parameter at a time, shape (p,).
@@ -105,11 +133,11 @@ def fit(
 ) -> Fit:
     """Fit a simulation to measured signals by least squares on residuals divided by the noise.
 
-    Derivatives are central differences. The covariance is that of the Jacobian with the noise that the residuals show,
-    enlarged where neighbouring residuals are alike.
+    Derivatives are central differences. The covariance is that of the Jacobian with the noise that the residuals show;
+    where they are correlated, so many samples count as one as `samples_per_independent` says.
 
     Args:
-        simulate: the signals, shape (q, n), for parameters of shape (p,).
+        simulate: the signals of runs, shape (m, q, n), for parameters of shape (m, p).
         start: first guess, shape (p,). measured: shape (q, n), with NaN where nothing was measured.
         noise: standard deviations of the measurements, shape (q,), which weigh the signals; None: estimated.
         sizes: typical sizes of the parameters, shape (p,), all positive; None for those of the start, 1 where that is
@@ -135,12 +163,23 @@ class _Residuals:
         self.known, self.runs = np.isfinite(measured), 0
 
     def __call__(self, parameters: Array) -> Array:
-        self.runs += 1
+        return np.asarray(self._several(parameters[None])[0])
+
+    def _several(self, points: Array) -> Array:
+        """Residuals with each of the parameters, shape (m, q, n)."""
+        self.runs += len(points)
         with np.errstate(all="ignore"):
-            return np.where(self.known, self._measured - self._simulate(parameters), 0.0)
+            return np.where(self.known, self._measured - self._simulate(points), 0.0)
 
     def jacobian(self, parameters: Array) -> Array:
-        return _differences(self, parameters, self.sizes, self._low, self._high)
+        """Derivatives by central differences inside the bounds, shape (q, n, p)."""
+        steps = _DIFFERENCE * np.maximum(np.abs(parameters), self.sizes)
+        low, high = self.bounds
+        above = np.minimum(parameters + steps, high * self.sizes)
+        below = np.maximum(parameters - steps, low * self.sizes)
+        moved = np.diag(above - parameters), np.diag(below - parameters)
+        found = self._several(np.concatenate([parameters + moves for moves in moved]))
+        return np.moveaxis((found[: len(steps)] - found[len(steps) :]) / (above - below)[:, None, None], 0, -1)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -165,14 +204,21 @@ def _fit(residuals: _Residuals, start: Array, noise: Array | None) -> Fit:
     for _ in range(1 if noise is not None or len(known) == 1 else _REPEATS):
         found, converged = _weighted(residuals, found, weights)
         left = residuals(found * sizes)
-        seen = _deviations(left, known, 0)
-        weights = weights if noise is not None else 1.0 / np.maximum(seen, 1e-12 * np.maximum(spreads, 1e-300))
+        if noise is None:
+            shown = _deviations(left, known, np.zeros(len(known)))
+            weights = 1.0 / np.maximum(shown, 1e-12 * np.maximum(spreads, 1e-300))
     left, slopes = residuals(parameters := found * sizes), -residuals.jacobian(parameters)
-    freedom = max(1, int(known.sum()) - len(start))
-    seen = _deviations(left, known, len(start) / max(1, int(known.sum())))
-    covariance = _covariance(slopes, weights, seen**2 * serial_enlargement(left), sizes)
-    correlation = serial_correlation(left)
-    return Fit(parameters, covariance, sizes, left, seen, correlation, slopes, freedom, residuals.runs, converged)
+    counts = known.sum(axis=1)
+    shares = len(start) * counts / max(1, int(known.sum()))
+    sampled = [row[k] for row, k in zip(left, known, strict=True)]
+    alike = np.array([samples_per_independent(row, share) for row, share in zip(sampled, shares, strict=True)])
+    shown = _deviations(left, known, shares * alike / np.maximum(counts, 1))
+    covariance = _covariance(slopes, weights, shown**2 * alike, sizes)
+    correlation = np.array([serial_correlation(row) for row in sampled])
+    freedom = max(1, int(counts.sum()) - len(start))
+    return Fit(
+        parameters, covariance, sizes, left, shown, correlation, alike, slopes, freedom, residuals.runs, converged
+    )
 
 
 def _weighted(residuals: _Residuals, found: Array, weights: Array) -> tuple[Array, bool]:
@@ -189,22 +235,10 @@ def _weighted(residuals: _Residuals, found: Array, weights: Array) -> tuple[Arra
     return result.x, bool(result.success)
 
 
-def _deviations(residuals: Array, known: NDArray[np.bool_], share: float) -> Array:
-    """Standard deviations of the residuals, shape (q,), where a share of the samples went into the parameters."""
-    counts = np.maximum(known.sum(axis=1) * (1.0 - share), 1.0)
+def _deviations(residuals: Array, known: NDArray[np.bool_], shares: Array) -> Array:
+    """Standard deviations of the residuals, shape (q,), where shares of the samples went into the parameters."""
+    counts = np.maximum(known.sum(axis=1) * (1.0 - shares), 1.0)
     return np.asarray(np.sqrt(np.sum(residuals**2, axis=1) / counts))
-
-
-def _differences(function: Simulation, at: Array, sizes: Array, low: Array | None, high: Array | None) -> Array:
-    """Derivatives of a function of shape (q, n) by central differences inside the bounds, shape (q, n, p)."""
-    columns = []
-    for i, size in enumerate(sizes):
-        above, below = at.copy(), at.copy()
-        step = _DIFFERENCE * max(abs(at[i]), size)
-        above[i] = at[i] + step if high is None else min(at[i] + step, high[i])
-        below[i] = at[i] - step if low is None else max(at[i] - step, low[i])
-        columns.append((function(above) - function(below)) / (above[i] - below[i]))
-    return np.stack(columns, axis=-1)
 
 
 def _covariance(jacobian: Array, weights: Array, variances: Array, sizes: Array) -> Array:
@@ -238,7 +272,7 @@ class Direction:
         names = list(self.shares)
         if len(names) == 1:
             return (
-                f"{names[0]} cannot be told from these signals (uncertain by {100.0 * self.uncertainty:.3g} % of its "
+                f"{names[0]} cannot be found from these signals (uncertain by {100.0 * self.uncertainty:.3g} % of its "
                 "size)"
             )
         changes = ", ".join(f"{name} {100.0 * share:+.0f} %" for name, share in self.shares.items())
@@ -251,7 +285,7 @@ class Direction:
 
 
 _RATIO = 0.1
-"""Two shares within this count as equal, so that a ratio or a product is told."""
+"""Two shares within this count as equal, so that a ratio or a product is named."""
 _SMALL = 0.05
 """Shares below this are left out of the words."""
 
