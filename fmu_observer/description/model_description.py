@@ -114,7 +114,7 @@ def _without_structure(
 
 def _add_structure(system: HybridSystem, description: ModelDescription) -> None:
     """What depends on what, and the token, which follows from it."""
-    table, facts, variables = VariableTable.of(system), _traced_facts(system), description.modelVariables
+    table, facts, variables = VariableTable.of(system), _traced_once(system), description.modelVariables
     outputs = _unknowns(variables, table.outputs, facts["output"])
     derivatives = _unknowns(variables, table.derivatives, facts["derivative"])
     # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
@@ -229,14 +229,14 @@ def _unknown(variable: ModelVariable, known: list[ModelVariable]) -> Unknown:
     return Unknown(index=variable.valueReference, variable=variable, dependencies=known, dependenciesKind=kinds)
 
 
-def _traced_facts(system: HybridSystem) -> dict[str, Any]:
-    """What only the traced equations tell, remembered: ``output`` and ``derivative``, the value references that each
+def _traced_once(system: HybridSystem) -> dict[str, Any]:
+    """What only the traced equations show, remembered: ``output`` and ``derivative``, the value references that each
     row depends on, all of them where it cannot be traced; ``equations``, their digest, or the class.
     """
-    return dict(remembered("description", identity(system, code=("fmu_observer",)), lambda: _traced_facts(system)))
+    return dict(remembered("description", identity(system, code=("fmu_observer",)), lambda: _traced(system)))
 
 
-def _traced_facts(system: HybridSystem) -> dict[str, Any]:
+def _traced(system: HybridSystem) -> dict[str, Any]:
     return {
         "output": _traced_dependencies(system, "output", width(system.outputs)),
         "derivative": _traced_dependencies(system, "derivative", system.continuous_count),

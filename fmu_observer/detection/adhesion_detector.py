@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -72,7 +71,7 @@ class AdhesionDetector(HybridSystem):
     )
     events = (PeriodicEvent("check", "check_period", description="The filtered slip is judged"),)
     default_preset = "polach"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"slip_definition": ("odometer", "speed")}
+    option_choices = {"slip_definition": ("odometer", "speed")}
 
     def __init__(self, slip_definition: _SlipDefinition = "odometer") -> None:
         require_chosen(self.name, self.option_choices, slip_definition=slip_definition)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -71,7 +70,7 @@ class CouplerRisk(HybridSystem):
         parameter("check_period", "s", 0.02, "Time between two checks", min=1e-4),
     )
     events = (PeriodicEvent("check", "check_period", description="The tension is judged"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "category_1_mn": {"break_force": 850e3},
         "category_1_5_mn": {"break_force": 1350e3},
     }

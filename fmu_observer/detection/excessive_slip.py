@@ -4,7 +4,6 @@ ratios.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -79,7 +78,7 @@ class ExcessiveSlip(HybridSystem):
         parameter("check_period", "s", 0.05, "Time between two checks", min=1e-4),
     )
     events = (PeriodicEvent("check", "check_period", description="The filtered slip is judged"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "experiment": {"slip_threshold": 0.15},
         "simulation": {"slip_threshold": 0.02},
     }

@@ -4,8 +4,8 @@ and nothing else.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 
@@ -187,12 +187,12 @@ class JamDetector(HybridSystem):
     )
     outputs = (*FAULT_OUTPUTS, _SETTLED_TIME)
     events = (ODOMETER_SAMPLE,)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "as_published": {"threshold": 0.9, "residual_gain": 2.3},
         "as_published_5_3_1": {"threshold": 0.65, "residual_gain": 3.36},
     }
     default_preset = "as_published"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
+    option_choices = {"rules": tuple(RULES)}
 
     def __init__(self, rules: RuleChoice = "repaired") -> None:
         require_chosen(self.name, self.option_choices, rules=rules)

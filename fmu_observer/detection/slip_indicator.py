@@ -5,7 +5,6 @@ The raw ratio chatters about the threshold when the odometer is noisy, so a firs
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,7 @@ class SlipIndicator(HybridSystem):
     )
     outputs = SLIP_OUTPUTS
     parameters = SLIP_PARAMETERS
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "simulation": {"slip_threshold": 0.02},
         "experiment": {"slip_threshold": 0.15},
     }

@@ -6,7 +6,6 @@ Its rules are pure functions, which an observer with a detector inside uses too;
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -127,7 +126,7 @@ class ThresholdDetector(HybridSystem):
         parameter("sample_period", "s", 1e-3, "Time between two judgements", min=1e-6),
     )
     events = (PeriodicEvent("sampling", "sample_period", description="The residual is judged"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "repaired": {},
         "as_published": {"longest_fault": NEVER},
         "filtered": {"residual_filter_time": 2e-3},

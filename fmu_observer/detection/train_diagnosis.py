@@ -5,8 +5,7 @@ Declares the hybrid system; residuals, verdicts and shares of force stand in the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -118,7 +117,7 @@ class TrainDiagnosis(HybridSystem):
     outputs = OUTPUTS
     parameters = PARAMETERS
     events = EVENTS
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "swept": {},
         "wet_rails": {
             "threshold_wheels": 0.55,
@@ -128,7 +127,7 @@ class TrainDiagnosis(HybridSystem):
         },
     }
     default_preset = "swept"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "speed_window": range(2, 51),
         "gps_window": range(2, 101),
         "force_window": range(3, 61),

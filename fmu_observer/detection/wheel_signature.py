@@ -5,7 +5,7 @@ pencil map.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class WheelSignature(HybridSystem):
         memory("held_time", "s", 0.0, "Time since the fault was told"),
     )
     events = (ODOMETER_SAMPLE,)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
+    option_choices = {}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and the period is that of the training."""

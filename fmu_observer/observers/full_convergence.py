@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from math import inf
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
     description = "Moving-horizon observer whose windows are solved to convergence"
     source = "Omar 2012, sections 1.4.8 and 4.2; solver and arrival cost are ours"
     traceable = False
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**MovingHorizonObserver.option_choices, **_EFFORT_OPTIONS}
+    option_choices = {**MovingHorizonObserver.option_choices, **_EFFORT_OPTIONS}
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     traceable = False
     internal_step = 0.1  # [s]; it flows in Python, and the resistance hardly changes in that time
     outputs = (*BaliseMovingHorizon.outputs, *ENDED)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**BaliseMovingHorizon.option_choices, **_EFFORT_OPTIONS}
+    option_choices = {**BaliseMovingHorizon.option_choices, **_EFFORT_OPTIONS}
 
     def __init__(
         self,

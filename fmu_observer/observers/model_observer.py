@@ -5,7 +5,7 @@ It knows models and hybrid systems, and nothing of how an observer corrects itse
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -61,7 +61,7 @@ class ModelObserver(JudgedObserver):
     extra_memory: tuple[Signal, ...] = ()
     gain_parameters: tuple[Signal, ...] = ()
     extra_outputs: tuple[Signal, ...] = ()
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MODELS)}
+    option_choices = {"model": tuple(MODELS)}
 
     def __init__(self, model: str | ObserverModel = "pendulum", **options: Any) -> None:
         self.model = find_model(model)

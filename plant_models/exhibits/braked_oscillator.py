@@ -4,8 +4,7 @@ hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -42,13 +41,13 @@ class BrakedOscillator(NoisyPlant):
         output_signal("x2", "1/s", "Second state"),
         output_signal("y", "1/s", "Output without noise, now"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "fits_set": {},
         "chapter_2": {"rate_factor": 1.5, "braking": 2.25},
         "noisy": {"measurement_noise": 0.03},
     }
     default_preset = "fits_set"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"variant": ("mixed", "speed", "root")}
+    option_choices = {"variant": ("mixed", "speed", "root")}
 
     def __init__(self, variant: Variant = "mixed") -> None:
         require_chosen(self.name, self.option_choices, variant=variant)

@@ -4,7 +4,6 @@ hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,7 +92,7 @@ class CartDoublePendulum(NoisyPlant):
         output_signal("second_rate", "rad/s", "Angular speed of the upper rod"),
         output_signal("energy", "J", "Kinetic and potential energy; zero height is that of the lower joint"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "repaired": {},
         "as_published": {"centrifugal_sign": -1.0},
         "as_published_4_11": {"coupling_sign": -1.0},

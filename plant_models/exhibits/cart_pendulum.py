@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,7 +61,7 @@ class CartPendulum(NoisyPlant):
         output_signal("rate", "rad/s", "Angular speed of the pendulum"),
         output_signal("energy", "J", "Kinetic and potential energy; zero height is that of the pivot"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "free_fall": {},
         "noisy": {"process_noise": 1e-3, "measurement_noise": 0.1},
         "upright": {"pendulum_angle": 0.0},

@@ -4,8 +4,7 @@ foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -51,13 +50,13 @@ class EcoliCulture(NoisyPlant):
         output_signal("enzyme", "kg/m3", "Beta-galactosidase P"),
         output_signal("light", "1", "Light L without noise, now"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "nominal": {},
         "other_start": {"biomass_state": 0.06, "glycerol_state": 2.2, "enzyme_state": 0.012},
         "noisy": {"measurement_noise": (5e-3, 6e-3)},
     }
     default_preset = "nominal"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"glycerol": ("clamped", "as_published")}
+    option_choices = {"glycerol": ("clamped", "as_published")}
 
     def __init__(self, glycerol: Glycerol = "clamped") -> None:
         require_chosen(self.name, self.option_choices, glycerol=glycerol)

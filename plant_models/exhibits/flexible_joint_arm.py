@@ -4,8 +4,7 @@ hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,7 +55,7 @@ class FlexibleJointArm(HybridSystem):
         output_signal("total_drive", "1", "Drive u that acts"),
     )
     parameters = (parameter("drive_gain", "1", 1.0, "Size of the printed drive"),)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"gravity": GRAVITY}
+    option_choices = {"gravity": GRAVITY}
 
     def __init__(self, gravity: Gravity = "link_angle") -> None:
         self.gravity = checked_gravity(gravity, self.name)

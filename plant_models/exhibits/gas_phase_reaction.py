@@ -4,7 +4,6 @@ foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
@@ -33,7 +32,7 @@ class GasPhaseReaction(NoisyPlant):
         output_signal("x2", "1", "Partial pressure of B, scaled"),
         output_signal("y", "1", "Total pressure without noise, now"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "as_published": {},
         "wide_samples": {"sample_period": 0.1},
         "literature": {"rate": 0.16, "state_1": 3.0, "state_2": 1.0, "sample_period": 0.1},

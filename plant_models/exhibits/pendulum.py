@@ -4,7 +4,6 @@ foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ class Pendulum(HybridSystem):
         parameter("stiffness", "1/s2", 1.0, "Gravity over length, g / l", min=0.0),
         parameter("damping", "1/s", 0.2, "Damping over the moment of inertia", min=0.0),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "swinging": {},
         "small": {"pendulum_angle": 0.05},
         "rest": {"pendulum_angle": 0.0},

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +83,7 @@ class StateFeedback(HybridSystem):
     source = "Allaoui 2024, section IV.2, names it; weights and gains are ours"
     internal_step = 1e-2  # nothing flows between samples
     states = (memory("held_force", "N", 0.0, "Force on the cart, held"),)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"plant": tuple(REGULATED)}
+    option_choices = {"plant": tuple(REGULATED)}
 
     def __init__(self, plant: str = "cart_pendulum") -> None:
         require_chosen(self.name, self.option_choices, plant=plant)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -34,9 +33,9 @@ class TanhSystem(HybridSystem):
         parameter("stiffness", "1/s2", 0.1, "Factor of x1", min=0.0),
         parameter("tanh_gain", "1/s", 1.0, "Factor of the term with tanh", min=0.0),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {"large": {}, "small": {"first": 0.05, "second": 0.0}}
+    presets = {"large": {}, "small": {"first": 0.05, "second": 0.0}}
     default_preset = "large"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"reading": ("minus", "as_published", "product")}
+    option_choices = {"reading": ("minus", "as_published", "product")}
 
     def __init__(self, reading: Reading = "minus") -> None:
         require_chosen(self.name, self.option_choices, reading=reading)

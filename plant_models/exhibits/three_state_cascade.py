@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ class ThreeStateCascade(NoisyPlant):
         output_signal("x2", "1/s", "Second state"),
         output_signal("x3", "1/s2", "Third state"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {"as_published": {}, "noisy": {"measurement_noise": 1e-4}}
+    presets = {"as_published": {}, "noisy": {"measurement_noise": 1e-4}}
     default_preset = "as_published"
 
     def __init__(self) -> None:

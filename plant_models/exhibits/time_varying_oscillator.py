@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,7 @@ class TimeVaryingOscillator(HybridSystem):
         parameter("phase", "rad", 0.0, "Phase of the second regressor"),
         parameter("fading", "1/s2", 1.0, "Fading of the second regressor", min=0.0),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {"as_published": {}, "lasting": {"fading": 0.0, "phase": -0.5 * np.pi}}
+    presets = {"as_published": {}, "lasting": {"fading": 0.0, "phase": -0.5 * np.pi}}
     default_preset = "as_published"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

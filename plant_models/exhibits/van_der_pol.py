@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,7 @@ class VanDerPol(HybridSystem):
         parameter("p3", "1", 0.0, "Shift of the damping", min=-LARGEST_SHIFT, max=LARGEST_SHIFT),
         parameter("stiffness", "1/s", 9.0, "Rate of x2 by x1", min=0.0, max=100.0),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "nominal": {},
         "quick": {"p1": 2.0},
         "stiff": {"p2": 3.0},

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import Any
 
 from plant_models.faults.fault_cause import Carrier
 from plant_models.faults.fault_system import CAUSES, FaultSystem, active, unfinished_output
@@ -46,7 +46,7 @@ class SignalFault(FaultSystem):
     name = "signal_fault"
     description = "Faults of any signal: stuck, gain, offset, drift, ramped, lost samples"
     source = "Omar 2012, section 7.4, (7.6.12)"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "channels": range(1, 65),
         "fault_count": range(1, 65),
         "unit": (),

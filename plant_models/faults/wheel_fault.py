@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class WheelFault(FaultSystem):
         output_signal("effort_loss", "1", "Share of the effort that does not reach the rail"),
         unfinished_output("given fault"),
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "cause": CAUSES,
         "fault_count": range(1, 65),
         "distance_from": ("speed", "position"),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class CascadeSignature(SignatureObserver):
     name = "cascade_signature"
     description = "Signature observer of the cascade of three states, by envelopes"
     source = "Omar 2012, (4.6.12)-(4.6.15)"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"nodes": range(4, 14), "next_scaling": ("literal", "norm")}
+    option_choices = {"nodes": range(4, 14), "next_scaling": ("literal", "norm")}
 
     def __init__(self, nodes: int = 7, next_scaling: NextScaling = "literal") -> None:
         require_whole(self.name, 4, 13, nodes=nodes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class CultureSignature(SignatureObserver):
     name = "culture_signature"
     description = "Signature observer of the E. coli culture, biomass and light measured"
     source = "Omar 2012, (4.7.5)-(4.7.9)"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "nodes": range(2, 8),
         "next_scaling": ("literal", "norm"),
         "look_up": ("weighted", "cell"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -49,8 +49,8 @@ class OscillatorSignature(SignatureObserver):
     description = "Signature observer of the braked oscillator"
     source = "Omar 2012, (4.6.1)-(4.6.8)"
     default_preset = "fits_set"
-    presets: Mapping[str, Mapping[str, Any]] = {"fits_set": {}}
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    presets = {"fits_set": {}}
+    option_choices = {
         "nodes": range(4, 22),
         "next_scaling": ("literal", "norm"),
         "variant": ("mixed", "speed", "root"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class ReactionSignature(SignatureObserver):
     description = "Signature observer of the gas-phase reaction, its rate unknown"
     source = "Omar 2012, (4.8.1)-(4.8.6)"
     default_preset = "as_published"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "candidates": range(3, 12),
         "corrections": range(7),
         "nodes": range(4, 14),

@@ -215,7 +215,7 @@ class WindTurbineDiagnosis(HybridSystem):
             for way, start in zip(("raise", "clear"), starts, strict=True)
         ),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {"repaired": {}, "as_published": {"centring": 0.0}}
+    presets = {"repaired": {}, "as_published": {"centring": 0.0}}
     default_preset = "repaired"
     events = (
         PeriodicEvent("sampling", "sample_period", description="Readings are taken, residuals and alarms follow"),

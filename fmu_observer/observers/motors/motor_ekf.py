@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 
@@ -70,12 +70,12 @@ class MotorEkf(MotorFilter):
     name = "motor_ekf"
     description = "Extended Kalman filter of a synchronous motor, currents in the rotor frame"
     source = 'Allaoui 2024, "3.39"-"3.45" (4.39-4.45), Tables 1-3'
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         **_MOTOR_PRESETS,
         "traction_200kw": traction_preset((0.01, 0.01, 1e-6, 1e-8), 1.0),
     }
     default_preset = "bbo_20"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES, "jacobian": ("exact", "as_published")}
+    option_choices = {"frame": FRAMES, "jacobian": ("exact", "as_published")}
 
     def __init__(self, *, frame: Frame = "rotor", jacobian: Jacobian = "exact") -> None:
         require_chosen(self.name, self.option_choices, frame=frame, jacobian=jacobian)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from fmu_observer.observers.motors.motor_filter import MotorFilter, traction_preset
 from fmu_observer.observers.motors.motor_jacobians import rotor_jacobian
@@ -43,7 +43,7 @@ class MotorEkfStator(MotorFilter):
     description = "Extended Kalman filter of a synchronous motor, currents in the stator frame, sensorless"
     source = "ours, on the equations of Allaoui 2024, (4.31) and (b.4)"
     default_preset = "quiet"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"load": ("known", "estimated")}
+    option_choices = {"load": ("known", "estimated")}
 
     def __init__(self, *, load: Load = "known") -> None:
         require_chosen(self.name, self.option_choices, load=load)

@@ -4,8 +4,8 @@ Ours.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
 
 import numpy as np
 
@@ -72,7 +72,7 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         "assumed_speed_error",
         "assumed_spacing_error",
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "first_stage": tuple(_STAGES),
         "gain_speed": ("odometer", "estimated"),
         "spacing": ("expected", "learnt"),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -46,7 +45,7 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         "Wheel observer and augmented high-gain observer: speed, position and coupler force of a locomotive in a train"
     )
     source = "Bouchama 2024, (4.7)-(4.11); gains ours"
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "gps_and_balises": {"theta_balise": 1.5, "theta_gps": 0.7, "high_gain": _AUGMENTED_K},
         "gps": {"theta_balise": 0.0, "theta_gps": 0.7, "high_gain": _AUGMENTED_K},
         "balises": {"theta_balise": 1.75, "theta_gps": 0.0, "high_gain": _AUGMENTED_K},
@@ -59,7 +58,7 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         "fix_period",
         *MultirateStage.stability_parameters,
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"first_stage": tuple(WHEEL_STAGES), "fixes": WAYS_OF_FIXES}
+    option_choices = {"first_stage": tuple(WHEEL_STAGES), "fixes": WAYS_OF_FIXES}
 
     def __init__(self, first_stage: _FirstStage = "multirate", fixes: Fixes = "event") -> None:
         require_chosen(self.name, self.option_choices, first_stage=first_stage)

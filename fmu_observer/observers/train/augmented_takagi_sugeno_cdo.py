@@ -4,8 +4,7 @@ positions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -70,14 +69,14 @@ class AugmentedTakagiSugenoCdo(AugmentedTrainObserver):
         parameter("odometer_gain", "1", NONE, "Gain of the continuous odometer, state i per m/s", size=ORDER),
     )
     stability_parameters = (*(s.name for s in own_parameters), "fix_period")
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "gps_and_balises": _preset(BALISES_BESIDE_FIXES, FIXES),
         "gps": _preset(NONE, FIXES),
         "balises": _preset(BALISES_ONLY, NONE),
         "odometer_trusted": _preset((2.0, 0.0, 0.0, 0.0), (0.5, 0.0, 0.0, 0.0), ODOMETER),
     }
     default_preset = "gps_and_balises"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"fixes": WAYS_OF_FIXES}
+    option_choices = {"fixes": WAYS_OF_FIXES}
 
     def __init__(self, fixes: Fixes = "event") -> None:
         super().__init__(fixes=fixes)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -132,7 +132,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     bounded_parameters = (*TUNABLE, *_WINDOW_PARAMETERS)
     outputs = (*BaliseOdometerEkf.outputs, *window_outputs(WINDOW), _RESTARTS)
     iterate = staticmethod(iterate)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "window": range(1, MOST_ROWS + 1),
         "passes": range(1, MOST_PASSES + 1),
         "loss": LOSSES,

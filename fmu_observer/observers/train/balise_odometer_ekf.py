@@ -155,7 +155,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         ODOMETER_READ,
     )
     parameters: tuple[Signal, ...] = OWN_PARAMETERS
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         # ours: for the position error on the line Amsterdam - Utrecht with drawn faults, see docs/tuning_the_train.md
         "tuned": {
             "acceleration_density": 6.15e-6,

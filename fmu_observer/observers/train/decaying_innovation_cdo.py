@@ -47,7 +47,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
     innovation_state = ELAPSED
     estimator_memory = (memory("balise_innovation", "m", 0.0, "Position error seen at the last balise"),)
     stability_parameters = ("theta", "high_gain", "decay_rate", "decay_exponent")
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "dense_balises": {},
         "balise_holes": {"theta": 0.12, "decay_rate": 0.15},
     }

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
@@ -37,7 +36,7 @@ class DelayedTrainObserver(DelayedStateObserver):
     description = "Train observer: position and speed now, from late odometer packets and late balises"
     source = "Hann 2014, (2.16), (2.57); the train by Bouchama 2024, (3.24)-(3.25)"
     theta_start = 2.0  # [1/s] [ours]
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"predictors": (1, 0, 2, 3), "between_samples": BETWEEN}
+    option_choices = {"predictors": (1, 0, 2, 3), "between_samples": BETWEEN}
 
     def __init__(
         self, *, predictors: int = 1, memory_places: int = MEMORY_PLACES, between_samples: Between = "predicted"

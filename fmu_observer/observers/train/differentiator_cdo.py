@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from fmu_observer.observers.train.wheel_stage import DifferentiatorStage
 
@@ -32,5 +29,5 @@ class DifferentiatorCdo(HighGainTrainObserver):
     source = "Bouchama 2024, (3.17)-(3.43)"
     stage = DifferentiatorStage()
     stability_parameters = ("theta", "high_gain")
-    presets: Mapping[str, Mapping[str, Any]] = {"as_published": {"theta": 8.0, "high_gain": (2.0, 1.0), "n_axles": 1.0}}
+    presets = {"as_published": {"theta": 8.0, "high_gain": (2.0, 1.0), "n_axles": 1.0}}
     default_preset = "as_published"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
@@ -34,7 +33,7 @@ class DynamicGainCdo(HighGainTrainObserver):
     outputs = (*HighGainTrainObserver.outputs, output_signal("gain", "1/s", "High gain theta in force"))
     gain_states = (state("theta", "1/s", START, "High gain in force"),)
     stability_parameters = ("theta_limit", "high_gain")
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "dense_balises": {},
         "balise_holes": {"theta_limit": 0.12, "theta_rate": 0.25, "theta": 2.0},
     }

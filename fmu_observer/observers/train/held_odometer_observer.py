@@ -5,10 +5,10 @@ speed error that run between them: what the two of them share.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from math import sqrt
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -163,9 +163,9 @@ class HeldOdometerObserver(TrainObserver):
     )
     estimator_events = (ODOMETER_SAMPLE,)
     stability_parameters = ("gain", "gain_schedule", "speed_max")
-    presets: Mapping[str, Mapping[str, Any]] = HELD_ODOMETER_PRESETS
+    presets = HELD_ODOMETER_PRESETS
     default_preset = "repaired"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"missing": ("predicted", "held")}
+    option_choices = {"missing": ("predicted", "held")}
 
     def __init__(self, missing: Missing = "predicted") -> None:
         require_chosen(self.name, self.option_choices, missing=missing)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from fmu_observer.observers.train.wheel_stage import MultirateStage
@@ -28,7 +25,7 @@ class MultirateCdo(HighGainTrainObserver):
     theta_name = "theta_2"
     stage = MultirateStage()
     stability_parameters = ("theta_2", "high_gain", "theta_1", "wheel_high_gain", "odometer_period")
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "repaired": {
             "theta_1": 8.0,
             "theta_2": 8.0,

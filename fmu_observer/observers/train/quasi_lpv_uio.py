@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -135,12 +134,12 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         output_signal("residual", "m/s", "M times odometer minus estimated speed"),
         *FAULT_OUTPUTS,
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "as_published": _preset(SECTION_3_3_4),
         "as_published_5_3_1": _preset(SECTION_5_3_1),
     }
     default_preset = "as_published"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES), "hold": HOLDS}
+    option_choices = {"rules": tuple(RULES), "hold": HOLDS}
 
     def __init__(self, rules: RuleChoice = "repaired", hold: _HoldChoice = "innovation") -> None:
         require_chosen(self.name, self.option_choices, rules=rules, hold=hold)

@@ -6,7 +6,6 @@ the detector, and no controller.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import inf, log
 from typing import Any
 
@@ -141,7 +140,7 @@ class StoppingUio(GatedObserver, GapCertified):
         ),
         BALISE,
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "repaired": {**_PRINTED_START, "disturbance_rate": 0.337},
         "as_published": {**_PRINTED_START, "longest_fault": NEVER, "min_speed": 0.0},
     }

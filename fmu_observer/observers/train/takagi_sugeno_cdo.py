@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -86,13 +86,13 @@ class TakagiSugenoCdo(TrainObserver):
         ),
     )
     stability_parameters = ("innovation_decay", "premise_min", "premise_max", *_PRINTED_GAINS)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "as_published": {"innovation_decay": 3.0, **_PRINTED_GAINS},
         "repaired": {"innovation_decay": 9.9, **_PRINTED_GAINS},
         "long_gaps": _LONG_GAPS,
     }
     default_preset = "repaired"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"premise": ("frozen", "live", "estimated")}
+    option_choices = {"premise": ("frozen", "live", "estimated")}
 
     def __init__(self, premise: Premise = "frozen") -> None:
         require_chosen(self.name, self.option_choices, premise=premise)

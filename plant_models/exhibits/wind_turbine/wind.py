@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ class Wind(HybridSystem):
             description="The turbulence changes",
         ),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "benchmark_script": {},
         "synthetic": {"mean_to": 14.0, "sine_amplitude": 3.0, "turbulence_std": 1.2},
     }

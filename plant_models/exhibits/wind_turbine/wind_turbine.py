@@ -5,7 +5,6 @@ Declares the hybrid system; aerodynamics and drive train are formulas in the fil
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -152,7 +151,7 @@ class WindTurbine(HybridSystem):
             description="The sensors are read",
         ),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "repaired": {},
         "as_published": {"printed_drive_train": 1.0},
         "without_noise": {

@@ -5,8 +5,7 @@ A controller as a hybrid system of its own; knows the hybrid foundation, the obs
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -98,9 +97,9 @@ class AdrcController(HybridSystem):
         parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0),
         parameter("standstill_speed", "m/s", 0.1, "Odometer speed below which it stands", min=0.0, display_unit="km/h"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = PRESETS
+    presets = PRESETS
     default_preset = "train"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"drive": ("immediate", "ramped")}
+    option_choices = {"drive": ("immediate", "ramped")}
 
     def __init__(self, *, drive: Drive = "immediate") -> None:
         require_chosen(self.name, self.option_choices, drive=drive)

@@ -5,8 +5,8 @@ A controller as a hybrid system of its own; knows the hybrid foundation and the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -109,9 +109,9 @@ class Driver(HybridSystem):
         ),
         *_profile(PROFILE_POINTS),
     )
-    presets: Mapping[str, Mapping[str, Any]] = _presets(PROFILE_POINTS)
+    presets = _presets(PROFILE_POINTS)
     default_preset = "profile_d"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"profile_count": range(FEWEST_POINTS, MOST_POINTS + 1)}
+    option_choices = {"profile_count": range(FEWEST_POINTS, MOST_POINTS + 1)}
 
     def __init__(self, *, profile_count: int = PROFILE_POINTS) -> None:
         require_whole("driver", FEWEST_POINTS, MOST_POINTS, profile_count=profile_count)

@@ -6,7 +6,6 @@ limits, blending and coupler protection come from their own files.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,7 +188,7 @@ class MdpeController(HybridSystem):
         parameter("standstill_speed", "m/s", 0.1, "Speed below which the train stands", min=0.0, display_unit="km/h"),
     )
     events = (PeriodicEvent("control", "control_period", description="Decision and control law"),)
-    presets: Mapping[str, Mapping[str, Any]] = PRESETS
+    presets = PRESETS
     default_preset = "train"
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -5,9 +5,8 @@ A generator as a hybrid system of its own; knows the hybrid foundation and the c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -126,14 +125,14 @@ class Mission(HybridSystem):
         parameter("start_position", "m", 0.0, "Position from which the distance counts"),
         parameter("stopping_tolerance", "m", 0.05, "Distance before the stop at which the reference is zero", min=0.0),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "sc1": {"target_speed": _KMH_35, "acceleration": 0.35},
         "sc2": {"target_speed": _KMH_35, "acceleration": 0.5},
         "sc3": {"target_speed": _KMH_35, "acceleration": 0.5},
         "sc4": {"target_speed": _KMH_50, "acceleration": 0.35},
     }
     default_preset = "sc1"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"braking": ("time", "position")}
+    option_choices = {"braking": ("time", "position")}
 
     def __init__(self, *, braking: BrakingPoint = "time") -> None:
         require_chosen(self.name, self.option_choices, braking=braking)

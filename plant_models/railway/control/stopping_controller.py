@@ -6,7 +6,6 @@ from its own file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -177,7 +176,7 @@ class StoppingController(HybridSystem):
         parameter("standstill_speed", "m/s", 0.01, "Speed at which the train is held", min=0.0, display_unit="km/h"),
     )
     events = (PeriodicEvent("control", "control_period", description="Plan and control law"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "fault_tolerant": {},
         "classical": {"compensates": 0.0, "heeds_faults": 0.0},
         "as_published": {"feedback_sign": 1.0, "traction_limit": 100.0},

@@ -5,8 +5,8 @@ A system of its own; knows the hybrid foundation and the protocols.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class NetworkProtocol(HybridSystem):
             "A node sends, and what was sent a delay ago arrives",
         ),
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "signals": range(1, MOST_SIGNALS + 1),
         "nodes": range(1, MOST_NODES + 1),
         "protocol": PROTOCOLS,

@@ -5,8 +5,8 @@ A sensor as a hybrid system of its own; knows the hybrid foundation, the layouts
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -166,7 +166,7 @@ class BaliseReader(HybridSystem):
         output_signal("lost_count", "1", "Crossings that found no room", variability="discrete", integer=True),
     )
     events = (CommunicationEvent("reading", "Position and speed are taken"),)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "layout": ("spacing", "positions"),
         "balise_capacity": range(1, 257),
         "pending_capacity": range(1, 17),

@@ -5,7 +5,6 @@ A sensor as a hybrid system of its own; knows only the hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -52,7 +51,7 @@ class BrakePressureSensor(HybridSystem):
         parameter("span", "Pa", 10.0 * BAR, "Largest reading", min=1.0, display_unit="bar"),
     )
     events = (sampling_event("The pressure is read"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "class_0_5": {},
         "ideal": {"scale_error": 0.0, "offset": 0.0, "noise_std": 0.0, "resolution": 0.0},
     }

@@ -5,7 +5,6 @@ A sensor as a hybrid system of its own; knows only the hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,7 @@ class DopplerRadar(HybridSystem):
         parameter("lowest_speed", "m/s", 0.1, "Speed below which the reading is zero", min=0.0, display_unit="km/h"),
     )
     events = (sampling_event("The radar is read"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "measured": {},
         "ideal": {"scale_error": 0.0, "noise_share": 0.0, "noise_std": 0.0, "lowest_speed": 0.0},
     }

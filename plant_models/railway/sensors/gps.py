@@ -5,7 +5,6 @@ A sensor as a hybrid system of its own; knows only the hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -75,7 +74,7 @@ class Gps(HybridSystem):
             description="A fix is taken",
         ),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "half_metre": {},
         "ideal": {"drift_std": 0.0, "white_std": 0.0},
         "white": {"drift_std": 0.0, "white_std": 0.5},

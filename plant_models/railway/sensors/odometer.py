@@ -5,7 +5,6 @@ A sensor as a hybrid system of its own; knows only the hybrid foundation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -57,7 +56,7 @@ class Odometer(HybridSystem):
         parameter("wheel_radius", "m", 0.575, "Radius of the wheel", min=1e-3),
     )
     events = (sampling_event("The odometer is read", "sample_offset"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "ideal": {},
         "10_hz": {"sample_period": 0.1},
         "pulses": {"sample_period": 0.1, "teeth": 100.0},

@@ -5,9 +5,8 @@ A sensor as a hybrid system of its own; knows the hybrid foundation and the coun
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -89,7 +88,7 @@ class PulseOdometer(HybridSystem):
             "The samples are aggregated",
         ),
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"count_from": ("wheel_speed", "wheel_distance")}
+    option_choices = {"count_from": ("wheel_speed", "wheel_distance")}
 
     def __init__(self, *, count_from: CountFrom = "wheel_speed") -> None:
         require_chosen(self.name, self.option_choices, count_from=count_from)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,7 @@ class DriveCycle(HybridSystem):
         parameter("load_torque_after", "N.m", 0.05, "Torque of the load from `load_time` on"),
         parameter("load_time", "s", 0.5, "Instant at which the load changes"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "load_step": {},
         "reversal": {"reversal_period": 0.5, "load_torque_before": 0.05},
         "low_speed": {"speed": RPM_100, "reversal_period": 0.25, "load_torque_before": 0.05},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
@@ -52,7 +51,7 @@ class DriveShaft(HybridSystem):
         parameter("stiffness", "N.m/rad", 1e4, "Stiffness k of the shaft, side of the motor", min=0.0),
         parameter("damping", "N.m.s/rad", 150.0, "Damping d of the shaft, side of the motor", min=0.0),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {"locomotive": {}}
+    presets = {"locomotive": {}}
     default_preset = "locomotive"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -66,7 +65,7 @@ class FieldOrientedControl(HybridSystem):
         *(s for s in MOTOR_PARAMETERS if s.name != "viscous_friction"),
     )
     events = (PeriodicEvent("control", "control_period", description="Speed and current control"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "drive_100w": {},
         "traction_200kw": {
             **{name: value for name, value in TRACTION_200_KW.items() if name != "viscous_friction"},
@@ -76,7 +75,7 @@ class FieldOrientedControl(HybridSystem):
         },
     }
     default_preset = "drive_100w"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "frame": FRAMES,
         "reference": ("speed", "torque"),
     }

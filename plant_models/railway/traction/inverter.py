@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,7 @@ class Inverter(HybridSystem):
         output_signal("direct_current", "A", "Current taken from the direct voltage"),
     )
     parameters = (parameter("direct_voltage", "V", 28.0, "Direct voltage U", min=1e-9),)
-    presets: Mapping[str, Mapping[str, Any]] = {"drive_100w": {}, "traction_200kw": {"direct_voltage": 1500.0}}
+    presets = {"drive_100w": {}, "traction_200kw": {"direct_voltage": 1500.0}}
     default_preset = "drive_100w"
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -55,9 +55,9 @@ class SynchronousMotor(HybridSystem):
     bounded_parameters = "all"
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(state)
     parameters: tuple[Signal, ...] = MOTOR_PARAMETERS
-    presets: Mapping[str, Mapping[str, Any]] = {"exact": {}, "traction_200kw": TRACTION_200_KW}
+    presets = {"exact": {}, "traction_200kw": TRACTION_200_KW}
     default_preset = "exact"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES, "noise": ("none", "sampled")}
+    option_choices = {"frame": FRAMES, "noise": ("none", "sampled")}
 
     def __init__(self, *, frame: Frame = "rotor", noise: Noise = "none") -> None:
         chosen = {"frame": frame, "noise": noise}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from plant_models.hybrid import Array, Signal, memory
@@ -38,7 +38,7 @@ class SynchronousMotorEuler(SynchronousMotor):
     internal_step = 1e-2  # nothing flows
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(memory)
     events = (sampling_event("update"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "as_published": PUBLISHED_NOISE,
         "exact": {},
         "quiet": {"process_variance": (1e-4, 1e-4, 1e-4, 0.0), "measurement_variance": 1e-2},
@@ -46,7 +46,7 @@ class SynchronousMotorEuler(SynchronousMotor):
         "faint": {"process_variance": (1e-7, 1e-7, 1e-7, 0.0), "measurement_variance": 1e-4},
     }
     default_preset = "as_published"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES}
+    option_choices = {"frame": FRAMES}
 
     def __init__(self, *, frame: Frame = "rotor") -> None:
         super().__init__(frame=frame, noise="sampled")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -54,7 +53,7 @@ class ThreePhaseMotor(HybridSystem):
         parameter("cyclic_inductance", "H", 0.0121, "L_s - M_s", min=1e-9),
         *(s for s in MOTOR_PARAMETERS if not s.name.startswith("inductance")),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {"annex_c": {}}
+    presets = {"annex_c": {}}
     default_preset = "annex_c"
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -5,8 +5,7 @@ Declares the hybrid system and its forces; the curves, the resistance and the tr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -82,14 +81,14 @@ class Locomotive(HybridSystem):
         output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
         output_signal("adhesion_degraded", "1", "0 nominal .. 1 degraded adhesion"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
+    presets = {
         "chapter_3": _CHAPTER_3,
         "chapter_3_four_axles": {**_CHAPTER_3, "n_axles": 4.0},
         "table_4_1": _TABLE_4_1,
         "table_4_1_motored_axles": {**_TABLE_4_1, "adhesive_share": 90.0 / 166.0},
     }
     default_preset = "chapter_3"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "adhesion": tuple(ADHESION_LAWS),
         "zones": ("time", "position"),
         "zone_count": range(1, 65),

@@ -5,7 +5,7 @@ Declares what the continuous and the discrete train have in common; how time run
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -73,9 +73,9 @@ class LongitudinalForces(HybridSystem):
             ),
         ),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {}
+    presets = {}
     default_preset = "set_a"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "zones": ("position", "time"),
         "zone_count": range(1, 65),
         "gradient_shape": ("constant", "linear"),
@@ -198,7 +198,7 @@ def _davis_preset(chosen: DavisSet) -> dict[str, float]:
     }
 
 
-TRAIN_PRESETS: dict[str, dict[str, float]] = {
+TRAIN_PRESETS: dict[str, Mapping[str, Any]] = {
     **{name: _davis_preset(chosen) for name, chosen in DAVIS_SETS.items() if name != "set_b_observer"},
     "scenario_3_3_4": {
         **_davis_preset(DAVIS_SETS["set_b"]),

@@ -5,7 +5,6 @@ Declares the continuous system; the forces stand in `longitudinal_forces`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from plant_models.hybrid import Array, state, vector
@@ -59,7 +58,7 @@ class LongitudinalTrain(LongitudinalForces):
         state("train_speed", "m/s", 0.0, "Speed of the train at start"),
     )
     frictions = ("train_speed",)
-    presets: Mapping[str, Mapping[str, Any]] = TRAIN_PRESETS
+    presets = TRAIN_PRESETS
 
     def __init__(
         self,

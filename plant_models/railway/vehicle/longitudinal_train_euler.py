@@ -5,7 +5,6 @@ Declares the periodic update; the forces stand in `longitudinal_forces`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -49,7 +48,7 @@ class LongitudinalTrainEuler(LongitudinalForces):
     )
     own_parameters = (parameter("update_period", "s", 0.05, "Time between two updates Dt", min=1e-6),)
     events = (PeriodicEvent("update", "update_period", description="The state is updated"),)
-    presets: Mapping[str, Mapping[str, Any]] = TRAIN_PRESETS
+    presets = TRAIN_PRESETS
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position and speed one period later."""

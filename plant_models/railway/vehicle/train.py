@@ -6,9 +6,8 @@ own files.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -87,9 +86,9 @@ class Train(HybridSystem):
     stiff = ("train_speed", "wagon_velocity", "axle_rate")  # with all momenta among them; the couplers are slow: 3.4 Hz
     # to 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
     internal_step = 1e-3
-    presets: Mapping[str, Mapping[str, Any]] = {}
+    presets = {}
     default_preset = "table_4_2"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "wagons": range(1, 21),
         "axles": (4, 1),
         "effort_per_axle": (False, True),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from fmu_observer.models.state_affine import StateAffineModel
@@ -30,7 +29,7 @@ class AdaptiveHold(AdaptiveObserver):
     name = "adaptive_hold"
     description = "Adaptive observer at samples, innovation held between them"
     source = "Hann 2014, (4.65)-(4.66), theorem 4.6; cap, holding and covariance ours"
-    presets: Mapping[str, Mapping[str, Any]] = ADAPTIVE_PRESETS
+    presets = ADAPTIVE_PRESETS
     default_preset = "as_published"
     predicts = False
 

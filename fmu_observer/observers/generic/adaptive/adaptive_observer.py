@@ -5,7 +5,7 @@ samples.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar, NamedTuple
@@ -101,7 +101,7 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
     """
 
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
+    option_choices = {"model": tuple(STATE_AFFINE_MODELS)}
     predicts: ClassVar[bool]
 
     def __init__(self, model: str | StateAffineModel, sampled: bool, **options: Any) -> None:

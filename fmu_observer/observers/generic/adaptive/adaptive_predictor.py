@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.generic.adaptive.adaptive_observer import AdaptiveObserver
@@ -38,10 +37,10 @@ class AdaptivePredictor(AdaptiveObserver):
     name = "adaptive_predictor"
     description = "Adaptive observer at samples, output predicted between them"
     source = "Hann 2014, (4.7), theorem 4.1; cap, holding and covariance ours"
-    presets: Mapping[str, Mapping[str, Any]] = ADAPTIVE_PRESETS
+    presets = ADAPTIVE_PRESETS
     default_preset = "as_published"
     predicts = True
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         **AdaptiveObserver.option_choices,
         "sensitivity": _SENSITIVITIES,
     }

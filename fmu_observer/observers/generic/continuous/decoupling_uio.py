@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +50,7 @@ class DecouplingUio(ModelObserver):
     source = "Aguiar Cota 2019, (2.12)"
     internal_step = 5e-3
     estimate_prefix = "filter_"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MODELS), **NUMBERS}
+    option_choices = {"model": tuple(MODELS), **NUMBERS}
 
     def __init__(self, model: str | ObserverModel = "coupled_vehicles", **numbers: float) -> None:
         chosen = with_unknown_inputs(find_model(model, **numbers), self.name)

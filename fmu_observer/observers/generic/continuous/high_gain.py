@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +35,7 @@ class HighGain(ModelObserver):
     description = "High-gain observer, continuous measurements"
     source = "Bouchama 2024, (1.10)-(1.13), Theorem 2"
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("pendulum", "freight_train")}
+    option_choices = {"model": ("pendulum", "freight_train")}
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +56,7 @@ class ProportionalIntegralUio(ModelObserver):
     description = "Unknown-input observer that estimates the unknown inputs, continuous measurements"
     source = "Aguiar Cota 2019, (2.13)-(2.17)"
     internal_step = 1e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "model": tuple(MODELS),
         "rho": tuple(range(1, LARGEST + 1)),
         **NUMBERS,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -50,7 +49,7 @@ class TakagiSugenoLuenberger(JudgedObserver):
     description = "Takagi-Sugeno Luenberger observer, continuous measurements"
     source = "Bouchama 2024, (1.19)-(1.28), inequality (1.26) repaired"
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
+    option_choices = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
     def __init__(
         self,

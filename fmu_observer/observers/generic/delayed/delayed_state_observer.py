@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class DelayedStateObserver(HighGainSampled):
     theta_start = _THETA_REPAIRED
     internal_step = 2.5e-3  # four to a reading
     late_policy = "late"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "model": tuple(MODELS),
         "predictors": (1, 0, 2, 3),
         "between_samples": BETWEEN,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
@@ -29,7 +28,7 @@ class FilteringDifferentiator(SignalDifferentiator):
     source = "Bouchama 2024, (1.16), Theorem 4, general exponent"
     internal_step = 1e-3
     method = "euler"  # Levant's discretisation; stages of a higher order see a signal that stands still while they move
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "order": (0, 1, 2),
         "filtering_order": tuple(range(1, LARGEST)),
     }

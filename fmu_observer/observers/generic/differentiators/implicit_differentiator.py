@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import factorial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class ImplicitDifferentiator(SignalDifferentiator):
     description = "Implicit discrete filtering differentiator of a sampled signal"
     source = "Bouchama 2024, (1.36), Theorem 5, third case repaired"
     discrete = True
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "order": (0, 1, 2),
         "filtering_order": tuple(range(1, LARGEST)),
     }

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from fmu_observer.formulas.differentiation.differentiator import differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
@@ -30,7 +29,7 @@ class LevantDifferentiator(SignalDifferentiator):
     source = "Bouchama 2024, (1.14), Theorem 3, gains in working order"
     internal_step = 1e-3
     method = "euler"  # Levant's discretisation; stages of a higher order see a signal that stands still while they move
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"order": tuple(range(LARGEST + 1))}
+    option_choices = {"order": tuple(range(LARGEST + 1))}
 
     def __init__(self, order: int = 2, unit: str = "1") -> None:
         super().__init__(order, 0, unit)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
-
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_linear
@@ -26,7 +23,7 @@ class DiscreteLuenberger(ExtendedLuenberger):
     name = "discrete_luenberger"
     description = "Discrete Luenberger observer of a linear model, periodic measurements"
     source = "Bouchama 2024, (1.29)-(1.32)"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("linear_pendulum",)}
+    option_choices = {"model": ("linear_pendulum",)}
 
     def __init__(self, model: str | ObserverModel = "linear_pendulum") -> None:
         chosen = find_model(model)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import scipy
@@ -44,7 +43,7 @@ class ExtendedLuenberger(ModelObserver):
     timing = "periodic"
     discrete = leaves_out = True
     internal_step = 0.1  # nothing flows between samples
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("pendulum", "linear_pendulum", "freight_train")}
+    option_choices = {"model": ("pendulum", "linear_pendulum", "freight_train")}
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)

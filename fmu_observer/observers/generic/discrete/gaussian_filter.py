@@ -6,7 +6,7 @@ It knows models of filters and hybrid systems; how a filter predicts and correct
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import reduce
 from typing import Any, ClassVar, Literal
 
@@ -80,7 +80,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
     forms: ClassVar[tuple[Form, ...]] = ("joseph", "short", "square_root")
     internal_step = 0.1  # nothing flows between samples
     own_parameters: tuple[Signal, ...] = ()
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "model": (),
         "outputs": (),
         "inputs": (),

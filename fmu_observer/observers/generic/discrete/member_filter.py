@@ -97,7 +97,7 @@ class MemberFilter(JudgedObserver):
     own_parameters: tuple[Signal, ...] = ()
     own_memory: tuple[Signal, ...] = ()
     own_outputs: tuple[Signal, ...] = ()
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "model": (),
         "members": range(2, MOST + 1),
         "outputs": (),

@@ -117,7 +117,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
     source = "Omar 2012, sections 1.4.8 and 4.2; real-time iteration and arrival cost are ours"
     forms: ClassVar[tuple[Form, ...]] = ("joseph", "short")
     iterate = staticmethod(iterate)
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         **ExtendedKalmanFilter.option_choices,
         "form": ("joseph", "short"),
         "window": range(1, MOST_ROWS + 1),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -54,7 +54,7 @@ class UnscentedKalmanFilter(GaussianFilter):
         parameter("beta", "1", BETA, "What is known of the distribution, 2 for a Gaussian one"),
         parameter("kappa", "1", _KAPPA, "Second spread of the sigma points, 0 or 3 - n"),
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         **GaussianFilter.option_choices,
         "form": ("short", "square_root"),
         "redraw": (True, False),

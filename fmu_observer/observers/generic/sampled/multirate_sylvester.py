@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import scipy
@@ -69,7 +69,7 @@ class MultirateSylvester(GapCertified, JudgedObserver):
     description = "Multirate observer by a Sylvester equation, every sampled output at its own instants"
     source = "Bouchama 2024, (1.42)-(1.46)"
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(_MULTIRATE_MODELS), "continuous": (0, 1, 2)}
+    option_choices = {"model": tuple(_MULTIRATE_MODELS), "continuous": (0, 1, 2)}
 
     def __init__(self, model: str | ObserverModel = "inverted_pendulum_cart", continuous: int = 1) -> None:
         self.model = _find(model)

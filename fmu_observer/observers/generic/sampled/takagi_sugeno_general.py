@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
     )
     source = "Bouchama 2024, (2.6)"
     internal_step = 1e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
+    option_choices = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
     def __init__(
         self,

@@ -6,7 +6,6 @@ It knows Takagi-Sugeno models and certificates.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
 from functools import reduce
 from itertools import combinations
 from typing import Any, ClassVar
@@ -52,7 +51,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
     """
 
     internal_step = 5e-3
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": _SUITED}
+    option_choices = {"model": _SUITED}
     periodic: ClassVar[bool] = False
     extra_memory: tuple[Signal, ...] = ()
 

@@ -4,8 +4,7 @@ has changed. Uses the pencil map and the properties.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -134,9 +133,9 @@ class SignatureTrack(HybridSystem):
         parameter("noise_limit", "1", 0.003, "Noise up to which verdicts are right, unit of the signal", min=0.0),
     )
     events = (PeriodicEvent("sampling", "sample_period", description="The signal is read"),)
-    presets: Mapping[str, Mapping[str, Any]] = {"van_der_pol": {}}
+    presets = {"van_der_pol": {}}
     default_preset = "van_der_pol"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+    option_choices = {
         "next_scaling": ("norm", "literal"),
         "reading": ("repaired", "as_published"),
     }
