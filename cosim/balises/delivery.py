@@ -20,7 +20,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.standard import TIME_TOLERANCE
 
 Timing = Literal["exact", "stale"]
-Deliverable = BaliseRecord | EventMessage
+_Deliverable = BaliseRecord | EventMessage
 """What receivers are notified of: telegrams of balises, and messages of others with an event of their own."""
 
 OUTCOMES = (
@@ -70,7 +70,7 @@ class Delivery:
             outcomes[receiver] = outcome
 
 
-StepThrough = Callable[[float, float, Sequence[Any]], list[Delivery]]
+_StepThrough = Callable[[float, float, Sequence[Any]], list[Delivery]]
 """Steps a receiver from one time to another [s] through telegrams; what became of each."""
 
 
@@ -94,9 +94,9 @@ class Receiver:
     event: str = "balise"
     timing: Timing = "exact"
     seen: dict[str, int] = field(default_factory=dict)
-    backlog: list[Deliverable] = field(default_factory=list)
+    backlog: list[_Deliverable] = field(default_factory=list)
     arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    compiled: StepThrough | None = None
+    compiled: _StepThrough | None = None
     announced: bool = False
     _open: list[Delivery] = field(default_factory=list)
     _kept: dict[int, Delivery] = field(default_factory=dict)
@@ -120,7 +120,7 @@ class Receiver:
         self.seen, self.backlog = dict(seen), list(backlog)
         self._open, self._kept = list(unsettled), dict(kept)
 
-    def step(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
+    def step(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
         """Step from `t` to `until` [s] with the prepared inputs through `telegrams`, in order of delivery.
 
         Args:
@@ -133,7 +133,7 @@ class Receiver:
         """
         return (self.compiled or self.step_in_python)(t, until, telegrams)
 
-    def step_in_python(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
+    def step_in_python(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
         """As `step`, without the compiled stepper's way through a single telegram.
 
         Args:
@@ -149,7 +149,7 @@ class Receiver:
             return self._notify_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
         return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
 
-    def hold_back(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
+    def hold_back(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
         """Keep telegrams of a part of a step, from `t` to `until` [s], that the component does not take: its next step
         has them.
 
@@ -185,7 +185,7 @@ class Receiver:
 
     # -- a receiver that can be stopped anywhere --------------------------------------------------------------------
 
-    def _step_through(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
+    def _step_through(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
         now = t
         deliveries: list[Delivery] = []
         arrived = None
@@ -201,7 +201,7 @@ class Receiver:
         self.arrived = self.planned.outputs.copy() if arrived is None else arrived
         return deliveries
 
-    def _deliver(self, now: float, notified_at: float, telegram: Deliverable) -> Delivery:
+    def _deliver(self, now: float, notified_at: float, telegram: _Deliverable) -> Delivery:
         component = self.planned.component
         if not component.event_needs_step:
             if notified_at > now:
@@ -217,14 +217,14 @@ class Receiver:
         self.announced = True
         return self._notify_here(notified_at, telegram, telegram.stamp)
 
-    def _notify_here(self, t: float, telegram: Deliverable, stamp: float) -> Delivery:
+    def _notify_here(self, t: float, telegram: _Deliverable, stamp: float) -> Delivery:
         before = self._outputs()
         delivery = Delivery(t, before, before)
         self._notify(t, telegram, stamp, delivery)
         delivery.after = self._outputs()
         return delivery
 
-    def _announce(self, now: float, notified_at: float, telegram: Deliverable) -> Delivery:
+    def _announce(self, now: float, notified_at: float, telegram: _Deliverable) -> Delivery:
         """FMI 2: the event happens at the end of the step from `now` to `notified_at` [s]."""
         delivery = Delivery(notified_at, self._look_ahead(now, notified_at))
         self._notify(now, telegram, min(telegram.stamp, notified_at), delivery)
@@ -248,7 +248,7 @@ class Receiver:
 
     # -- a receiver that takes whole steps only ---------------------------------------------------------------------
 
-    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
+    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
         """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told
         late.
         """
@@ -264,7 +264,7 @@ class Receiver:
         self.arrived = self._outputs()
         return deliveries
 
-    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[Deliverable]) -> list[Delivery]:
+    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
         """Whatever was passed in the step is told at its end, as if it had happened there."""
         self._advance(t, until)
         self.arrived = self._outputs()
@@ -278,7 +278,7 @@ class Receiver:
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _port(self, telegram: Deliverable) -> EventPort:
+    def _port(self, telegram: _Deliverable) -> EventPort:
         event = telegram.event if isinstance(telegram, EventMessage) else self.event
         return self.planned.component.events[event]
 
@@ -291,12 +291,12 @@ class Receiver:
         self.planned.read()
         return self.planned.outputs.copy()
 
-    def _put_off(self, telegram: Deliverable, time: float) -> Delivery:
+    def _put_off(self, telegram: _Deliverable, time: float) -> Delivery:
         """The next step has it; what becomes of it there settles this delivery of `time` [s]."""
         self.backlog.append(telegram)
         return self._kept.setdefault(id(telegram), Delivery(time))
 
-    def _notify(self, t: float, telegram: Deliverable, stamp: float, delivery: Delivery) -> None:
+    def _notify(self, t: float, telegram: _Deliverable, stamp: float, delivery: Delivery) -> None:
         self.planned.component.notify(self._port(telegram), t, stamp, payload(telegram))
         self._open.append(delivery)
         if id(telegram) in self._kept:

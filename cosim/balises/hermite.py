@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
 
-MAX_HALVINGS = 200
+_MAX_HALVINGS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class HermiteStep:
         part = self.segments()[0] if segment is None else segment
         (cubic, square), rising = self._coefficients(), part.rising
         p0, linear, h, low, high = self.p0, self.h * self.v0, self.h, part.start, part.end
-        for _ in range(MAX_HALVINGS):  # as `first_time`, of `position`: some sixty halvings, without a call in each
+        for _ in range(_MAX_HALVINGS):  # as `first_time`, of `position`: some sixty halvings, without a call in each
             middle = 0.5 * (low + high)
             if middle in (low, high):
                 break
@@ -124,7 +124,7 @@ def first_time(reached: Callable[[float], bool], low: float, high: float) -> flo
     """The first time in ``(low, high]`` at which `reached` is true, halved down to neighbouring floats; `high` must
     reach.
     """
-    for _ in range(MAX_HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break

@@ -10,7 +10,7 @@ from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
 from cosim.balises.telegram import Crossing
 from fmus.fmi.standard import TIME_TOLERANCE
 
-FINE_CUT = 1e-4
+_FINE_CUT = 1e-4
 """Half the length of the cut that takes the plant over a balise [s]; interpolation over it errs by 1e-8 s at walking
 pace.
 """
@@ -54,5 +54,5 @@ class PredictLocaliser(Localiser):
         speed = self.watch.speed
         behind, ahead = layout.gaps(self.watch.position)
         safe = min(time_to_reach(ahead, speed, ACCELERATION_LIMIT), time_to_reach(behind, -speed, ACCELERATION_LIMIT))
-        cut = now + max(safe, 2.0 * FINE_CUT)
-        return until if until - cut <= FINE_CUT else cut
+        cut = now + max(safe, 2.0 * _FINE_CUT)
+        return until if until - cut <= _FINE_CUT else cut

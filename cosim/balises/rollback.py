@@ -15,10 +15,10 @@ from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
 from cosim.balises.telegram import Crossing
 from fmus.fmi.standard import TIME_TOLERANCE
 
-ROOT_TOLERANCE = 1e-11
+_ROOT_TOLERANCE = 1e-11
 """Crossing times are searched until they move by less than this [s]; a hundredth of the promised 1e-9 s."""
 
-TURN_TOLERANCE = 1e-6
+_TURN_TOLERANCE = 1e-6
 """Where the train turns it stands: its position there errs by a millionth of a millionth of a metre only."""
 
 MAX_ROOT_STEPS = 60
@@ -76,7 +76,7 @@ class RollbackLocaliser(Localiser):
         if balise is None:
             return self.instant_crossing(stamp, position)
         rounding = 4.0 * ulp(position) / max(abs(speed), 1e-12) + 2.0 * ulp(stamp)
-        bound = max(ROOT_TOLERANCE, rounding) + self.watch.error.time(stamp, position, speed)
+        bound = max(_ROOT_TOLERANCE, rounding) + self.watch.error.time(stamp, position, speed)
         return Crossing(stamp, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
 
 
@@ -123,7 +123,7 @@ class _Trial:
         if not hermite.turns():
             return [Segment(0.0, hermite.h, hermite.p0, hermite.p1)]
         low, high = 0.0, hermite.h
-        while high - low > TURN_TOLERANCE:
+        while high - low > _TURN_TOLERANCE:
             middle = 0.5 * (low + high)
             self.go(self.t + middle)
             low, high = (middle, high) if self.watch.speed * hermite.v0 > 0.0 else (low, middle)
@@ -152,7 +152,7 @@ class _Trial:
             following = guess - miss / speed if speed else 0.5 * (low + high)
             if not low <= following <= high:
                 following = 0.5 * (low + high)
-            if abs(following - guess) <= ROOT_TOLERANCE or high - low <= ROOT_TOLERANCE:
+            if abs(following - guess) <= _ROOT_TOLERANCE or high - low <= _ROOT_TOLERANCE:
                 return following
             guess = following
         return guess

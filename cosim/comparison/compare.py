@@ -12,18 +12,51 @@ import numpy as np
 
 from cosim.comparison.curve import Curve, check_time, looks_held, rows_to_keep
 from cosim.comparison.curve_comparison import Task, compare_signal
+from cosim.comparison.event_comparison import Event, compare_events
 from cosim.comparison.notes import notes, tells_no_units
-from cosim.comparison.packets import compare_packets
 from cosim.comparison.telegram_comparison import compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
-from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
+from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
 from cosim.errors import ComparisonError
 from cosim.results.load_result import load_result
-from cosim.results.result import Result, SignalInfo
+from cosim.results.result import PacketRecord, Result, SignalInfo
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 Given = Tolerance | Mapping[str, Any] | float
 """A tolerance as users write it, see `cosim.comparison.tolerance.tolerance`."""
+
+
+def keeps_packets(result: Result) -> bool:
+    """Whether a result would have packets if there had been any: a folder does, a single file or a baseline does not.
+
+    Args:
+        result: result or reference.
+    """
+    return bool(result.packets) or ("components" in result.summary and "events_recorded" not in result.summary)
+
+
+def _compare_packets(reference: Result, result: Result, tolerance: Tolerance, length: float) -> EventComparison:
+    """Compare two lists of packets. Numbers say which belong together, and what is left the nearest stamp.
+
+    Args:
+        reference, result: whose packets. tolerance: of times and values. length: of the reference [s].
+    """
+    sides = (reference, result)
+    if any(side.packets for side in sides) and not all(map(keeps_packets, sides)):
+        return EventComparison(compared=False)
+    ours, theirs = ([_event(packet) for packet in side.packets] for side in sides)
+    return compare_events(ours, theirs, tolerance, length)
+
+
+def _event(packet: PacketRecord) -> Event:
+    return Event(
+        packet,
+        f"packet {packet.number} of {packet.node!r} ({packet.kind}) of {packet.stamp:.9g} s",
+        {"node": packet.node, "number": str(packet.number), "kind": packet.kind},
+        {"sent": packet.stamp, "delivered": packet.delivered_at},
+        packet.values,
+        packet.outcomes,
+    )
 
 
 def compare_results(
@@ -65,7 +98,7 @@ def compare_results(
         compare_telegrams(reference, result, tolerances.default, pair.length),
         notes(reference, result, tolerances, labels),
         extra_fails,
-        compare_packets(reference, result, tolerances.default, pair.length),
+        _compare_packets(reference, result, tolerances.default, pair.length),
     )
 
 

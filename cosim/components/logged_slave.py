@@ -24,7 +24,7 @@ def log_calls(component: Component, log: CallLog) -> None:
         component.slave.fmiCallLogger = _ignore  # prepared calls and the compiled stepper make way for a logger
         component.slave._log_fmi_args = _ignore
     else:
-        component.slave = LoggedSlave(component, log, names)
+        component.slave = _LoggedSlave(component, log, names)
 
 
 def _logged_native(component: Component, log: CallLog, names: Names) -> Callable[..., Any]:
@@ -43,7 +43,7 @@ def _ignore(*_arguments: Any) -> None:
     """fmpy's own logging of calls, which knows no time and writes after the call."""
 
 
-class LoggedSlave:
+class _LoggedSlave:
     """A slave in Python whose methods are logged; everything else is the slave's own.
 
     Args:

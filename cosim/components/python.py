@@ -23,7 +23,7 @@ NO_TIME = float("nan")
 
 
 @dataclass
-class EventCounters:
+class _EventCounters:
     """What became of the telegrams.
 
     Args:
@@ -34,7 +34,7 @@ class EventCounters:
     ignored: int = 0
 
 
-class PythonSlave:
+class _PythonSlave:
     """A Python object with the call surface of fmpy's `FMU3Slave`.
 
     Args:
@@ -44,7 +44,7 @@ class PythonSlave:
     def __init__(self, model: PythonModel) -> None:
         self.model = model
         self.component = self
-        self.counters = EventCounters()
+        self.counters = _EventCounters()
         self._inputs, self._parameters = slices(model.inputs), slices(model.parameter_signals)
         fields = [name for name in model.telegram or () if name != "stamp"]
         telegram = [Signal(f"{EVENT}_{name}", UNKNOWN_UNIT, "input", "discrete") for name in fields]
@@ -100,7 +100,7 @@ class PythonSlave:
 
     def reset(self) -> None:
         """Back to before initialisation."""
-        self._made, self._time, self._notified, self.counters = None, NO_TIME, False, EventCounters()
+        self._made, self._time, self._notified, self.counters = None, NO_TIME, False, _EventCounters()
 
     def enterInitializationMode(self, startTime: float = 0.0, stopTime: float | None = None, **_: Any) -> None:
         """Make the object with its parameters; its attributes are the first outputs.
@@ -252,7 +252,7 @@ class PythonComponent(FMI3Component):
     """
 
     def __init__(self, name: str, model: PythonModel, source: str) -> None:
-        slave, self._model = PythonSlave(model), model
+        slave, self._model = _PythonSlave(model), model
         super().__init__(name, slave, slave.model_description, source=source, kind="block")
 
     def declare_missing(self, names: Sequence[str], where: str) -> None:

@@ -30,7 +30,7 @@ TELEGRAM = ("stamp", "position", "location_accuracy", "odometer_reading", "deliv
 UNKNOWN_UNIT = ""
 
 
-class PythonModelError(RuntimeError):
+class _PythonModelError(RuntimeError):
     """The object raised, or gave something that cannot be; the message names the call and the signal."""
 
 
@@ -193,11 +193,11 @@ class PythonModel:
             try:
                 return make(self.cls, {**self.options, **values})
             except UserFileError as error:
-                raise PythonModelError(str(error)) from error
+                raise _PythonModelError(str(error)) from error
         try:
             copy = deepcopy(self.given)
         except Exception as error:
-            raise PythonModelError(
+            raise _PythonModelError(
                 f"the given instance cannot be copied for a run: {explained(error)}; give the class in its place"
             ) from error
         for name, value in values.items():
@@ -224,7 +224,7 @@ class PythonModel:
         try:
             return call(*arguments, **named)
         except (Exception, SystemExit) as error:
-            raise PythonModelError(f"{what} raised {explained(error, self.file)}") from error
+            raise _PythonModelError(f"{what} raised {explained(error, self.file)}") from error
 
     def output_values(self, made: Any, given: Any, call: str, held: np.ndarray | None = None) -> np.ndarray:
         """The outputs after a call: out of the mapping that it returned, else attributes of their names.
@@ -240,13 +240,13 @@ class PythonModel:
             PythonModelError: an output is missing, of a wrong shape, or no finite number.
         """
         if given is not None and not isinstance(given, Mapping):
-            raise PythonModelError(
+            raise _PythonModelError(
                 f"{call} returned a {type(given).__name__}, expected a dict of outputs or, with attributes, None"
             )
         known = [signal.name for signal in self.outputs]
         for name in given or ():
             if name not in known:
-                raise PythonModelError(f"{call} returned {name!r}, which is no output; {nearest(str(name), known)}")
+                raise _PythonModelError(f"{call} returned {name!r}, which is no output; {nearest(str(name), known)}")
         places = slices(self.outputs)
         values = np.zeros(sum(signal.width for signal in self.outputs)) if held is None else held.copy()
         for signal in self.outputs:
@@ -262,23 +262,23 @@ class PythonModel:
         if signal.name not in given and not hasattr(made, signal.name):
             if not demanded:
                 return None
-            raise PythonModelError(
+            raise _PythonModelError(
                 f"no output {signal.name!r}: return it from {call} in a dict, or keep it as self.{signal.name}"
             )
         found = given[signal.name] if signal.name in given else getattr(made, signal.name)
         try:
             value = np.asarray(found)
         except Exception as error:  # of a tensor that belongs to a graph, say
-            raise PythonModelError(f"output {signal.name!r} is no number: {explained(error)}") from error
+            raise _PythonModelError(f"output {signal.name!r} is no number: {explained(error)}") from error
         expected = () if signal.size is None else (signal.size,)
         after = f" after {call}" if call else " before the first step"
         if value.dtype.kind not in "fiub":
-            raise PythonModelError(f"output {signal.name!r} is no number{after}: {found!r}")
+            raise _PythonModelError(f"output {signal.name!r} is no number{after}: {found!r}")
         if value.shape != expected:
             wanted = "one number, shape ()" if expected == () else f"shape {expected}"
-            raise PythonModelError(f"output {signal.name!r} has shape {value.shape}{after}, expected {wanted}")
+            raise _PythonModelError(f"output {signal.name!r} has shape {value.shape}{after}, expected {wanted}")
         if not (np.isfinite(value) | (signal.can_be_missing & np.isnan(value))).all():
-            raise PythonModelError(f"output {signal.name!r} is {value}{after}, expected finite numbers")
+            raise _PythonModelError(f"output {signal.name!r} is {value}{after}, expected finite numbers")
         return value
 
     def save(self, made: Any) -> Any:
@@ -293,7 +293,7 @@ class PythonModel:
         try:
             return deepcopy(made.get_state() if hasattr(made, "get_state") else made)
         except Exception as error:
-            raise PythonModelError(self._not_copied(made, error)) from error
+            raise _PythonModelError(self._not_copied(made, error)) from error
 
     def restore(self, made: Any, state: Any) -> Any:
         """The object in a saved state, which stays as it is.

@@ -12,16 +12,70 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import struct
 import sys
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.components.elf import read_linkage
 from cosim.errors import FmuLoadError
 
-LINK_MAP = 2  # dlinfo: RTLD_DI_LINKMAP
+_LINK_MAP = 2  # dlinfo: RTLD_DI_LINKMAP
 _brought: dict[str, tuple[Path, str]] = {}
 """For every library that an FMU brought into this process, by its path: the FMU, and the digest of the library."""
+
+
+MAGIC = b"\x7fELF"
+_DYNAMIC, LOAD = 2, 1  # types of segments
+END, _NEEDED, _STRINGS, _SONAME = 0, 1, 5, 14  # entries of the dynamic section
+
+
+@dataclass(frozen=True)
+class _Linkage:
+    """What the dynamic linker goes by.
+
+    Args:
+        soname: of the library itself, empty where it has none. needed: of the libraries it asks for.
+    """
+
+    soname: str = ""
+    needed: tuple[str, ...] = ()
+
+
+def read_linkage(path: Path) -> _Linkage | None:
+    """The linkage of a 64-bit little-endian ELF file; None of any other file, and of a damaged one.
+
+    Args:
+        path: of the file.
+    """
+    try:
+        content = path.read_bytes()
+        return _linkage(content) if content[:6] == MAGIC + b"\x02\x01" else None
+    except (OSError, struct.error, ValueError):
+        return None
+
+
+def _linkage(content: bytes) -> _Linkage:
+    start, size, count = struct.unpack_from("<32xQ14x2H", content)  # e_phoff, e_phentsize, e_phnum
+    segments = [struct.unpack_from("<2I4Q", content, start + k * size) for k in range(count)]
+    entries = [
+        struct.unpack_from("<2Q", content, offset + at)
+        for kind, _, offset, _, _, length in segments
+        if kind == _DYNAMIC
+        for at in range(0, length, 16)
+    ]
+    entries = entries[: next((k for k, (tag, _) in enumerate(entries) if tag == END), len(entries))]
+    address = next((value for tag, value in entries if tag == _STRINGS), 0)
+    loads = [(begin, offset, length) for kind, _, offset, begin, _, length in segments if kind == LOAD]
+    strings = next(
+        (offset + address - begin for begin, offset, length in loads if begin <= address < begin + length), 0
+    )
+
+    def text(value: int) -> str:
+        return content[strings + value : content.index(b"\0", strings + value)].decode("utf-8", "replace")
+
+    soname = next((text(value) for tag, value in entries if tag == _SONAME), "")
+    return _Linkage(soname, tuple(text(value) for tag, value in entries if tag == _NEEDED))
 
 
 class _LinkMap(ctypes.Structure):
@@ -87,7 +141,7 @@ def _loaded(soname: str) -> str | None:
         handle = _ctypes.dlopen(soname, os.RTLD_LAZY | os.RTLD_NOLOAD)
         try:
             found = ctypes.POINTER(_LinkMap)()
-            if ctypes.CDLL(None).dlinfo(ctypes.c_void_p(handle), LINK_MAP, ctypes.byref(found)) == 0:
+            if ctypes.CDLL(None).dlinfo(ctypes.c_void_p(handle), _LINK_MAP, ctypes.byref(found)) == 0:
                 return os.fsdecode(found.contents.name or b"")
         finally:
             _ctypes.dlclose(handle)

@@ -17,7 +17,7 @@ from typing import Any
 FLOATS = "the rounding of floating-point numbers"
 PLACE = "the working directory"
 ENVIRONMENT_BYTES = 256  # more than any fenv_t
-MXCSR_AT, MXCSR_MODES = 28, 0xFFC0  # in glibc's fenv_t of x86-64: rounding, masks, flush to zero, denormals are zero
+MXCSR_AT, _MXCSR_MODES = 28, 0xFFC0  # in glibc's fenv_t of x86-64: rounding, masks, flush to zero, denormals are zero
 EVERY = 64
 
 
@@ -102,5 +102,5 @@ def _floats() -> tuple[int, int] | None:
     if _has_mxcsr():
         environment = (ctypes.c_uint32 * (ENVIRONMENT_BYTES // 4))()
         library.fegetenv(environment)
-        modes = environment[MXCSR_AT // 4] & MXCSR_MODES
+        modes = environment[MXCSR_AT // 4] & _MXCSR_MODES
     return int(library.fegetround()), modes

@@ -25,7 +25,7 @@ VERSIONS = ("1.0", "2.0", "3.0")
 KEPT = 16
 """Contents that are kept, those used last; what is met again after more others is unpacked again."""
 
-FOR_READERS = ("sources/", "documentation/")
+_FOR_READERS = ("sources/", "documentation/")
 """Folders that an instance of FMI 2 or 3 is not told of."""
 
 
@@ -110,7 +110,7 @@ def _copy(archive: Archive, content: _Content, folder: Path) -> None:
 
 
 def _extract(archive: Archive, folder: Path) -> None:
-    left_out = () if fmi_version(archive.description) == 1 else FOR_READERS
+    left_out = () if fmi_version(archive.description) == 1 else _FOR_READERS
     with zipfile.ZipFile(archive.path) as file:
         file.extractall(folder, [name for name in archive.names if not name.startswith(left_out)])
 

@@ -13,7 +13,7 @@ from cosim.coupling.connection import Link, split_name
 from cosim.errors import CouplingError
 from fmus.fmi.elements import described
 
-CLOCK, TRIGGERED = "Clock", "triggered"
+_CLOCK, _TRIGGERED = "Clock", "triggered"
 
 
 @dataclass(frozen=True)
@@ -86,16 +86,16 @@ def _clock_connection(pair: Link, components: Mapping[str, Component]) -> ClockC
     source = split_name(pair[0], components, "Connection source")
     target = split_name(pair[1], components, "Connection target")
     ends = [components[component].variable(name) for component, name in (source, target)]
-    if all(variable.type != CLOCK for variable in ends):
+    if all(variable.type != _CLOCK for variable in ends):
         return None
     where = f"Connection {pair[0]} -> {pair[1]}"
-    if any(variable.type != CLOCK for variable in ends):
+    if any(variable.type != _CLOCK for variable in ends):
         kinds = f"{pair[0]} is a {described(ends[0])}, {pair[1]} is a {described(ends[1])}"
         raise CouplingError(f"{where}: {kinds}; a clock is connected to a clock.")
     components[source[0]].variable(source[1], "output")
     components[target[0]].variable(target[1], "input")
     kind = ends[1].intervalVariability
-    if kind != TRIGGERED:
+    if kind != _TRIGGERED:
         raise CouplingError(
             f"{where}: {pair[1]} ticks at its own instants (intervalVariability '{kind}'); leave it unconnected."
         )

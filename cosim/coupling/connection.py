@@ -22,7 +22,7 @@ from plant_models.hybrid.units import UnitError, conversion
 Link = tuple[str, str] | tuple[str, str, Transformation]
 """Names of a source and a target, and what happens to the number on its way besides units."""
 
-LONG_TYPES = frozenset({"Int64", "UInt64"})
+_LONG_TYPES = frozenset({"Int64", "UInt64"})
 """Types with values that a double cannot hold."""
 
 
@@ -226,7 +226,7 @@ def _exact(
         return True
     versions = [components[end[0]].fmi_version for end in (source, target)]
     kinds = {getter_type(v.type, version) for v, version in zip((output, name), versions, strict=True)}
-    return kinds <= LONG_TYPES and transformation == Transformation()
+    return kinds <= _LONG_TYPES and transformation == Transformation()
 
 
 def _misfit(source: ModelVariable, target: ModelVariable) -> str:

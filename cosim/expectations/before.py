@@ -17,7 +17,7 @@ from plant_models.hybrid.units import UnitError, conversion
 if TYPE_CHECKING:
     from cosim.scenario.scenario_tables import ComponentTable, ReportTable
 
-SLACK = 1e-9
+_SLACK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Before:
             key: of the instant. value: the instant [s], or None.
         """
         first, last = self.start, self.stop
-        if value is not None and not first - SLACK <= value <= last + SLACK:
+        if value is not None and not first - _SLACK <= value <= last + _SLACK:
             raise ScenarioError(
                 f"{key!r} ({value:g} s) lies outside the run, which lasts from {first:g} to {last:g} s; for a shorter "
                 "run leave expectations out: --set expect=[]"
@@ -77,8 +77,8 @@ class Before:
                 f"'to' ({until:g} s) lies before the evaluation begins (report.evaluate_after, {begin:g} s); "
                 "give 'from'"
             )
-        recorded = floor((until - first) / self.period + SLACK) >= ceil((begin - first) / self.period - SLACK)
-        if not recorded and until < last - SLACK:
+        recorded = floor((until - first) / self.period + _SLACK) >= ceil((begin - first) / self.period - _SLACK)
+        if not recorded and until < last - _SLACK:
             raise ScenarioError(f"no row is recorded between {begin:g} and {until:g} s; one is every {self.period:g} s")
 
     def demand_output(self, component: str, output: str) -> None:

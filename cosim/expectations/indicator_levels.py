@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-BETWEEN_0_AND_1, BETWEEN_1_AND_2 = 0.5, 1.5
+BETWEEN_0_AND_1, _BETWEEN_1_AND_2 = 0.5, 1.5
 LEVELS = {
-    "slip_indicator": BETWEEN_1_AND_2,
-    "condition": BETWEEN_1_AND_2,
-    "adhesion_level": BETWEEN_1_AND_2,
+    "slip_indicator": _BETWEEN_1_AND_2,
+    "condition": _BETWEEN_1_AND_2,
+    "adhesion_level": _BETWEEN_1_AND_2,
     "axle_slipping": BETWEEN_0_AND_1,
     "sanding_request": BETWEEN_0_AND_1,
     "adhesion_degraded": BETWEEN_0_AND_1,

@@ -18,7 +18,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class JournalEntry:
+class _JournalEntry:
     """One thing that a filter did.
 
     Attributes:
@@ -46,7 +46,7 @@ class FilterJournal:
     def __init__(self, engine: FmuFilter, belief: FmuBelief, t: float, horizon: float) -> None:
         self._engine, self._horizon = engine, horizon
         self.belief, self.t = belief, t
-        self._entries: list[JournalEntry] = []
+        self._entries: list[_JournalEntry] = []
 
     def predict(self, h: float, u: Array) -> None:
         """Go on.
@@ -54,7 +54,7 @@ class FilterJournal:
         Args:
             h: how far [s]. u: inputs, held, shape (m,).
         """
-        self._done(JournalEntry(self.belief, self.t, u.copy(), h=h))
+        self._done(_JournalEntry(self.belief, self.t, u.copy(), h=h))
         oldest = self.t - self._horizon - SAME
         while self._entries and self._entries[0].t + self._entries[0].h < oldest:
             self._entries.pop(0)
@@ -70,7 +70,7 @@ class FilterJournal:
             Whether it was taken; one from before the horizon is not.
         """
         if stamp >= self.t - SAME:
-            self._done(JournalEntry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
+            self._done(_JournalEntry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
             return True
         place = next((i for i, e in enumerate(self._entries) if e.h > 0.0 and e.t <= stamp < e.t + e.h - SAME), None)
         if place is None:
@@ -80,16 +80,16 @@ class FilterJournal:
         self.belief, self.t = split.before, split.t
         if stamp > split.t + SAME:
             self._do(replace(split, h=stamp - split.t))
-        self._do(JournalEntry(self.belief, stamp, split.u, seen=tuple(seen), y=y.copy(), R=R))
+        self._do(_JournalEntry(self.belief, stamp, split.u, seen=tuple(seen), y=y.copy(), R=R))
         self._do(replace(split, h=split.t + split.h - stamp))
         for entry in rest:
             self._do(entry)
         return True
 
-    def _do(self, entry: JournalEntry) -> None:
+    def _do(self, entry: _JournalEntry) -> None:
         self._done(replace(entry, before=self.belief, t=self.t))
 
-    def _done(self, entry: JournalEntry) -> None:
+    def _done(self, entry: _JournalEntry) -> None:
         """What an entry that begins here and now does."""
         self._entries.append(entry)
         if entry.y is None:
@@ -99,11 +99,11 @@ class FilterJournal:
             assert entry.R is not None
             self.belief = self._engine.correct(self.belief, self.t, entry.u, entry.seen, entry.y, entry.R)
 
-    def state(self) -> tuple[FmuBelief, float, tuple[JournalEntry, ...]]:
+    def state(self) -> tuple[FmuBelief, float, tuple[_JournalEntry, ...]]:
         """What to keep in order to return here."""
         return self.belief, self.t, tuple(self._entries)
 
-    def restore(self, state: tuple[FmuBelief, float, tuple[JournalEntry, ...]]) -> None:
+    def restore(self, state: tuple[FmuBelief, float, tuple[_JournalEntry, ...]]) -> None:
         """Return.
 
         Args:

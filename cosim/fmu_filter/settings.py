@@ -10,8 +10,8 @@ from cosim.toml_table import OwnSeed, TomlTable
 from plant_models.hybrid.noise import FROM_NAME
 
 Kind = Literal["ekf", "ukf", "ensemble", "particle"]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+_Positive = Annotated[float, Field(gt=0.0)]
+_NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class FilterTable(TomlTable):
@@ -26,27 +26,27 @@ class FilterTable(TomlTable):
     )
     states: list[str] | None = Field(default=None, description="states; those that the FMU declares by default")
     outputs: list[str] | None = Field(default=None, description="outputs that are estimated; all by default")
-    measurements: dict[str, Positive] = Field(
+    measurements: dict[str, _Positive] = Field(
         default={}, description="outputs of the FMU that are measured, with standard deviations"
     )
-    sample_period: Positive | None = Field(
+    sample_period: _Positive | None = Field(
         default=None, description="time between samples of the measurements [s]; every communication step by default"
     )
-    process_noise: dict[str, NotNegative] = Field(
+    process_noise: dict[str, _NotNegative] = Field(
         default={}, description="by state: standard deviation that a second adds, in the unit of the state by sqrt(s)"
     )
-    input_noise: dict[str, NotNegative] = Field(
+    input_noise: dict[str, _NotNegative] = Field(
         default={}, description="by input: standard deviation, held over a step; enters the model where the input does"
     )
-    start_deviation: dict[str, NotNegative] = Field(
+    start_deviation: dict[str, _NotNegative] = Field(
         default={}, description="by state, or start value of a `particle` filter: standard deviation at the start"
     )
     balise: str | None = Field(default=None, description="output that a telegram measures, a position [m]")
-    balise_deviation: Positive = Field(
+    balise_deviation: _Positive = Field(
         default=1.0, description="standard deviation of it [m], where a telegram tells no location accuracy"
     )
-    horizon: NotNegative = Field(default=10.0, description="how far back a late telegram is still taken in [s]")
-    alpha: Positive = Field(default=1.0, description="spread of the sigma points of a `ukf` [1]")
+    horizon: _NotNegative = Field(default=10.0, description="how far back a late telegram is still taken in [s]")
+    alpha: _Positive = Field(default=1.0, description="spread of the sigma points of a `ukf` [1]")
     members: Annotated[int, Field(ge=2)] = Field(default=100, description="of an `ensemble`, or particles")
     seed: OwnSeed = Field(
         default=FROM_NAME,

@@ -24,7 +24,7 @@ from fmus.tables.table import Column, Parts, Table, joined, name_column, text_co
 Array = NDArray[np.float64]
 Method = Literal["exact Jacobians", "directional derivatives", "central differences"]
 _POLE_COLUMNS = (name_column("eigenvalue", "eigenvalue"), Column("time_constant", "time constant"))
-RANK_TOLERANCE = 1e-7
+_RANK_TOLERANCE = 1e-7
 """For modes that are not seen or not reached, relative: differences lose half of the digits."""
 
 
@@ -88,11 +88,11 @@ class Linearisation:
 
     def unobservable(self) -> list[Mode]:
         """Modes that no output shows."""
-        return unobservable_modes(self._measured(self.A, self.C), RANK_TOLERANCE)
+        return unobservable_modes(self._measured(self.A, self.C), _RANK_TOLERANCE)
 
     def uncontrollable(self) -> list[Mode]:
         """Modes that no input reaches: those that the mirrored system does not show."""
-        return unobservable_modes(self._measured(self.A.T, self.B.T), RANK_TOLERANCE)
+        return unobservable_modes(self._measured(self.A.T, self.B.T), _RANK_TOLERANCE)
 
     def _measured(self, A: Array, C: Array) -> MeasuredSystem:
         """The pair in coordinates of like size, with rows of C of length one."""
@@ -126,10 +126,10 @@ class Linearisation:
             OutputError: another ending, or the file cannot be written.
         """
         path = Path(path)
-        if path.suffix not in WRITERS:
-            raise OutputError(f"{path}: unknown ending {path.suffix!r}; expected one of: {', '.join(WRITERS)}.")
+        if path.suffix not in _WRITERS:
+            raise OutputError(f"{path}: unknown ending {path.suffix!r}; expected one of: {', '.join(_WRITERS)}.")
         try:
-            WRITERS[path.suffix](self, path)
+            _WRITERS[path.suffix](self, path)
         except OSError as error:
             raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
         return path
@@ -237,7 +237,7 @@ def _arrays(found: Linearisation) -> dict[str, Any]:
     return numbers | names | units
 
 
-WRITERS: dict[str, Callable[[Linearisation, Path], None]] = {
+_WRITERS: dict[str, Callable[[Linearisation, Path], None]] = {
     ".json": _write_json,
     ".npz": _write_npz,
     ".mat": _write_mat,

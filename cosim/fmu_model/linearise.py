@@ -21,7 +21,7 @@ from fmus.check.findings import Verdict
 from fmus.check.finite_differences import RELATIVE_STEP, compare
 
 Array = NDArray[np.float64]
-HELD_TYPES = ("Real", "Float64", "Float32")
+_HELD_TYPES = ("Real", "Float64", "Float32")
 MOST_NAMED = 6
 """Names of held variables in a sentence."""
 Function = Callable[[Array, Array], tuple[Array, Array]]  # (states, inputs) -> (rates or next states, outputs)
@@ -177,7 +177,7 @@ def _held_between_events(model: SealedModel) -> list[str]:
     held = [
         v.name
         for v in variables
-        if v.type in HELD_TYPES
+        if v.type in _HELD_TYPES
         and v.variability == "discrete"
         and v.name not in model.states
         and v.causality in ("output", "local")

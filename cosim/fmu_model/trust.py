@@ -15,14 +15,14 @@ SOLVER = 1e-3
 """What a restarted solver may make of a step, as a share of the change over it; a part of the state that was forgotten
 makes more of it.
 """
-MOST_RESTARTS = 100
+_MOST_RESTARTS = 100
 """Restarts in a row by which steps of an FMU's own are looked for."""
 ROUNDING = 1e-9
 """The same as a share of the values."""
 
 
 @dataclass(frozen=True)
-class StateTrust:
+class _StateTrust:
     """What was seen of the states of an FMU.
 
     Attributes:
@@ -47,7 +47,7 @@ def usual_step(model: SealedModel) -> float:
     return float(declared) if declared else 0.01
 
 
-def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
+def check_states(model: SealedModel, h: float, t: float = 0.0) -> _StateTrust:
     """Measure whether the states determine what follows.
 
     A run of some steps is left at one of them, started again from the states read there, and compared with the run that
@@ -81,7 +81,7 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
             f"{model.path}: no state changes what follows ({', '.join(idle)}): the FMU does not start from the values "
             "given. No filter can move it; a particle filter over saved states only selects."
         )
-    return StateTrust(model.way, all(same for _, same in seen), max(0.0, *(deviation for deviation, _ in seen)), idle)
+    return _StateTrust(model.way, all(same for _, same in seen), max(0.0, *(deviation for deviation, _ in seen)), idle)
 
 
 def _continued(model: SealedModel, rows: list[tuple[Array, Array]], k: int, t: float, h: float) -> tuple[float, bool]:
@@ -139,7 +139,7 @@ def _demand_own_steps_fit(model: SealedModel, t: float, u: Array, h: float) -> N
     Looked at over two steps of its default experiment, where those are longer.
     """
     x = model.start
-    count = min(ceil(2.0 * usual_step(model) / h - ROUNDING), MOST_RESTARTS)
+    count = min(ceil(2.0 * usual_step(model) / h - ROUNDING), _MOST_RESTARTS)
     if count <= STEPS:
         return
     model.restart(t, x, u)

@@ -15,18 +15,18 @@ from cosim.master.algorithms.history import shown
 from cosim.master.algorithms.links import interface, plan_links
 
 MAX_ROUNDS = 100
-PLAIN_ROUNDS = (10, 30)
+_PLAIN_ROUNDS = (10, 30)
 """Plain exchanges before Newton's method: as many as a chain of values that are fed back can be long, within these
 bounds.
 """
 
-EXPLOSION = 100.0
+_EXPLOSION = 100.0
 """Growth of the changes from one plain exchange to the next that is not waited out."""
 
 TOLERANCE = 1e-12
 """A value that moves by less than this share of itself has settled: a few roundings of a double."""
 
-JUMP = 1e-6
+_JUMP = 1e-6
 """What changes by more than this share of itself when initialisation ends has jumped."""
 
 
@@ -95,7 +95,7 @@ class _Settling:
     def run(self) -> list[int]:
         """Exchange; returns the columns of the values that still change, none where all is well."""
         values, columns = self.plan.values, self._columns
-        plain = min(max(PLAIN_ROUNDS[0], len(columns) + 2), PLAIN_ROUNDS[1])
+        plain = min(max(_PLAIN_ROUNDS[0], len(columns) + 2), _PLAIN_ROUNDS[1])
         changed = np.ones(len(values), dtype=bool)
         if self._newton is not None:
             self._newton.begin(self._size)
@@ -116,7 +116,7 @@ class _Settling:
         """Exchange once; whether anything that is fed back was still changed by it."""
         previous = self.plan.values.copy()
         _exchange(self.plan)
-        return bool(self._changed(previous, JUMP)[self._columns].any())
+        return bool(self._changed(previous, _JUMP)[self._columns].any())
 
     def _changed(self, previous: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
         values = self.plan.values
@@ -142,7 +142,7 @@ class _Settling:
         """Twice in a row the changes grew so much that no component should be asked for more of it."""
         return (
             len(self.residuals) > 2
-            and self.residuals[-1] > EXPLOSION * self.residuals[-2] > EXPLOSION**2 * self.residuals[-3] > 0.0
+            and self.residuals[-1] > _EXPLOSION * self.residuals[-2] > _EXPLOSION**2 * self.residuals[-3] > 0.0
         )
 
     def _guess(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ Time is an index, ``t_k = t0 + k*H``; a row labelled t holds the values at t; an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
@@ -20,23 +20,95 @@ from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
-from cosim.master.events.choose import Events
-from cosim.master.events.coordinated_system import CoordinatedSystem
-from cosim.master.finite import make_finite_check
+from cosim.master.events.choose import Events, make_coordinator
 from cosim.master.initialisation import initialise
 from cosim.master.stepper import ChooseStepper, StepperChoice, python_stepper
-from cosim.master.system import Row, System
+from cosim.master.system import Checkpoint, Row, System
 from cosim.network.service import NetworkService
 from cosim.process.last_call import LAST_CALL
 from cosim.results.recorder import Recorder
 from cosim.results.result import SignalInfo
 from fmus.fmi.standard import TIME_TOLERANCE
 
-PROGRESS_INTERVAL = 64
+_PROGRESS_INTERVAL = 64
+
+
+def make_finite_check(values: np.ndarray, can_be_missing: np.ndarray) -> Callable[[], bool]:
+    """A call that says whether all values are finite, or NaN where one can be missing.
+
+    Args:
+        values: shape (n,); looked at anew in each call. The flags are compared as bytes, a quarter of what ``all``
+            costs.
+        can_be_missing: mask of the values of which NaN says that there is none, shape (n,).
+    """
+    flags, good, isfinite = bytearray(len(values)), b"\1" * len(values), np.isfinite
+    finite = np.frombuffer(flags, dtype=bool)
+    some = bool(can_be_missing.any())
+
+    def all_finite() -> bool:
+        isfinite(values, out=finite)
+        return flags == good or (some and bool((finite | (can_be_missing & np.isnan(values))).all()))
+
+    return all_finite
+
+
+class _CoordinatedSystem(System):
+    """All components of a plan, stepped together from event to event.
+
+    Args:
+        plan, algorithm, balises, network: as for `System`.
+        events: ``propagate`` events of the components to others, or leave them ``local``.
+
+    `events` is the coordinator, None where none is needed.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        algorithm: Algorithm,
+        balises: BaliseService | None = None,
+        network: NetworkService | None = None,
+        events: Events = "propagate",
+    ) -> None:
+        super().__init__(plan, algorithm, balises, network)
+        self.events = make_coordinator(self, events)
+
+    @property
+    def divides_steps(self) -> bool:
+        return self.events is not None and not self.events.only_network
+
+    def start(self, t: float) -> None:
+        """All components were initialised at `t` [s]: handle what happens there already.
+
+        Raises:
+            RunError: a component failed, or events do not settle.
+        """
+        if self.events is not None:
+            self.events.start(t)
+
+    def advance(self, t: float, until: float) -> Sequence[Row]:
+        """As `System.advance`, events of the components on the way included.
+
+        Where a component asks for the end of the run, everybody who can stops there.
+
+        Raises:
+            RunError: a component failed, or events do not settle.
+        """
+        return self.move(t, until) if self.events is None else self.events.advance(t, until)
+
+    def save(self, *, anyway: bool = False) -> Checkpoint:
+        checkpoint = super().save(anyway=anyway)
+        checkpoint.events = None if self.events is None else self.events.save()
+        return checkpoint
+
+    def restore(self, checkpoint: Checkpoint, keep: Set[str] = frozenset()) -> None:
+        super().restore(checkpoint, keep)
+        if self.events is not None:
+            self.events.restore(checkpoint.events)
 
 
 @dataclass
-class WallClock:
+class _WallClock:
     """Wall-clock seconds of a run."""
 
     initialisation: float = 0.0
@@ -82,11 +154,11 @@ class Master:
         network: NetworkService | None = None,
     ) -> None:
         self.plan, self.axis, self.balises = plan, axis, balises
-        self.system = CoordinatedSystem(plan, algorithm(plan), balises, network, events)
+        self.system = _CoordinatedSystem(plan, algorithm(plan), balises, network, events)
         self.control = control(self.system)
         event_rows = 0 if balises is None else balises.expected_rows(axis.start, axis.stop)
         self.recorder = recorder(plan.signals, axis.count + 1 + event_rows)
-        self.timing = WallClock()
+        self.timing = _WallClock()
         self.exchange_rounds = 0
         self.ended_early: str | None = None
         self._progress = progress
@@ -164,7 +236,7 @@ class Master:
                 continue
             if not self._step_and_record(step, axis[k + 1]):
                 return
-            if self._progress is not None and k % PROGRESS_INTERVAL == 0:
+            if self._progress is not None and k % _PROGRESS_INTERVAL == 0:
                 self._progress(axis[k + 1])
             k += 1
         if self._progress is not None:

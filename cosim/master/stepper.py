@@ -12,7 +12,7 @@ from cosim.master.system import Row
 from cosim.results.recorder import Recorder
 
 Wanted = Literal["auto", "python", "compiled"]
-Finish = Callable[[], Sequence[Row]]
+_Finish = Callable[[], Sequence[Row]]
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Chunk:
     """
 
     done: int
-    finish: Finish | None = None
+    finish: _Finish | None = None
     suspect: bool = False
 
 
-class Stepper(Protocol):
+class _Stepper(Protocol):
     """Does many communication steps in one call; `steps` counts them."""
 
     steps: int
@@ -53,7 +53,7 @@ class StepperChoice:
     """
 
     wanted: Wanted
-    compiled: Stepper | None = None
+    compiled: _Stepper | None = None
     reason: str | None = None
 
     @property

@@ -13,7 +13,7 @@ from cosim.network.settings import NetworkSettings
 from plant_models.hybrid.noise import Purpose, standard_normal, uniform_pair
 from plant_models.railway.network.loss import loss_threshold
 
-LOSS, INSTANT, DELAY, SECOND_DELAY = range(4)
+LOSS, INSTANT, DELAY, _SECOND_DELAY = range(4)
 """Numbers of the noise signals; the first is that of the block `network_protocol`."""
 
 
@@ -72,7 +72,7 @@ class Chance:
 
     def _way(self, k: int, *, second: bool) -> float:
         """How long it is on its way [s]."""
-        settings, signal = self._settings, SECOND_DELAY if second else DELAY
+        settings, signal = self._settings, _SECOND_DELAY if second else DELAY
         if settings.delay_model == "recorded":
             return settings.delays[(k + second) % len(settings.delays)]
         if settings.delay_model == "uniform":

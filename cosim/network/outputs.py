@@ -70,12 +70,8 @@ class NetworkOutputs(FMI3Component):
         super().__init__(NAME, None, description, source="the network of the scenario", kind=KIND)
 
 
-def error_name(signal: str) -> str:
-    """Output with the network error of a signal.
-
-    Args:
-        signal: ``component.signal``.
-    """
+def _error_name(signal: str) -> str:
+    """Output with the network error of a signal."""
     return f"error.{signal}"
 
 
@@ -88,12 +84,8 @@ def arrived_name(target: str) -> str:
     return f"arrived.{target}"
 
 
-def stamp_name(node: str) -> str:
-    """Output with the stamp of what was last received of a node.
-
-    Args:
-        node: its name.
-    """
+def _stamp_name(node: str) -> str:
+    """Output with the stamp of what was last received of a node."""
     return f"stamp.{node}"
 
 
@@ -150,10 +142,10 @@ def _outputs(
                 marks = [CAN_BE_MISSING] if components[component].can_be_missing(signal) else []
                 add(name, f"Last received value of {name}", marks=marks, **units)
             else:
-                add(error_name(name), f"Last sent minus true value of {name} before the last transmission", **units)
+                add(_error_name(name), f"Last sent minus true value of {name} before the last transmission", **units)
     add(SENDER, "Number of the node that sent last, from 1; 0 before")
     for node in settings.nodes:
-        add(stamp_name(node.name), f"When what was last received of node {node.name} was measured", unit="s")
+        add(_stamp_name(node.name), f"When what was last received of node {node.name} was measured", unit="s")
     for reader in readers:
         component, signal = sources[reader.signal]
         text = f"What arrived of {component}.{signal} for {reader.target}, NaN where it is lost or was read"

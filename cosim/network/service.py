@@ -30,7 +30,7 @@ PACKET_STAGE_TEXT = "packet receiver"
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
+class _Packet:
     """A packet on its way.
 
     Args:
@@ -78,14 +78,14 @@ class PacketListener:
 
 
 @dataclass(slots=True)
-class SentPacket:
+class _SentPacket:
     """One packet in the log.
 
     Args:
         packet: as it was sent. deliveries: by receiver, once it has arrived.
     """
 
-    packet: Packet
+    packet: _Packet
     deliveries: dict[str, Delivery | str] = field(default_factory=dict)
 
 
@@ -124,8 +124,8 @@ class NetworkService:
         self._holding = [
             sorted({name for signal in node.signals for name in holders.get(signal, ())}) for node in settings.nodes
         ]
-        self.mailbox: Mailbox[Packet] = Mailbox()
-        self.entries: list[SentPacket] = []
+        self.mailbox: Mailbox[_Packet] = Mailbox()
+        self.entries: list[_SentPacket] = []
         self.number = 0
         self._start, self._begun = start, False
         self._next = self.chance.instant(0)
@@ -222,20 +222,20 @@ class NetworkService:
         self.number, self._next = k + 1, self.chance.instant(k + 1)
         told = tuple(measured[own].tolist())
         lost, arrives = self.chance.lost(k), stamp + self.chance.delay(k)
-        self._post(Packet(stamp, arrives, node, k, told, "lost" if lost else "sent", len(self.entries)))
+        self._post(_Packet(stamp, arrives, node, k, told, "lost" if lost else "sent", len(self.entries)))
         if not lost and self.chance.is_doubled(k):
             arrives = stamp + self.chance.delay(k, second=True)
-            self._post(Packet(stamp, arrives, node, k, told, "duplicate", len(self.entries)))
+            self._post(_Packet(stamp, arrives, node, k, told, "duplicate", len(self.entries)))
 
-    def _post(self, packet: Packet) -> None:
+    def _post(self, packet: _Packet) -> None:
         lost = packet.kind == "lost"
-        self.entries.append(SentPacket(replace(packet, delivered_at=nan) if lost else packet))
+        self.entries.append(_SentPacket(replace(packet, delivered_at=nan) if lost else packet))
         if not lost or np.isin(self._own[packet.node], self._sampled).any():
             self.mailbox.post(replace(packet, kind="gap") if lost else packet)
 
     # -- delivering -------------------------------------------------------------------------------------------------
 
-    def _deliver(self, t: float, packet: Packet) -> None:
+    def _deliver(self, t: float, packet: _Packet) -> None:
         node, values, entry = packet.node, self._plan.values, self.entries[packet.place]
         checked = self.settings.sequence == "checked"
         again = packet.number in self._arrived[node]
@@ -274,7 +274,7 @@ class NetworkService:
                 self._plan.values[self._arriving][place] = received[reader.signal]
                 self._reads[place] = reader.next_sample(t, self._start)
 
-    def _message(self, listener: PacketListener, packet: Packet) -> EventMessage:
+    def _message(self, listener: PacketListener, packet: _Packet) -> EventMessage:
         """What a listener is told: the values of the packet, and of other nodes what was last received."""
         values = self._plan.values[self._held].copy()
         values[self._own[packet.node]] = packet.values
@@ -322,7 +322,7 @@ class NetworkService:
             for entry in self.entries[first:until]
         ]
 
-    def _outcomes(self, entry: SentPacket) -> dict[str, str]:
+    def _outcomes(self, entry: _SentPacket) -> dict[str, str]:
         node = entry.packet.node
         told = [*self._holding[node], *(one.component for one in self.listeners if node in one.nodes)]
         if entry.packet.kind == "lost":

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 Protocol = Literal["round-robin", "periodic", "try-once-discard", "quadratic"]
-DelayModel = Literal["constant", "uniform", "recorded", "correlated"]
-Sequences = Literal["checked", "ignored"]
+_DelayModel = Literal["constant", "uniform", "recorded", "correlated"]
+_Sequences = Literal["checked", "ignored"]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class NetworkSettings:
     period: float = 0.016
     offset: float = 0.0
     jitter: float = 0.0
-    delay_model: DelayModel = "constant"
+    delay_model: _DelayModel = "constant"
     delay: float = 0.0
     delay_spread: float = 0.0
     delay_correlation: float = 0.0
@@ -64,7 +64,7 @@ class NetworkSettings:
     loss_fraction: float = 0.0
     loss_burst: float | None = None
     duplicate_fraction: float = 0.0
-    sequence: Sequences = "checked"
+    sequence: _Sequences = "checked"
     seed: int = 0
 
     @property

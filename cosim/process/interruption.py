@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import Any
 
-PATIENCE = 1.0
+_PATIENCE = 1.0
 """One key may arrive twice, from the terminal and from who watches; a signal after so long means that somebody insists
 [s].
 """
@@ -48,7 +48,7 @@ class Interruption:
             signal.signal(signal.SIGINT, self._former)
 
     def _hear(self, _number: int, _frame: Any) -> None:
-        if self.came and monotonic() - self._since > PATIENCE:
+        if self.came and monotonic() - self._since > _PATIENCE:
             raise KeyboardInterrupt
         if not self.came:
             self.came, self._since = True, monotonic()

@@ -13,7 +13,7 @@ from math import isnan, nan
 from pathlib import Path
 
 PAGE = 1 << 16
-CALL, TIME, LIMIT, ENDED, USED = range(5)
+_CALL, TIME, LIMIT, ENDED, USED = range(5)
 """Cells of the page: number of the call, 0 for none; the time [s]; how long a call may last [s]; how the process ended;
 bytes of words."""
 TEXTS = 64
@@ -21,7 +21,7 @@ NOTE = PAGE // 2
 LONGEST = 80
 RUNNING = 0
 WRITE, READ, STEP, EVENT = range(4)
-OFTEN = ("setting inputs", "getting outputs", "doStep", "an event")
+_OFTEN = ("setting inputs", "getting outputs", "doStep", "an event")
 """What a component is called for in every step: their numbers follow one another."""
 
 
@@ -80,12 +80,12 @@ class LastCall:
         return self._numbers[key]
 
     def numbers(self, component: str) -> int:
-        """The number of the first of the calls `OFTEN`; `WRITE`, `READ`, `STEP` and `EVENT` are added to it.
+        """The number of the first of the calls `_OFTEN`; `WRITE`, `READ`, `STEP` and `EVENT` are added to it.
 
         Args:
             component: its name.
         """
-        key = component, OFTEN[0]
+        key = component, _OFTEN[0]
         if key not in self._numbers:
             self._numbers[key] = self._four(component) or self._unknown
         return self._numbers[key]
@@ -125,7 +125,7 @@ class LastCall:
 
     def _four(self, component: str) -> int:
         """Four numbers, one after the other; 0 where there is no room for all of them."""
-        first, *_, last = [self._add(component, what) for what in OFTEN]
+        first, *_, last = [self._add(component, what) for what in _OFTEN]
         return first if last else 0
 
     def _add(self, component: str, what: str) -> int:

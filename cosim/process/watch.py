@@ -20,13 +20,13 @@ from cosim.process.interruption import STOPPING
 from cosim.process.last_call import LAST_CALL
 
 ERROR = 2
-POLL = 0.1
+_POLL = 0.1
 """How often is looked at the other process [s]."""
 
 GRACE = 3.0
 """A call that has not returned so long after Ctrl-C is ended with its process [s]."""
 
-PARENT_DEATH = 1  # prctl: PR_SET_PDEATHSIG
+_PARENT_DEATH = 1  # prctl: PR_SET_PDEATHSIG
 
 
 def can_watch() -> bool:
@@ -71,7 +71,7 @@ def _end_with(parent: int) -> None:
         return
     import ctypes  # noqa: PLC0415 - the watching process does without
 
-    ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGTERM, 0, 0, 0)
+    ctypes.CDLL(None).prctl(_PARENT_DEATH, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGTERM)
 
@@ -119,11 +119,11 @@ class _Watch:
                 signal.set_wakeup_fd(-1)
                 return status
             begin = monotonic()
-            if select.select([read], [], [], POLL)[0]:
+            if select.select([read], [], [], _POLL)[0]:
                 with suppress(BlockingIOError):
                     os.read(read, 4096)
             self._check_duration(
-                min(monotonic() - begin, 2.0 * POLL)
+                min(monotonic() - begin, 2.0 * _POLL)
             )  # no longer: this program may have been stopped meanwhile
 
     def _hear(self, number: int, _frame: Any) -> None:

@@ -14,14 +14,44 @@ import pytest
 
 from cosim.errors import CosimError
 from cosim.pytest_plugin import options
-from cosim.pytest_plugin.baseline_names import baseline_name
 from cosim.pytest_plugin.records import Records, RegressionRecord, Status
 
 if TYPE_CHECKING:
     from cosim.baselines import Regression
     from cosim.baselines.call import Call
+import re
+from hashlib import sha256
 
 UPDATE = "If the new outputs are right, accept them with: pytest --fmu-baseline=update"
+
+
+_LONGEST = 120
+"""Characters of a name; some file systems end at 255, with folders and endings."""
+
+
+def baseline_name(node: str, call: str = "") -> str:
+    """The name of a baseline, without folder and ending.
+
+    Args:
+        node: of the test behind its file: ``test_brakes[wet]``, ``TestDrive::test_start``.
+        call: name or number of the call in a test that makes several; empty for the first without a name.
+
+    Returns:
+        ``test_brakes-wet``, ``TestDrive.test_start``, ``test_brakes-wet@second``. Where characters had to be replaced,
+        some characters of a digest follow, so that two tests never share a baseline.
+    """
+    plain = re.sub(r"\[(.*)\]$", r"-\1", node, flags=re.DOTALL).replace("::", ".")
+    name = _safe(plain) + (f"@{_safe(call)}" if call else "")
+    return name if len(name) <= _LONGEST else f"{name[:_LONGEST]}-{_digest(node + call)}"
+
+
+def _safe(text: str) -> str:
+    safe = re.sub(r"[^A-Za-z0-9._-]", "_", text)
+    return safe if safe == text and not text.endswith(".") else f"{safe}-{_digest(text)}"
+
+
+def _digest(text: str) -> str:
+    return sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
 
 
 class FmuRegression:

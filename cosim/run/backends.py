@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from fmus.build import BuildDraft
 
 NATIVE: Backend = "fmu3"
-IN_PYTHON: Backend = "block3"
-AT_A_TIME = 2
+_IN_PYTHON: Backend = "block3"
+_AT_A_TIME = 2
 """Compilers that work at once; each takes a processor and some hundred megabytes for seconds."""
 
 FAULTS = (OSError, RuntimeError, ValueError, TracingError)
@@ -70,11 +70,11 @@ def intended(table: ComponentTable, system: HybridSystem) -> Backend:
     """
     if table.backend is not None:
         return table.backend
-    return NATIVE if system.traceable and _missing_compiler() is None else IN_PYTHON
+    return NATIVE if system.traceable and _missing_compiler() is None else _IN_PYTHON
 
 
 def realise(requests: Mapping[str, Request], tell: Tell) -> Realised:
-    """Decide, and build the FMUs that are not in the cache, `AT_A_TIME` at once.
+    """Decide, and build the FMUs that are not in the cache, `_AT_A_TIME` at once.
 
     Args:
         requests: by component. tell: told of each FMU that is built, and how long that took.
@@ -90,7 +90,7 @@ def realise(requests: Mapping[str, Request], tell: Tell) -> Realised:
     for name, fault in faults.items():
         if requests[name].table.backend is not None:
             raise cannot_build(requests[name].where, requests[name].system, fault) from fault
-        made.kinds[name] = IN_PYTHON
+        made.kinds[name] = _IN_PYTHON
     _note(requests, made, faults)
     return made
 
@@ -119,7 +119,7 @@ def _missing_compiler() -> str | None:
 
 def _note(requests: Mapping[str, Request], made: Realised, faults: Mapping[str, Exception]) -> None:
     """Say why models are blocks that nobody asked to be blocks."""
-    blocks = [name for name, kind in made.kinds.items() if kind == IN_PYTHON and requests[name].table.backend is None]
+    blocks = [name for name, kind in made.kinds.items() if kind == _IN_PYTHON and requests[name].table.backend is None]
     opaque = [name for name in blocks if not requests[name].system.traceable]
     if opaque:
         made.notes.append(f"Cannot be traced, so they run as Python blocks: {', '.join(opaque)}.")
@@ -142,7 +142,7 @@ def _build(
     """
     entries: dict[str, CacheEntry] = {}
     faults: dict[str, Exception] = {}
-    with ThreadPoolExecutor(AT_A_TIME) as pool:
+    with ThreadPoolExecutor(_AT_A_TIME) as pool:
         building = _Building(pool, tell)
         try:
             for name, request in requests.items():

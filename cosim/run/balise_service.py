@@ -26,14 +26,14 @@ from plant_models.disk_cache.identity import identity
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 BALISE_EVENT = "balise"
-ASKED_FOR = "asked for in the scenario"
-AS_RECORDED = "they are told as they were in an earlier run"
-PROBING = ("fmus", "cosim/components")
+_ASKED_FOR = "asked for in the scenario"
+_AS_RECORDED = "they are told as they were in an earlier run"
+_PROBING = ("fmus", "cosim/components")
 """The code by which plants are probed."""
-NO_ERROR = PlantError()
-UNTOUCHED = ("early-return", "interpolate")
+_NO_ERROR = PlantError()
+_UNTOUCHED = ("early-return", "interpolate")
 """Methods that neither cut nor redo the steps of the plant."""
-PLAYED_BACK = "the plant is a recording, which goes to any time and back"
+_PLAYED_BACK = "the plant is a recording, which goes to any time and back"
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Choice:
     reason: str
     probe: ProbeReport | None = None
     warnings: Sequence[str] = ()
-    error: PlantError = NO_ERROR
+    error: PlantError = _NO_ERROR
 
     def to_dict(self) -> dict[str, str]:
         """For the summary."""
@@ -162,16 +162,16 @@ def choose_method(
         start: start of the run [s]. step: communication step [s].
     """
     if table.layout == "recorded":
-        return Choice("recorded", AS_RECORDED)
+        return Choice("recorded", _AS_RECORDED)
     asked: Method | None = None if table.method == "auto" else table.method
     # a tolerance tells of a solver: it is looked at
-    if asked is not None and asked in UNTOUCHED and component.tolerance is None:
-        return Choice(asked, ASKED_FOR, error=plant_error(table, asked, component, start))
+    if asked is not None and asked in _UNTOUCHED and component.tolerance is None:
+        return Choice(asked, _ASKED_FOR, error=plant_error(table, asked, component, start))
     if component.kind == RECORDING:
-        return Choice("rollback", PLAYED_BACK) if asked is None else Choice(asked, ASKED_FOR)
+        return Choice("rollback", _PLAYED_BACK) if asked is None else Choice(asked, _ASKED_FOR)
     report = known_probe(make, starts, start, step)
     chosen, reason = choose(report.honest_step, report.restores, table.clock)
-    method, why = (chosen, reason) if asked is None else (asked, ASKED_FOR)
+    method, why = (chosen, reason) if asked is None else (asked, _ASKED_FOR)
     error = plant_error(table, method, component, start, report)
     warnings = []
     if asked is not None and error.unknown:
@@ -188,7 +188,7 @@ def known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start:
     Args:
         make, starts, start, step: as for `choose_method`.
     """
-    key = identity(make, starts, start, step, code=PROBING)
+    key = identity(make, starts, start, step, code=_PROBING)
     known = None if key is None else recall("probe", key)
     if known is not None:
         return ProbeReport(**known | {"remarks": tuple(known["remarks"])})
@@ -215,7 +215,7 @@ def plant_error(
     spread, drift = (scale * seen.get(signal, 0.0) for seen in (report.spread, report.drift))
     if signal in report.spread and spread == 0.0:
         tolerance = 0.0
-    return PlantError(0.0 if method in UNTOUCHED else spread, tolerance, drift, start, unknown)
+    return PlantError(0.0 if method in _UNTOUCHED else spread, tolerance, drift, start, unknown)
 
 
 def _why_unknown(method: Method, report: ProbeReport | None, position: str, tolerance: float) -> str:
@@ -224,7 +224,7 @@ def _why_unknown(method: Method, report: ProbeReport | None, position: str, tole
     """
     if method == "early-return" and not tolerance:
         return "the plant itself says when it passed, and knows of no tolerance"
-    if report is None or method in UNTOUCHED:
+    if report is None or method in _UNTOUCHED:
         return ""
     if not report.honest_step:
         return "the probe saw steps of other lengths go wrong"

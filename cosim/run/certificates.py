@@ -14,16 +14,16 @@ from cosim.scenario.scenario_tables import ComponentTable
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
 
-WALKING = 1.0
+_WALKING = 1.0
 """Who is certified for the gaps of a train at this speed [m/s] is certified for all that a moving train meets."""
-DETECTORS = "fmu_observer.detection."
+_DETECTORS = "fmu_observer.detection."
 """Room of the models that correct no state by a gain, so that there is nothing to certify."""
 UNKNOWN = (
     "{}: not known before the run whether it stays stable over the gaps between its samples: an FMU, or a model "
     "without a method certify, does not say. Watch its errors."
 )
 ROUNDING = 1e-9  # relative, of distances between positions
-ASKED_FOR_LIMITS_ONLY = 0.5
+_ASKED_FOR_LIMITS_ONLY = 0.5
 """A gap to ask for [s] where only the limits of a certificate are of interest; they do not depend on it."""
 
 
@@ -50,7 +50,7 @@ def check_certificates(
     for name, gap in gaps.items():
         table = components[name]
         system = make_system(table, where)
-        if type(system).__module__.startswith(DETECTORS):
+        if type(system).__module__.startswith(_DETECTORS):
             continue  # it has no gain that a gap could make unstable
         if not hasattr(system, "certify"):
             warnings.append(UNKNOWN.format(name))
@@ -71,12 +71,12 @@ def _known_judgement(name: str, table: ComponentTable, system: Any, gap: Expecte
 
 def _judge(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> tuple[dict[str, Any], list[str]]:
     """Certificate of one observer as plain data, and what speaks against it, with what would be certified instead."""
-    asked = ASKED_FOR_LIMITS_ONLY if gap.seconds is None else gap.seconds
+    asked = _ASKED_FOR_LIMITS_ONLY if gap.seconds is None else gap.seconds
     in_use = {"parameters": given_parameters(table, system), "preset": table.preset}
     certificate = system.certify(asked, **in_use)
     if gap.seconds is None and gap.distance is not None and certificate.aperiodic_limit == inf:
         # no limit so far: ask for gaps like these
-        certificate = system.certify(max(asked, gap.distance / WALKING), **in_use)
+        certificate = system.certify(max(asked, gap.distance / _WALKING), **in_use)
         if certificate.holds:
             return certificate.to_dict() | {"explanation": certificate.explain()}, []
     data: dict[str, Any] = certificate.to_dict() | {"explanation": certificate.explain()}

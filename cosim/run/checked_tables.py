@@ -4,11 +4,14 @@ are coupled, to the tables with the roles and thresholds that were left open.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
+from cosim.components.component import Component
 from cosim.coupling.connection import Link
-from cosim.expectations.check_expectations import check_expectations
+from cosim.errors import CosimError, ScenarioError
+from cosim.expectations.before import Before
 from cosim.run.balise_service import BaliseRoles
 from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled
@@ -17,6 +20,64 @@ from cosim.run.remarks import Remarks
 from cosim.run.signal_roles import check_roles, inferred_roles, with_roles
 from cosim.run.step_schedule import idle_settings
 from cosim.run.task import RunTask
+from plant_models.explained_error import explained
+
+if TYPE_CHECKING:
+    from cosim.scenario.schema import ScenarioTable
+
+
+def check_expectations(
+    table: ScenarioTable, components: Mapping[str, Component], receivers: Sequence[str], where: str
+) -> ScenarioTable:
+    """Check the expectations of a scenario against its components.
+
+    Args:
+        table: the scenario. components: by name. receivers: of balise telegrams. where: place for messages.
+
+    Returns:
+        The scenario, with the thresholds of indicators that were left to us.
+
+    Raises:
+        ScenarioError: a signal, observer or receiver does not exist, a window lies outside the run, or an expectation
+        can never
+            be judged; one line for each expectation at fault.
+    """
+    faults, items = [], []
+    before = _before(table, components, receivers)
+    for place, item in enumerate(table.expect, start=1):
+        title = f" ({item.name})" if item.name else ""
+        try:
+            items.append(_prepared(item, before))
+        except CosimError as error:
+            faults.append(f"{where}: expect, number {place}{title}, {item.check!r}: {error}")
+    if faults:
+        raise ScenarioError("\n".join(faults))
+    return table.model_copy(update={"expect": items})
+
+
+def _prepared(item: Any, before: Before) -> Any:
+    try:
+        prepared = item.prepare(before)
+    except CosimError:
+        raise
+    except Exception as error:  # code of others
+        raise CosimError(f"prepare() failed: {explained(error)}") from error
+    if not isinstance(prepared, type(item)):
+        raise CosimError(f"prepare() returned {type(prepared).__name__}; expected itself or another {item.check!r}.")
+    return prepared
+
+
+def _before(table: ScenarioTable, components: Mapping[str, Component], receivers: Sequence[str]) -> Before:
+    return Before(
+        start=table.start,
+        stop=table.stop,
+        period=table.step * table.master.record_every,
+        report=table.report,
+        tables=table.components,
+        components=components,
+        receivers=None if table.balises is None else receivers,
+        certificates=table.certificates,
+    )
 
 
 @dataclass(frozen=True)

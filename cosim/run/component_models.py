@@ -34,21 +34,14 @@ from plant_models.user_file import UserFileError, make
 OWN_PACKAGES = ("plant_models", "fmu_observer")
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
 
-LASTING = 100
+_LASTING = 100
 """Systems that are kept; a sweep over options makes ever new ones."""
 
 _systems: dict[tuple[type[HybridSystem], str], HybridSystem] = {}
 
 
-def model_of(table: ComponentTable, where: str) -> Any:
-    """The class or instance that a component's table names as ``model`` or ``observer``; None where it names neither.
-
-    Args:
-        table: of the component. where: place for messages.
-
-    Raises:
-        ScenarioError: there is no such model, or it cannot be loaded.
-    """
+def _model_of(table: ComponentTable, where: str) -> Any:
+    """The class or instance that a table names as ``model`` or ``observer``; None where it names neither."""
     rooms = {"model": plant_models.PLANTS, "observer": fmu_observer.OBSERVERS}
     for kind, other in (("model", "observer"), ("observer", "model")):
         name = getattr(table, kind)
@@ -71,7 +64,7 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
     Raises:
         ScenarioError: unknown model, option or preset.
     """
-    model = model_of(table, where)
+    model = _model_of(table, where)
     if not descends_from(model, plant_models.SYSTEM):
         return None
     name = table.model or table.observer
@@ -101,7 +94,7 @@ def make_declared(table: ComponentTable, where: str) -> Any:
     system = make_system(table, where)
     if system is not None or (table.model or table.observer) is None:
         return system
-    return PythonModel(model_of(table, where), table.options, where)
+    return PythonModel(_model_of(table, where), table.options, where)
 
 
 def component_factories(
@@ -132,7 +125,7 @@ def component_factories(
         if table.recording is not None:
             recording = open_recording(name, table, folder, places[name], span)
             factories[name] = partial(RecordingComponent, name, recording)
-            made.notes += left_out_note(name, recording)
+            made.notes += _left_out_note(name, recording)
         elif name in systems:
             factories[name] = _of_system(name, table, systems[name], made)
         else:
@@ -216,12 +209,8 @@ def open_recording(
     return load_recording(path, name, table.component, table.interpolation, span, where, table.can_be_missing)
 
 
-def left_out_note(name: str, recording: Recording) -> list[str]:
-    """Which columns of a recording are not there, if any.
-
-    Args:
-        name: of the component.
-    """
+def _left_out_note(name: str, recording: Recording) -> list[str]:
+    """Which columns of a recording are not there, if any."""
     columns = "; ".join(f"{column}: {why}" for column, why in recording.left_out.items())
     return [f"{name}: columns that cannot be played back are left out. {columns}."] if columns else []
 
@@ -261,7 +250,7 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     options = _for_its_period(type(system), table.options, table)
     options = move_option_files(options, lambda path: f"{path} {files_digest(name.folder / path)}")
     lasting = _systems.setdefault((type(system), repr(sorted(options.items()))), system)
-    while len(_systems) > LASTING:
+    while len(_systems) > _LASTING:
         _systems.pop(next(iter(_systems)))
     return lasting
 

@@ -2,34 +2,195 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
+from cosim.components.component import Component
 from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.diagnostics.call_log import CallLog
-from cosim.diagnostics.messages import in_order
+from cosim.diagnostics.messages import FAULTS, in_order
 from cosim.errors import CosimError
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judge import judge
 from cosim.process.interruption import Interruption
-from cosim.results.result import Result
-from cosim.results.result_data import BaliseRecord
+from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import InFormerUnits, in_si
-from cosim.run.after_run import missed_samples, warnings_after
-from cosim.run.balise_summary import all_telegrams, balise_summary, certificates_after, largest_gap
 from cosim.run.network_remarks import network_summary
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.run.premises import premise_findings
 from cosim.run.ready import Ready
 from cosim.run.remarks import Remarks
+from cosim.run.services import Services
 from cosim.run.signal_roles import report_spec
 from cosim.run.summary import judged_summary, run_summary
 from cosim.structure.divergence import explained_failure
+from fmu_observer.annotated_variable import declared_warnings
+from plant_models.hybrid.missing import MISSED_SAMPLES
+from plant_models.hybrid.output_warning import OutputWarning
+
+_DOUBTS = {"doubted": "used", "ignored": "ignored"}  # what became of a telegram that was doubted, by its outcome
+_NAMED_DOUBTS = 5
+
+
+def _all_telegrams(services: Services) -> list[BaliseRecord]:
+    """Everything that was passed: delivered, missed, and still on its way at the end."""
+    if services.balises is None:
+        return []
+    mailbox = services.balises.mailbox
+    waiting = [replace(e, outcomes=dict.fromkeys(_receivers(services), "undelivered")) for e in mailbox.waiting]
+    return [*mailbox.log, *waiting]
+
+
+def _largest_gap(services: Services, start: float, telegrams: Sequence[BaliseRecord]) -> float | None:
+    """The longest time without a balise [s]; None where none was passed, and without balises.
+
+    Args:
+        services: of the run. start: of the run [s]. telegrams: of the run.
+    """
+    if services.balises is None:
+        return None
+    stamps = sorted(telegram.stamp for telegram in telegrams if telegram.kind == "true")
+    return max((b - a for a, b in pairwise([start, *stamps])), default=None)
+
+
+def _certificates_after(
+    certificates: Mapping[str, dict[str, Any]], services: Services, gap: float | None
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Certificates with the longest gap that receivers of telegrams met.
+
+    Args:
+        certificates: by component. services: of the run. gap: the longest between balises [s], None for none.
+
+    Returns:
+        Certificates by component, and warnings of gaps beyond what is certified.
+    """
+    found, beyond, receivers = dict(certificates), list[str](), _receivers(services)
+    for name, certificate in certificates.items():
+        if name not in receivers:
+            continue
+        limit = certificate["certified_up_to"]
+        found[name] = certificate | {"largest_gap_seen": gap}
+        if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:
+            beyond.append(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
+    return found, beyond
+
+
+def _balise_summary(services: Services, gap: float | None) -> dict[str, Any]:
+    """Method, probe and gap, for the summary of a run.
+
+    Args:
+        services: of the run. gap: the longest between balises [s], None for none.
+    """
+    choice, service = services.choice, services.balises
+    if choice is None or service is None:
+        nothing = dict.fromkeys(("localisation", "probe", "redo_differences", "largest_gap"))
+        return {**nothing, "undelivered": 0}
+    return {
+        "localisation": choice.to_dict(),
+        "probe": None if choice.probe is None else choice.probe.to_dict(),
+        "redo_differences": service.localiser.watch.redo_differences,
+        "largest_gap": gap,
+        "undelivered": len(service.mailbox.waiting),
+    }
+
+
+def _receivers(services: Services) -> list[str]:
+    return [] if services.balises is None else [r.planned.component.name for r in services.balises.receivers]
+
+
+def _warnings_after(
+    components: Mapping[str, Component],
+    telegrams: Sequence[BaliseRecord],
+    changed_in_steps: Set[str],
+    table: np.ndarray,
+) -> Iterator[str]:
+    """Texts that warn of what happened on the way."""
+    for name, component in components.items():
+        for signal, warning in declared_warnings(component.description).items():
+            yield from _declared(table, name, signal, warning)
+    yield from _trespasses(components, changed_in_steps)
+    for name, component in components.items():
+        rejected = (component.outcomes() or {}).get("rejected", 0)
+        if rejected:
+            yield f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays."
+    for name in components:
+        yield from _doubted(name, telegrams)
+    for name, component in components.items():
+        wrong = {status: count for status, count in component.messages.counts.items() if status in FAULTS}
+        if wrong:
+            counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
+            yield f"{name} logged {counts}; the last says: {component.messages.reason}"
+
+
+def _missed_samples(components: Mapping[str, Component]) -> Iterator[str]:
+    """Notes of the measurements that were missing, one a component that left some out."""
+    for name, component in components.items():
+        count = component.missed_samples().get(MISSED_SAMPLES, 0)
+        if count:
+            yield f"{name}: {count} measurements were missing at its samples, and left out."
+
+
+def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning) -> Iterator[str]:
+    """What an output warns of: what it never reached, or the first row that is not zero and the values there."""
+    column, fields = f"{name}.{signal}", table.dtype.names or ()
+    if column not in fields or not len(table):
+        return
+    values = np.asarray(table[column], dtype=float)
+    if warning.reaches is not None:
+        if np.nanmax(values, initial=-np.inf) < warning.reaches:
+            yield f"{name}: {warning.text}; {signal} came to {np.nanmax(values):.6g} of {warning.reaches:.6g}."
+        return
+    raised = np.flatnonzero(values != 0.0)
+    if warning.at_end:
+        raised = raised[raised == len(values) - 1]
+    if not len(raised):
+        return
+    time, first = np.asarray(table["time"], dtype=float), raised[0]
+    shown = [other for other in warning.shows if f"{name}.{other}" in fields]
+    told = ", ".join(f"{other} = {float(table[f'{name}.{other}'][first]):.6g}" for other in shown)
+    beside = f" ({told})" if told else ""
+    if warning.at_end:
+        yield f"{name}: {warning.text}; seen at the end, {time[-1]:.6g} s{beside}."
+        return
+    seconds = float(np.diff(time)[values[:-1] != 0.0].sum())
+    yield f"{name}: {warning.text}; first at {time[first]:.6g} s{beside}, for {seconds:.3g} s in all."
+
+
+def _trespasses(components: Mapping[str, Component], in_steps: Set[str]) -> Iterator[str]:
+    """What was changed for everybody in this process, and put back."""
+    for name, component in components.items():
+        for changed, call in component.trespasses.items():
+            yield f"{name}: {call} changed {changed} of the whole program; it was put back."
+    native = [name for name, component in components.items() if component.kind == "FMU"]
+    for changed in sorted(in_steps):
+        yield (
+            f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
+            "every step: other components, and their numbers, may have been touched."
+        )
+
+
+def _doubted(name: str, telegrams: Sequence[BaliseRecord]) -> Iterator[str]:
+    """Which telegrams an observer did not believe."""
+    parts, count = [], 0
+    for outcome, what in _DOUBTS.items():
+        found = [e for e in telegrams if e.outcomes.get(name) == outcome]
+        if found:
+            first = ", ".join(f"{e.stamp:.6g} s" for e in found[:_NAMED_DOUBTS])
+            more = ", ..." if len(found) > _NAMED_DOUBTS else ""
+            parts.append(f"{len(found)} {what} (stamped {first}{more})")
+            count += len(found)
+    if parts:
+        plural = "telegram" if count == 1 else "telegrams"
+        yield f"{name} doubted {count} {plural}: {', '.join(parts)}; see docs/telegram_gate.md."
 
 
 @dataclass(frozen=True)
-class Executed:
+class _Executed:
     """What stepping left.
 
     Args:
@@ -53,10 +214,10 @@ def execute(
     recorded = _as_recorded(ready)  # before a stream is finished: to ask for its rows again would reserve more
     premises = _remark_model(ready, recorded, remarks)
     summary = run_summary(ready.task, ready.master, setup_seconds)
-    telegrams, spec = all_telegrams(ready.services), report_spec(ready.task.table)
+    telegrams, spec = _all_telegrams(ready.services), report_spec(ready.task.table)
     result = _in_si(ready, telegrams, executed.failure)
     remarks.warn(*result_warnings(replace(result, events=[]), spec))  # judged by its rows alone
-    remarks.warn(*warnings_after(ready.coupled.components, telegrams, executed.changed, recorded))
+    remarks.warn(*_warnings_after(ready.coupled.components, telegrams, executed.changed, recorded))
     if call_log is not None and call_log.broken is not None:
         remarks.warn(call_log.broken)
     summary |= _summary(ready, result, spec, premises, remarks)
@@ -67,7 +228,7 @@ def execute(
     return outcome.with_summary(expectations=[judged.to_data() for judged in judge(ready.task.table, outcome)])
 
 
-def _step(ready: Ready, interruption: Interruption) -> Executed:
+def _step(ready: Ready, interruption: Interruption) -> _Executed:
     """Run the master to its end or its first failure."""
     failure: str | None = None
     surroundings = SurroundingsOfSteps()
@@ -83,7 +244,7 @@ def _step(ready: Ready, interruption: Interruption) -> Executed:
         failure = explained_failure(error, ready.master.plan, _as_recorded(ready))
     except KeyboardInterrupt:
         failure = INTERRUPTED
-    return Executed(failure, frozenset(surroundings.finish()))
+    return _Executed(failure, frozenset(surroundings.finish()))
 
 
 def _remark_model(ready: Ready, recorded: Any, remarks: Remarks) -> dict[str, dict[str, Any]]:
@@ -101,11 +262,11 @@ def _summary(
 ) -> dict[str, Any]:
     """What is known of a run once it is over."""
     start = ready.master.axis.start
-    gap = largest_gap(ready.services, start, result.events)
-    certificates, beyond = certificates_after(ready.checked.certificates, ready.services, gap)
+    gap = _largest_gap(ready.services, start, result.events)
+    certificates, beyond = _certificates_after(ready.checked.certificates, ready.services, gap)
     remarks.warn(*beyond)
-    remarks.note(*missed_samples(ready.coupled.components))
-    found = balise_summary(ready.services, gap)
+    remarks.note(*_missed_samples(ready.coupled.components))
+    found = _balise_summary(ready.services, gap)
     found |= {"certificates": certificates, "premises": premises, "warnings": remarks.warnings, "notes": remarks.notes}
     found |= judged_summary(result, spec)
     if ready.coupled.network is not None:

@@ -45,7 +45,7 @@ class ExpectedGap:
     never: bool = False
 
 
-NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
+_NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
 UNTOLD = ExpectedGap(None, "nobody asks for it: there is no certificate")
 
 
@@ -205,12 +205,14 @@ def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedG
     """
     if isinstance(layout, RecordedLayout):
         gaps = np.diff([start, *layout.instants[layout.instants > start]])
-        return ExpectedGap(float(gaps.max()), "longest gap between the recorded telegrams") if len(gaps) else NO_BALISES
+        return (
+            ExpectedGap(float(gaps.max()), "longest gap between the recorded telegrams") if len(gaps) else _NO_BALISES
+        )
     if table.missed_fraction > 0.0 or table.missed:
         return ExpectedGap(None, "balises are missed by chance or by name, so a gap may be of any length")
     if isinstance(layout, InstantLayout):
         gaps = np.diff([start, *layout.instants[layout.instants > start]])
-        return ExpectedGap(float(gaps.max()), "longest gap between the balise instants") if len(gaps) else NO_BALISES
+        return ExpectedGap(float(gaps.max()), "longest gap between the balise instants") if len(gaps) else _NO_BALISES
     positions = layout.positions
     if "track_start" in table.model_fields_set:  # a train that begins there does not meet what lies before
         positions = positions[positions >= table.track_start]

@@ -8,22 +8,52 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
+
+from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
+from cosim.components.description import read_description
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.logged_slave import log_calls
 from cosim.components.start_values import StartValue
 from cosim.coupling.instants import followed
 from cosim.diagnostics.call_log import CallLog
+from cosim.errors import CouplingError
 from cosim.run.component_models import component_factories
 from cosim.run.coupled import Coupled
-from cosim.run.once_per_process import check_instances
 from cosim.run.remarks import Remarks
 from cosim.run.starts import component_starts
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
-from fmus.fmi.capabilities import tool_warning
+from fmus.fmi.capabilities import read_capabilities, tool_warning
 from fmus.fmi.sense import doubled_names
+
+
+def _check_instances(files: Mapping[str, Path], where: str) -> None:
+    """Refuse a second component of an FMU that allows one instance in a process (canBeInstantiatedOnlyOncePerProcess).
+
+    Two files are the same FMU where model identifier and GUID (instantiation token) agree.
+    """
+    if len(files) < 2:
+        return
+    first: dict[tuple[str, str], str] = {}
+    descriptions: dict[Path, ModelDescription] = {}
+    for name, path in files.items():
+        if path not in descriptions:
+            descriptions[path] = read_description(path, name)
+        description = descriptions[path]
+        if not read_capabilities(description).canBeInstantiatedOnlyOncePerProcess:
+            continue
+        identity = (description.coSimulation.modelIdentifier, str(description.guid))
+        if identity in first:
+            raise CouplingError(
+                f"{where}: components {first[identity]!r} and {name!r} are the same FMU ({path.name}), which can be "
+                f"instantiated "
+                "only once per process (canBeInstantiatedOnlyOncePerProcess). Ask its vendor for one without this "
+                "limit."
+            )
+        first[identity] = name
 
 
 @dataclass(frozen=True)
@@ -57,7 +87,7 @@ def load_components(
     factories, notes = component_factories(table.components, folder, task.where, building, span, table.tolerance)
     remarks.note(*notes)
     files = {name: (folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
-    check_instances(files, task.where)
+    _check_instances(files, task.where)
     components: dict[str, Component] = {}
     starts: dict[str, dict[str, StartValue]] = {}
     resources.callback(_free, components)

@@ -26,18 +26,18 @@ from fmus.versions import versions
 from plant_models.hybrid.noise import RUN_SEED
 from plant_models.user_file import names_code
 
-FILES_UP_TO = 50e6
+_FILES_UP_TO = 50e6
 """Files of others up to this size are copied into the results [bytes]."""
 
 HEADER = (
     "# The scenario of these results, with what it included and what was overridden. cosim rerun runs it again.\n\n"
 )
-UNHASHED = ("summary", "messages", "report", "calls")
-Seal = Callable[[Mapping[str, Path], Mapping[str, Any]], None]
+_UNHASHED = ("summary", "messages", "report", "calls")
+_Seal = Callable[[Mapping[str, Path], Mapping[str, Any]], None]
 
 
 @contextmanager
-def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = FILES_UP_TO) -> Iterator[Seal]:
+def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = _FILES_UP_TO) -> Iterator[_Seal]:
     """``made_from`` is exchanged with the results: prepared before, put in place after, the former one back on a
     failure.
 
@@ -161,7 +161,7 @@ def _keep_part(path: Path, copy: str, origin: Origin, new: Path, files_up_to: fl
 
 def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summary: Mapping[str, Any]) -> None:
     """Add what is known of the results and write the manifest."""
-    results = {p.name: {"sha256": sha256(p), "size": p.stat().st_size} for k, p in paths.items() if k not in UNHASHED}
+    results = {p.name: {"sha256": sha256(p), "size": p.stat().st_size} for k, p in paths.items() if k not in _UNHASHED}
     components = [
         {k: c.get(k) for k in ("name", "kind", "model", "fmi_version", "guid")} for c in summary.get("components", ())
     ]

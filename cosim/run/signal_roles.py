@@ -25,7 +25,7 @@ ROLES = {
 }
 
 
-OF_THE_PLANT = {"true_slip": "slip", "true_adhesion_force": "adhesion_force"}
+_OF_THE_PLANT = {"true_slip": "slip", "true_adhesion_force": "adhesion_force"}
 """Outputs of the watched plant that have a role where they have this name and the unit of the role."""
 ODOMETER, REFERENCE = "odometer", "speed_reference"
 
@@ -51,7 +51,7 @@ def inferred_roles(
         of the plant that are called so; the odometer from what all observers listen to; the reference from the one
         output called so.
     """
-    of_the_plant = {role: f"{plant}.{signal}" for role, signal in OF_THE_PLANT.items()} if plant else {}
+    of_the_plant = {role: f"{plant}.{signal}" for role, signal in _OF_THE_PLANT.items()} if plant else {}
     references = (
         f"{name}.{REFERENCE}" for name, component in components.items() if REFERENCE in component.names("output")
     )

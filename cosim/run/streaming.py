@@ -27,15 +27,8 @@ Streaming = tuple[Path, Callable[[], None]]
 """The folder to stream to, and what is called once this has begun: nothing of a former run is in it then."""
 
 
-def streaming_to(directory: str | Path, origin: Origin) -> Streaming:
-    """What a run needs to stream; the folder is made and nothing in it changed yet.
-
-    Args:
-        directory: the results folder. origin: of the run.
-
-    Raises:
-        OutputError: the folder cannot be written.
-    """
+def _streaming_to(directory: str | Path, origin: Origin) -> Streaming:
+    """What a run needs to stream; the folder is made and nothing in it changed yet."""
 
     def begun() -> None:
         with renewed(directory, origin) as seal:
@@ -58,7 +51,7 @@ def where_to(
     """
     if stream is not None:
         folder = Path(stream).absolute()  # an FMU may change the working directory
-        return folder, streaming_to(folder, origin)
+        return folder, _streaming_to(folder, origin)
     return None, None if spare is None else (Path(spare).absolute(), lambda: None)
 
 
@@ -102,7 +95,7 @@ def ending(
 
     def finish(outcome: Outcome) -> Outcome:
         outcome = replace(outcome, origin=origin)
-        outcome = outcome if folder is None else finish_stream(outcome, folder, warn)
+        outcome = outcome if folder is None else _finish_stream(outcome, folder, warn)
         if finished is not None:
             finished(outcome)
         return outcome
@@ -110,15 +103,9 @@ def ending(
     return finish
 
 
-def finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str], None]) -> Outcome:
+def _finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str], None]) -> Outcome:
     """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning
     says so.
-
-    Args:
-        directory: results folder. warn: called with each warning.
-
-    Returns:
-        The outcome, whose table is written as ``npy``, and in other formats only where the scenario asks for them.
     """
     assert outcome.origin is not None
     asked = outcome.tables if "tables" in outcome.origin.table.report.model_fields_set else ()

@@ -21,7 +21,7 @@ from cosim.scenario.toml_file import read_toml
 
 CONNECTIONS = "connections"
 Key = tuple[str, ...]
-NUMBERED = re.compile(r"connections, line (\d+)")
+_NUMBERED = re.compile(r"connections, line (\d+)")
 NAMED = re.compile(r"[A-Za-z_][\w.]*")
 
 
@@ -62,7 +62,7 @@ def attribute(message: str, where: str, places: Mapping[Key, str]) -> str:
 
 def _place(text: str, places: Mapping[Key, str]) -> str | None:
     """The file that holds the key a message begins with."""
-    numbered, named = NUMBERED.match(text), NAMED.match(text)
+    numbered, named = _NUMBERED.match(text), NAMED.match(text)
     if numbered is not None:
         return places.get((CONNECTIONS, str(int(numbered[1]) - 1)))
     keys = tuple(named[0].split(".")) if named is not None else ()

@@ -13,7 +13,7 @@ from typing import Any
 
 from cosim.errors import ScenarioError, nearest
 
-ORIGINS = ("fmu", "model", "observer", "recording")
+_ORIGINS = ("fmu", "model", "observer", "recording")
 FILES = ("fmu", "recording")
 BETWEEN_TARGETS = re.compile(r",(?![^\[\]]*\])")
 """A comma, but not one between the indices of an array element."""
@@ -63,7 +63,7 @@ def _is_another(before: Mapping[str, Any], after: Mapping[str, Any]) -> bool:
 
     Another file of an FMU is not another model: a new delivery keeps its parameters.
     """
-    named, former = ({key for key in ORIGINS if key in table} for table in (after, before))
+    named, former = ({key for key in _ORIGINS if key in table} for table in (after, before))
     return bool(named) and (named != former or any(before[key] != after[key] for key in named - set(FILES)))
 
 

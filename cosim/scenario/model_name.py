@@ -19,16 +19,12 @@ from plant_models.user_file import Expected, UserFileError, load_class, name_of,
 
 EXPECTED = Expected(
     "subclass of HybridSystem or class with step(t, inputs, dt)",
-    lambda found: isinstance(found, type) and not isabstract(found) and is_model(found),
+    lambda found: isinstance(found, type) and not isabstract(found) and _is_model(found),
 )
 
 
-def is_model(found: Any) -> bool:
-    """Whether an object is a hybrid system or can be stepped as plain Python, or is a class of such.
-
-    Args:
-        found: a class or an instance.
-    """
+def _is_model(found: Any) -> bool:
+    """Whether an object is a hybrid system or can be stepped as plain Python, or is a class of such."""
     return descends_from(found, SYSTEM) or is_python_model(found)
 
 
@@ -57,7 +53,7 @@ class ModelName(str):
             return given
         if isinstance(given, str):
             name = cls(given)
-        elif is_model(given):
+        elif _is_model(given):
             name = cls(_findable(given))
             name.given = given
         else:
@@ -128,4 +124,4 @@ def named(model: Any) -> Any:
     Args:
         model: as a user gives it.
     """
-    return model if isinstance(model, str) or not is_model(model) else ModelName.of(model)
+    return model if isinstance(model, str) or not _is_model(model) else ModelName.of(model)

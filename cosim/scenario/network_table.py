@@ -153,7 +153,7 @@ def network_settings(table: NetworkTable, folder: Path, where: str) -> NetworkSe
         offset=table.offset,
         jitter=table.jitter,
         delay_correlation=table.delay_correlation,
-        delays=() if file is None else read_delays(file, f"{where}: network.delay_file"),
+        delays=() if file is None else _read_delays(file, f"{where}: network.delay_file"),
         equalise=table.equalise,
         loss_fraction=table.loss_fraction,
         loss_burst=table.loss_burst,
@@ -164,15 +164,8 @@ def network_settings(table: NetworkTable, folder: Path, where: str) -> NetworkSe
     )
 
 
-def read_delays(path: Path, where: str) -> list[float]:
-    """Recorded delays [s] from a CSV file with the column ``delay``.
-
-    Args:
-        path: of the file. where: place for messages.
-
-    Raises:
-        ScenarioError: the file cannot be read, has no such column or no row, or a delay is negative.
-    """
+def _read_delays(path: Path, where: str) -> list[float]:
+    """Recorded delays [s] from a CSV file with the column ``delay``."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.DictReader(stream, skipinitialspace=True)

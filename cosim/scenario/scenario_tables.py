@@ -275,7 +275,7 @@ class MeasureTable(TomlTable):
     unit: str | None = None
 
 
-MeasureItem = Annotated[
+_MeasureItem = Annotated[
     MeasureTable, BeforeValidator(lambda given: {"measure": given} if isinstance(given, str) else given)
 ]
 
@@ -300,5 +300,5 @@ class ReportTable(TomlTable):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
-    measures: list[MeasureItem] = []
+    measures: list[_MeasureItem] = []
     tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]

@@ -52,7 +52,7 @@ def _adapter(kind: type[Expectation]) -> TypeAdapter[dict[str, Expectation]]:
     return TypeAdapter(dict[str, kind])  # type: ignore[valid-type]
 
 
-ExpectationItem = Annotated[SerializeAsAny[Expectation], PlainValidator(_expectation)]
+_ExpectationItem = Annotated[SerializeAsAny[Expectation], PlainValidator(_expectation)]
 
 
 class ScenarioTable(TomlTable):
@@ -74,7 +74,7 @@ class ScenarioTable(TomlTable):
     master: MasterTable = MasterTable()
     report: ReportTable = ReportTable()
     cases: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    expect: list[ExpectationItem] = Field(default_factory=list)
+    expect: list[_ExpectationItem] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _times(self) -> ScenarioTable:
@@ -83,20 +83,20 @@ class ScenarioTable(TomlTable):
             raise ValueError("a scenario needs at least one component")
         for name, component in self.components.items():
             if component.substeps > 1:
-                check_resolution(
+                _check_resolution(
                     f"components.{name}: one of {component.substeps} substeps,",
                     self.step / component.substeps,
                     self.start,
                     self.stop,
                 )
         if self.network is not None:
-            check_resolution("network: the time between two transmissions,", self.network.slot, self.start, self.stop)
+            _check_resolution("network: the time between two transmissions,", self.network.slot, self.start, self.stop)
         if self.master.smallest_step is not None:
-            check_resolution("master.smallest_step", self.master.smallest_step, self.start, self.stop)
+            _check_resolution("master.smallest_step", self.master.smallest_step, self.start, self.stop)
         return self
 
 
-MAX_STEPS = 1e12
+_MAX_STEPS = 1e12
 """Communication steps of a run at most: days with the fastest stepper, and times are still told apart."""
 
 
@@ -113,11 +113,11 @@ def step_count(start: float, stop: float, step: float) -> int:
         raise ValueError(f"step must be positive, got {step!r} s")
     if not stop > start:
         raise ValueError(f"stop ({stop!r} s) must lie behind start ({start!r} s)")
-    if (stop - start) / step > MAX_STEPS:
+    if (stop - start) / step > _MAX_STEPS:
         raise ValueError(
-            f"step {step!r} s from {start!r} s to {stop!r} s: more than {MAX_STEPS:g} steps; use a larger step"
+            f"step {step!r} s from {start!r} s to {stop!r} s: more than {_MAX_STEPS:g} steps; use a larger step"
         )
-    check_resolution("step", step, start, stop)
+    _check_resolution("step", step, start, stop)
     count = round((stop - start) / step)
     if count < 1 or abs(start + count * step - stop) > 1e-9 * max(1.0, abs(stop)):
         below = int((stop - start) / step)
@@ -126,11 +126,11 @@ def step_count(start: float, stop: float, step: float) -> int:
     return count
 
 
-APART = 10.0
+_APART = 10.0
 """A step is at least so many times the distance at which two times are still told apart: a grid of fewer is uneven."""
 
 
-def check_resolution(what: str, step: float, start: float, stop: float) -> None:
+def _check_resolution(what: str, step: float, start: float, stop: float) -> None:
     """A step must be longer than the resolution of time: that of the numbers, and `TIME_TOLERANCE`.
 
     Args:
@@ -141,9 +141,9 @@ def check_resolution(what: str, step: float, start: float, stop: float) -> None:
     """
     largest = max(abs(start), abs(stop))
     distance = max(ulp(largest), TIME_TOLERANCE)
-    if step < APART * distance:
+    if step < _APART * distance:
         why = f"times near {largest:g} s are told apart from {distance:.2g} s on"
-        least = f"a step must be {APART:g} times that; use {APART * distance:.2g} s or more"
+        least = f"a step must be {_APART:g} times that; use {_APART * distance:.2g} s or more"
         raise ValueError(f"{what} {step!r} s is too short: {why}, and {least}")
 
 

@@ -9,8 +9,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-ARCHIVE = b"PK\x03\x04"
-CONFLICT = re.compile(r"(<{7}|={7}|>{7})( |$)")
+_ARCHIVE = b"PK\x03\x04"
+_CONFLICT = re.compile(r"(<{7}|={7}|>{7})( |$)")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -23,7 +23,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         ValueError: it is not TOML; the message says what it is and what to do. OSError: it cannot be read.
     """
     data = path.read_bytes()
-    if data.startswith(ARCHIVE):
+    if data.startswith(_ARCHIVE):
         raise ValueError(
             "it is an archive (an FMU?), not a text file; for an FMU 'cosim new' writes a scenario to start from"
         )
@@ -35,7 +35,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        marked = next((n for n, line in enumerate(text.splitlines(), start=1) if CONFLICT.match(line)), None)
+        marked = next((n for n, line in enumerate(text.splitlines(), start=1) if _CONFLICT.match(line)), None)
         if marked is not None:
             raise ValueError(f"line {marked} begins the conflict of a merge; resolve it") from error
         raise ValueError(str(error)) from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 from cosim.errors import nearest
@@ -10,6 +10,7 @@ from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import read_extras
 from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag, parse, short, validated
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.package import DEFAULT_VARIANT, Package
 from cosim.ssp.package_data import (
     Binding,
@@ -24,13 +25,47 @@ from cosim.ssp.package_data import (
     SystemElement,
 )
 from cosim.ssp.parameter_sets import read_mapping, read_parameter_set
-from cosim.ssp.step_annotations import read_step
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
 _IMPLEMENTATIONS = ("any", "CoSimulation")
 _DEEPEST = 64
 Kind = TypeVar("Kind")
+
+
+_FIXED = ("FixedStepAlgorithm", "FixedStepMaster")
+_VARIABLE = ("VariableStepAlgorithm", "VariableStepMaster", "VariableStepSolver")
+_LENGTHS = ("baseStepSize", "stepSize")
+_HOLDERS = ("ssd:DefaultExperiment/ssd:Annotations", "ssd:System/ssd:Annotations", "ssd:Annotations")
+"""Where they stand: of the whole run, in the order in which they count. Those of nested systems and of components do
+not.
+"""
+
+
+def _read_step(root: Node, lapses: Lapses) -> float | None:
+    """The communication step that an annotation of a structure asks for [s]; None where none does."""
+    for node in _annotated(root):
+        name = short(node.tag)
+        length = next((node.get(key) for key in _LENGTHS if node.get(key) is not None), "")
+        if name in _VARIABLE:
+            lapses.note(
+                node, f"the annotation asks for {name}, which is not carried out; the communication step is fixed."
+            )
+        elif name in _FIXED:
+            try:
+                step = float(length)
+            except ValueError:
+                step = 0.0
+            if 0.0 < step < float("inf"):
+                return step
+            lapses.note(node, f"the annotation's {name} has the step {length!r}, expected seconds; it is not used.")
+    return None
+
+
+def _annotated(root: Node) -> Iterator[Node]:
+    for holder in _HOLDERS:
+        for annotation in find_all(root, f"{holder}/ssc:Annotation"):
+            yield from (node for node in annotation.iter() if isinstance(node.tag, str))
 
 
 def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -> SsdStructure:
@@ -53,7 +88,7 @@ def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -
         start=None if start is None else float(start),
         stop=None if stop is None else float(stop),
         extras=read_extras(root),
-        step=read_step(root, package.lapses),
+        step=_read_step(root, package.lapses),
     )
 
 

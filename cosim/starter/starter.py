@@ -5,22 +5,124 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from fmpy.model_description import DefaultExperiment, ModelVariable
+
+from cosim.components.start_values import declared_start, start_values
 from cosim.errors import CosimError, OutputError, ScenarioError, nearest
 from cosim.scenario.paths import move_file, relative
+from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
-from cosim.starter.alone import alone
-from cosim.starter.look import Look, look_into
-from cosim.starter.observer import observer_beside
-from cosim.starter.starter_file import render
-from cosim.starter.starter_roles import PlantRoles, is_observer, observer_roles, plant_roles
-from cosim.starter.toml_lines import LISTED, one_line
-from cosim.starter.train_starter import DEFAULT_OBSERVER, declared_observer, train
+from cosim.starter.guess import Guess
+from cosim.starter.look import Look, look_into, number
+from cosim.starter.starter_roles import ObserverRoles, PlantRoles, is_observer, observer_roles, plant_roles
+from cosim.starter.toml_lines import LISTED, GuessedLink, comment, entry, guessed, inline, listing, one_line
+from cosim.starter.train_starter import DEFAULT_OBSERVER, declared_observer, train, train_times
 from fmu_observer import OBSERVERS
+from fmus.fmi.types import NUMERIC_TYPES
+from fmus.templates import environment
 from plant_models.user_file import names_code
 
 _WANTED = frozenset({"effort", "odometer"})
 """Inputs of the observers that a starter can connect."""
+
+
+STOP, STEP, STEPS = 10.0, 0.01, 1000
+_COLUMNS_NAMED = 6
+
+
+def _observer_beside(look: Look, roles: ObserverRoles) -> dict[str, Any]:
+    """What the template of this starter inserts."""
+    stop, step, source = train_times(look)
+    links = [
+        GuessedLink("driver.effort", ["plant.effort"]),
+        GuessedLink("plant.wheel_speed", ["odometer.wheel_speed"]),
+        GuessedLink("odometer.reading", ["driver.odometer"]),
+        *_told("driver.effort", roles.effort),
+        *_told("odometer.reading", roles.odometer),
+    ]
+    title = f"{one_line(look.path.name)} beside the shipped locomotive"
+    return {"title": title, "stop": stop, "step": step, "source": source, "links": links}
+
+
+def _told(source: str, found: Guess | None) -> list[GuessedLink]:
+    if found is None:
+        return []
+    factor = None if found.signal.readable else 1.0
+    return [GuessedLink(source, [f"observer.{found.signal.name}"], guessed(found), factor)]
+
+
+def alone(look: Look) -> dict[str, Any]:
+    """What the template of this starter inserts.
+
+    Args:
+        look: what the FMU says.
+
+    Returns:
+        Values by name.
+    """
+    stop, step, source = times(look)
+    inputs = [v for v in look.component.variables.values() if v.causality == "input"]
+    hidden = look.component.event_references()
+    names = [v.name for v in inputs if v.type in NUMERIC_TYPES and v.valueReference not in hidden]
+    return {
+        "title": f"{one_line(look.path.name)} alone",
+        "stop": stop,
+        "step": step,
+        "source": source,
+        "has_inputs": bool(inputs),
+        "inputs": [_input(look, v) for v in inputs[:LISTED] if v.valueReference not in hidden],
+        "columns": ["time", *map(one_line, names[:_COLUMNS_NAMED]), *(["..."] if len(names) > _COLUMNS_NAMED else [])],
+        "first": names[0] if names else "NAME",
+    }
+
+
+def times(look: Look) -> tuple[float, float, str]:
+    """When the run stops and how long its steps are.
+
+    Args:
+        look: what the FMU says.
+
+    Returns:
+        Stop and step [s], and where they come from.
+    """
+    advised = look.description.defaultExperiment or DefaultExperiment()
+    stop, length = number(advised.stopTime), number(advised.stepSize)
+    start = number(advised.startTime) or 0.0
+    if stop is None or start != 0.0 or stop <= 0.0:
+        return STOP, STEP, "the FMU names no end of a run; write your own"
+    try:
+        step_count(0.0, stop, length or 0.0)
+    except ValueError:
+        length = None
+    return stop, length or stop / STEPS, "from the FMU's default experiment"
+
+
+def _input(look: Look, variable: ModelVariable) -> str:
+    """An input's start value, as a comment where it has none or the master would not take it."""
+    unit, said = look.component.unit_name(variable.name) or "-", one_line(variable.description or "")
+    remark = f"  # [{one_line(unit)}] {said}".rstrip()
+    value = declared_start(variable)
+    if value is None:
+        kind = f"{variable.type} array" if variable.shape else str(variable.type)
+        return f"# {entry(variable.name, 0.0).rpartition(' = ')[0]} = ...{remark} ({kind})"
+    try:
+        start_values(look.component, {variable.name: value})
+    except CosimError as error:
+        return (
+            f"# {entry(variable.name, value)}{remark} - its own start value does not fit it: "
+            f"{one_line(str(error), 200)}"
+        )
+    return entry(variable.name, value) + remark
+
+
+def _render(kind: str, **values: Any) -> str:
+    """A scenario file as text."""
+    files = environment("cosim.starter")
+    filters: dict[str, Any] = {"comment": comment, "guessed": guessed, "one_line": one_line, "python": repr}
+    files.filters |= filters | {"toml": inline}
+    return files.get_template(f"{kind}.toml.j2").render(entry=entry, listing=listing, **values)
 
 
 @dataclass(frozen=True)
@@ -61,7 +163,7 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     written = move_file(observer or DEFAULT_OBSERVER, lambda file: relative(file, target.parent))
     roles, beside = plant_roles(look), observer or DEFAULT_OBSERVER
     if is_observer(look):
-        kind, values = "observer", observer_beside(look, observer_roles(look))
+        kind, values = "observer", _observer_beside(look, observer_roles(look))
     elif roles.is_train:
         kind, values = (
             "train",
@@ -70,7 +172,7 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     else:
         kind, values = "alone", alone(look)
     known = {"look": look, "fmu": place, "target": target.name, "about": _about(look), "listed": LISTED}
-    text = render(kind, guesses=kind != "alone", **known, **values)
+    text = _render(kind, guesses=kind != "alone", **known, **values)
     return Starter(text, kind, list(_remarks(look, kind, roles, observer)))
 
 

@@ -17,7 +17,7 @@ from repetitions import Repetition
 
 from cosim import Result
 from cosim.baselines import Baseline, check, read_baseline, write_baseline
-from cosim.comparison.signal_findings import with_unit
+from cosim.comparison.curve_comparison import with_unit
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import Comparison, SignalComparison
 

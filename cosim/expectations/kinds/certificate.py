@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cosim.expectations.before import Before
 
 SEEN = "largest_gap_seen"
-NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to judge; remove that line'
+_NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to judge; remove that line'
 
 
 class CertificateExpectation(Expectation):
@@ -34,7 +34,7 @@ class CertificateExpectation(Expectation):
         if before.receivers is None:
             raise ScenarioError("this scenario has no balises, so there are no gaps to be certified for")
         if before.certificates == "ignore":
-            raise ScenarioError(NEVER_CERTIFIED)
+            raise ScenarioError(_NEVER_CERTIFIED)
         for name in before.named(self.of, before.receivers, "observer"):
             if name not in before.receivers:
                 raise ScenarioError(f"{name!r} is told of no telegrams; {nearest(name, before.receivers)}")

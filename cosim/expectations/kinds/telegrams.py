@@ -18,8 +18,8 @@ from cosim.toml_table import Name
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
 
-OF_THE_TRACK = ("missed", "false")
-OF_A_RECEIVER = {
+_OF_THE_TRACK = ("missed", "false")
+_OF_A_RECEIVER = {
     "rejected": ("rejected", "ignored"),
     "ignored": ("ignored",),
     "doubted": ("doubted",),
@@ -27,7 +27,7 @@ OF_A_RECEIVER = {
     "undelivered": ("undelivered",),
 }
 """Outcomes that count: what a gate ignored was not taken either, whoever refused it."""
-COUNTS = (*OF_THE_TRACK, *OF_A_RECEIVER, "used")
+COUNTS = (*_OF_THE_TRACK, *_OF_A_RECEIVER, "used")
 NAMES_SHOWN = 5
 
 
@@ -79,13 +79,13 @@ class TelegramsExpectation(WindowExpectation):
             text = f"nothing to judge: no balise was passed{where or ' in this run'}"
             return [Judged("telegrams", "telegrams", passed=False, measured=0.0, text=text)]
         found = []
-        for key in OF_THE_TRACK:
+        for key in _OF_THE_TRACK:
             if getattr(self, key) is not None:
                 chosen = [e for e in within if e.kind == key]
                 found.append(_at_most(f"telegrams {key}{where}", getattr(self, key), chosen, window))
         for receiver in receivers or [""]:
             at = f" at {receiver}" if receiver else ""
-            for key, outcomes in OF_A_RECEIVER.items():
+            for key, outcomes in _OF_A_RECEIVER.items():
                 if getattr(self, key) is not None:
                     chosen = [e for e in within if e.outcomes.get(receiver) in outcomes]
                     found.append(_at_most(f"telegrams {key}{at}{where}", getattr(self, key), chosen, window))

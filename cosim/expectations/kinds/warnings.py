@@ -9,7 +9,7 @@ from cosim.expectations.expectation import Count, Expectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun
 
-WARNINGS_SHOWN = 3
+_WARNINGS_SHOWN = 3
 
 
 class WarningsExpectation(Expectation):
@@ -24,7 +24,9 @@ class WarningsExpectation(Expectation):
         passed = len(warnings) <= self.at_most
         text = f"{len(warnings)}, expected at most {self.at_most}"
         if not passed:
-            text += ": " + " | ".join(warnings[:WARNINGS_SHOWN]) + (" | ..." if len(warnings) > WARNINGS_SHOWN else "")
+            text += (
+                ": " + " | ".join(warnings[:_WARNINGS_SHOWN]) + (" | ..." if len(warnings) > _WARNINGS_SHOWN else "")
+            )
         if run.result.failure is not None:
             text += "; not reached: the run ended early" if passed else ""
             passed = False

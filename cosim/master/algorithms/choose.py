@@ -12,7 +12,7 @@ from cosim.coupling.graph import Group
 from cosim.errors import CouplingError
 
 Wanted = Literal["auto", "gauss-seidel", "jacobi", "iterate"]
-BREAK_IT = (
+_BREAK_IT = (
     "break the loop with a component that holds a state or a sample (for instance a sampled sensor), or merge "
     "the components"
 )
@@ -62,7 +62,7 @@ def choose_algorithm(wanted: Wanted, groups: Sequence[Group], components: Mappin
             raise CouplingError(
                 f"master.algorithm = '{wanted}' does not solve the algebraic loop {algebraic[0]}. Use 'auto' or "
                 f"'iterate', or "
-                f"{BREAK_IT}."
+                f"{_BREAK_IT}."
             )
         return AlgorithmChoice(wanted, "It was asked for.", (), names, notes)
     if wanted == "auto":
@@ -104,7 +104,9 @@ def _demand_states(
             (f"the algebraic loop {a}" for a in algebraic if set(a.components) <= set(loop)),
             f"the loop of {', '.join(loop)}",
         )
-        remedy = BREAK_IT if any(set(a.components) <= set(loop) for a in algebraic) else "use master.algorithm = 'auto'"
+        remedy = (
+            _BREAK_IT if any(set(a.components) <= set(loop) for a in algebraic) else "use master.algorithm = 'auto'"
+        )
         raise CouplingError(
             f"To iterate {path}, its components must save and restore their state (canGetAndSetFMUState), and these "
             f"cannot: "

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-NUMBERS_SHOWN = 8
+_NUMBERS_SHOWN = 8
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class History:
 def shown(residuals: Sequence[float]) -> str:
     """A history of residuals for a message; of a long one the first and last numbers."""
     texts = [f"{r:.2g}" for r in residuals]
-    if len(texts) > NUMBERS_SHOWN:
-        half = NUMBERS_SHOWN // 2
+    if len(texts) > _NUMBERS_SHOWN:
+        half = _NUMBERS_SHOWN // 2
         texts = [*texts[:half], "...", *texts[-half:]]
     return ", ".join(texts)

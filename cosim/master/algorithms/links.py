@@ -50,12 +50,8 @@ def plan_links(plan: Plan) -> list[LoopLink]:
     ]
 
 
-def fed_back(links: Sequence[LoopLink], members: range | None = None) -> list[LoopLink]:
-    """Links whose target is stepped no later than their source, among consecutive members of the plan or among all.
-
-    Args:
-        links: between the components of the loop.
-    """
+def _fed_back(links: Sequence[LoopLink], members: range | None = None) -> list[LoopLink]:
+    """Links whose target is stepped no later than their source, among consecutive members of the plan or among all."""
     return [
         link
         for link in links
@@ -70,7 +66,7 @@ def interface(links: Sequence[LoopLink], members: range | None = None) -> np.nda
         links: between the components of the loop. members: of the loop, by number; None for all.
     """
     # a set, since `np.unique` loads the masked arrays of NumPy
-    return np.array(sorted({link.column for link in fed_back(links, members)}), dtype=np.intp)
+    return np.array(sorted({link.column for link in _fed_back(links, members)}), dtype=np.intp)
 
 
 def downstream(plan: Plan, names: Collection[str]) -> np.ndarray:

@@ -19,7 +19,7 @@ from cosim.master.control.control import StepControl
 from cosim.master.system import Checkpoint, Row, System
 from fmus.fmi.standard import TIME_TOLERANCE
 
-SAFETY = 0.5
+_SAFETY = 0.5
 """A longer step is tried where its expected error is below this share of the tolerance."""
 
 FINEST = 30
@@ -27,7 +27,7 @@ FINEST = 30
 
 
 @dataclass
-class StepStatistics:
+class _StepStatistics:
     """What became of the steps.
 
     Args:
@@ -70,7 +70,7 @@ class DoublingStep(StepControl):
             )
         super().__init__(system)
         self.tolerance, self.order, self.smallest_step = tolerance, order, smallest_step
-        self.statistics = StepStatistics()
+        self.statistics = _StepStatistics()
         self._level = 0
         self._watched = system.plan.continuous
 
@@ -91,7 +91,7 @@ class DoublingStep(StepControl):
                 self._close_pair(rows, _between(t, until, place, level + 1)[0])
             if self._ended():
                 break
-            if level > 0 and place % 2 == 0 and error * 2**self.order < SAFETY:
+            if level > 0 and place % 2 == 0 and error * 2**self.order < _SAFETY:
                 place, level = place // 2, level - 1
         self._level = level
         return rows

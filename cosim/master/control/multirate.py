@@ -20,7 +20,7 @@ from cosim.master.axis import TimeAxis
 from fmus.fmi.standard import TIME_TOLERANCE
 
 
-class SlowRate:
+class _SlowRate:
     """The stage at `Position.RATE`: steps a component over every n-th communication point only.
 
     Args:
@@ -88,4 +88,4 @@ def set_rates(
                 f"vary its "
                 "step for the rest; change 'stop', 'step' or 'every'."
             )
-        SlowRate(planned, count, axis)
+        _SlowRate(planned, count, axis)

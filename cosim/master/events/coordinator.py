@@ -17,16 +17,94 @@ from cosim.balises.service import Row
 from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.chain import Mover
+from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
 from cosim.errors import RunError
-from cosim.master.events.iteration import EventIteration
 from cosim.master.events.participant import Participant
 from cosim.master.events.stride import Span, Stride
 from cosim.master.system import Checkpoint, System
 from fmus.fmi.interruption import EventMet
 from fmus.fmi.standard import TIME_TOLERANCE
 
-MAX_EVENTS_WITHOUT_PROGRESS = 100
+_MAX_EVENTS_WITHOUT_PROGRESS = 100
+
+
+_MAX_ROUNDS = 100
+_NAMES_SHOWN = 5
+
+
+class _EventIteration:
+    """Takes all participants that are concerned through Event Mode.
+
+    Args:
+        plan: the plan. participants: in plan order.
+
+    `count` is the number of instants with an event, `longest` the most super-dense instants that one took.
+    """
+
+    def __init__(self, plan: Plan, participants: Sequence[Participant]) -> None:
+        self._plan, self._participants = plan, participants
+        self.count = self.longest = 0
+
+    def concerns_anybody(self, t: float) -> bool:
+        """Whether there is an event at `t` [s]."""
+        return any(p.stands_at(t) and (p.wants_event(t) or p.hears()) for p in self._participants)
+
+    def run(self, t: float) -> None:
+        """Handle everything that happens at `t` [s]; the values of the plan are those after it.
+
+        Raises:
+            RunError: a component failed, or the iteration does not settle; who and what still changes is named.
+        """
+        members = [p for p in self._participants if p.stands_at(t)]
+        values = self._plan.values
+        before = earlier = values.copy()
+        for round_number in range(1, _MAX_ROUNDS + 1):
+            earlier, before = before, values.copy()
+            for member in members:
+                if member.wants_event(t):
+                    member.begin_own_event()
+            self._pass_on(members, t)
+            busy = [member for member in members if member.needs_update]
+            if not busy:
+                self._finish(members, round_number - 1)
+                return
+            for member in busy:
+                member.update()
+        changed = _differs(earlier, before) | _differs(before, values)
+        raise self._unsettled(changed, [m.name for m in members if m.needs_update or m.wants_event(t)], t)
+
+    def _pass_on(self, members: Sequence[Participant], t: float) -> None:
+        for _ in range(_MAX_ROUNDS):
+            before = self._plan.values.copy()
+            news = [member.exchange() for member in members]
+            if not any(news):
+                return
+        raise self._unsettled(_differs(before, self._plan.values), [], t)
+
+    def _finish(self, members: Sequence[Participant], rounds: int) -> None:
+        for member in members:
+            member.leave()
+        self.count += 1
+        self.longest = max(self.longest, rounds)
+
+    def _unsettled(self, changed: np.ndarray, busy: Sequence[str], t: float) -> RunError:
+        signals = [self._plan.signals[i].name for i in np.flatnonzero(changed)]
+        shown = ", ".join(signals[:_NAMES_SHOWN]) + (
+            f" and {len(signals) - _NAMES_SHOWN} more" if len(signals) > _NAMES_SHOWN else ""
+        )
+        names = list(dict.fromkeys([*busy, *(name.partition(".")[0] for name in signals)]))
+        still = f"; still changing: {shown}" if signals else "; no output changes any more"
+        reason = (
+            f"Events at t = {t:g} s do not settle in {_MAX_ROUNDS} rounds{still}; components: {', '.join(names)}. "
+            "Look for two components that answer each other for ever, or for an event that is due again at once."
+        )
+        return RunError(reason, names[0] if names else "", t)
+
+
+def _differs(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    different: np.ndarray = (a != b) & ~(np.isnan(a) & np.isnan(b))
+    return different
 
 
 class EventCoordinator:
@@ -41,7 +119,7 @@ class EventCoordinator:
 
     def __init__(self, system: System, participants: Sequence[Participant]) -> None:
         self._system, self._participants = system, list(participants)
-        self.iteration = EventIteration(system.plan, participants)
+        self.iteration = _EventIteration(system.plan, participants)
         self.redone = 0
         self._span = Span()
         self._interrupters = [p.component for p in participants if p.interrupts]
@@ -96,7 +174,7 @@ class EventCoordinator:
             if ended or until - reached <= TIME_TOLERANCE:
                 return rows
             standing = standing + 1 if reached - now <= TIME_TOLERANCE else 0
-            if standing > MAX_EVENTS_WITHOUT_PROGRESS:
+            if standing > _MAX_EVENTS_WITHOUT_PROGRESS:
                 raise self._stuck(reached)
             now = reached
 
@@ -218,7 +296,7 @@ class EventCoordinator:
     def _stuck(self, t: float) -> RunError:
         names = [p.name for p in self._participants if abs(p.component.time - t) <= TIME_TOLERANCE]
         return RunError(
-            f"Time stands still at t = {t:g} s: {MAX_EVENTS_WITHOUT_PROGRESS} events one after the other without any "
+            f"Time stands still at t = {t:g} s: {_MAX_EVENTS_WITHOUT_PROGRESS} events one after the other without any "
             f"progress; "
             f"components with events: {', '.join(names)}.",
             names[0] if names else "",

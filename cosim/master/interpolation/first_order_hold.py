@@ -19,7 +19,7 @@ Method = Literal["interpolate", "extrapolate"]
 
 
 @dataclass
-class InputHistory:
+class _InputHistory:
     """The last two values that the sources gave, and when.
 
     Args:
@@ -31,12 +31,12 @@ class InputHistory:
     earlier_at: np.ndarray
     later_at: np.ndarray
 
-    def copy(self) -> InputHistory:
+    def copy(self) -> _InputHistory:
         """An independent copy."""
-        return InputHistory(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
+        return _InputHistory(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
 
 
-class Course(Protocol):
+class _Course(Protocol):
     """Signals whose values are known ahead."""
 
     def at(self, t: float, *, before: bool) -> np.ndarray:
@@ -55,7 +55,7 @@ class KnownInputs:
     """
 
     places: np.ndarray
-    course: Course
+    course: _Course
     factors: np.ndarray
     offsets: np.ndarray
 
@@ -86,7 +86,7 @@ class FirstOrderHold:
         self._distinct = list({id(c): c for c in sources}.values())
         self._source_of = np.array([[id(d) for d in self._distinct].index(id(c)) for c in sources], dtype=np.intp)
         count = len(continuous)
-        self._history = InputHistory(np.zeros(count), np.zeros(count), np.full(count, np.nan), np.full(count, np.nan))
+        self._history = _InputHistory(np.zeros(count), np.zeros(count), np.full(count, np.nan), np.full(count, np.nan))
         self.slope = np.zeros(count)
         self._stood = np.full(count, np.nan)
 
@@ -157,11 +157,11 @@ class FirstOrderHold:
         """
         self._history.earlier_at[which] = self._history.later_at[which] = np.nan
 
-    def save(self) -> InputHistory:
+    def save(self) -> _InputHistory:
         """What a step changes here."""
         return self._history.copy()
 
-    def restore(self, state: InputHistory) -> None:
+    def restore(self, state: _InputHistory) -> None:
         """Return to what was saved.
 
         Args:

@@ -16,7 +16,7 @@ from cosim.results.result import Result
 
 BOUND = "error_bound"
 ROW, REST = 0.38, 0.9  # height of the row of an observer, and of all that is not a row [inch]
-DECADES = 1e3  # from the bottom of the axis to the bound
+_DECADES = 1e3  # from the bottom of the axis to the bound
 _FILLED = 0.7  # share of a row that its bar fills
 
 
@@ -84,7 +84,7 @@ class BoundsPanel(Panel):
             largest = max(largest, float(np.max(sizes, initial=0.0)))
         ax.axhline(1.0, color=MARK, linewidth=1.2, label="bound")
         logarithmic(ax)
-        ax.set_ylim(1.0 / DECADES, 1.5 * largest)
+        ax.set_ylim(1.0 / _DECADES, 1.5 * largest)
         ax.set_ylabel("|Speed error| / bound [1]")
 
     @classmethod

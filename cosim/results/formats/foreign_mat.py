@@ -5,24 +5,119 @@ given.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import math
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import scipy
 
 from cosim.errors import OutputError
-from cosim.results.formats.about import with_about
+from cosim.results.formats.about import about_text, blocks, signals_of, with_about
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.formats.mat_file import MatFormat
-from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description, write_modelica
 from cosim.results.result_data import ResultData, SignalInfo
-from cosim.results.table_layout import table_of
+from cosim.results.table_layout import column_names, table_of
 
 TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``
+
+
+_ACLASS = [text.ljust(11) for text in ("Atrajectory", "1.1", "", "binTrans")]  # OpenModelica wants it so to the byte
+_ABOUT = "fmu_observer"
+_TEXT, _INTEGERS, _DOUBLES = 51, 20, 0  # types of a matrix: little-endian; letters are bytes of UTF-8
+_LARGEST = 2**31 - 1
+
+
+def _write_modelica(path: str | Path, result: ResultData) -> None:
+    """Write a result; a table larger than the memory is written block by block."""
+    names = column_names(result.table)
+    if len(result.table) > _LARGEST:
+        raise ValueError(
+            f"A Modelica trajectory holds at most {_LARGEST} rows, got {len(result.table)}. Use another format."
+        )
+    signals = signals_of(result)
+    parameters = _parameters(result.summary, names)
+    with Path(path).open("wb") as file:
+        _matrix(file, "Aclass", _TEXT, np.array([list(text) for text in _ACLASS], "S1"))
+        _text_matrix(file, "name", [*names, *parameters])
+        _text_matrix(file, "description", ["Time [s]", *map(_description, signals), *[""] * len(parameters)])
+        _matrix(file, "dataInfo", _INTEGERS, _data_info(len(names), len(parameters)))
+        ends = _ends(result.table)
+        _matrix(file, "data_1", _DOUBLES, np.array([ends, *([value] * 2 for value in parameters.values())]))
+        _header(file, "data_2", _DOUBLES, len(names), len(result.table))
+        for _, rows in blocks(result.table):
+            file.write(np.ascontiguousarray(rows).tobytes())
+        more = {"signals": [asdict(signal) for signal in signals], "about": about_text(result)}
+        _text_matrix(file, _ABOUT, [json.dumps(more, ensure_ascii=False)])
+
+
+def _parameters(summary: Mapping[str, Any], taken: Iterable[str]) -> dict[str, float]:
+    """Start values of the components by ``component.parameter``, but for those that have a column."""
+    found: dict[str, float] = {}
+    for component in summary.get("components", ()):
+        for name, value in (component.get("parameters") or {}).items():
+            if isinstance(value, (bool, int, float)) and not math.isnan(value):  # OpenModelica takes NaN for a change
+                found[f"{component['name']}.{name}"] = float(value)
+    return {name: value for name, value in found.items() if name not in set(taken)}
+
+
+def _ends(table: np.ndarray) -> list[float]:
+    return [float(table["time"][0]), float(table["time"][-1])] if len(table) else [0.0, 0.0]
+
+
+def _data_info(columns: int, parameters: int) -> np.ndarray:
+    """For each name: matrix (0 for time), row in it, linear interpolation, and what holds outside: nothing, or the
+    value.
+    """
+    rows = [
+        (0, 1, 0, -1),
+        *((2, i + 1, 0, -1) for i in range(1, columns)),
+        *((1, i + 2, 0, 0) for i in range(parameters)),
+    ]
+    return np.array(rows, np.int32).T
+
+
+def _description(signal: SignalInfo) -> str:
+    unit = signal.unit if signal.display_unit is None else f"{signal.unit}|{signal.display_unit}"
+    if unit == "1" and not signal.description.endswith("]"):
+        return signal.description
+    return f"{signal.description} [{unit}]" if signal.description else f"[{unit}]"
+
+
+def split_description(text: str) -> tuple[str, str | None, str | None]:
+    """Description, unit and display unit of a description in such a file, e.g. ``Mass of the train [kg]``.
+
+    Dymola puts types in too, ``[:#(type=Boolean)]``, which are left out.
+
+    Args:
+        text: the description.
+    """
+    start = text.rfind("[")
+    if start < 0 or not text.endswith("]"):
+        return text, None, None
+    unit, _, display = text[start + 1 : -1].partition(":#")[0].partition("|")
+    return text[:start].removesuffix(" "), unit or None, display or None
+
+
+def _text_matrix(file: BinaryIO, name: str, texts: Sequence[str]) -> None:
+    """Texts filled up with NUL, each a column."""
+    encoded = [text.encode() for text in texts]
+    width = max(map(len, encoded)) + 1  # one NUL at least: then trailing spaces are part of a text
+    _header(file, name, _TEXT, width, len(texts))
+    file.write(b"".join(text.ljust(width, b"\0") for text in encoded))
+
+
+def _matrix(file: BinaryIO, name: str, kind: int, values: np.ndarray) -> None:
+    _header(file, name, kind, *values.shape)
+    file.write(values.tobytes(order="F"))
+
+
+def _header(file: BinaryIO, name: str, kind: int, rows: int, columns: int) -> None:
+    file.write(struct.pack("<5i", kind, rows, columns, 0, len(name) + 1) + name.encode() + b"\0")
 
 
 def read_foreign_mat(path: Path) -> ResultData:
@@ -94,7 +189,7 @@ def _matrices(source: str, content: Mapping[str, Any], transposed: bool) -> _Tra
     constants = _rows_first(content["data_1"], transposed)
     start = constants[0] if len(constants) else np.zeros(0)  # nothing is constant
     data = _rows_first(content["data_2"], transposed).T
-    limits = {0: len(data), 1: len(start), 2: len(data), TEXTS: LARGEST if "stringData" in content else 0}
+    limits = {0: len(data), 1: len(start), 2: len(data), TEXTS: _LARGEST if "stringData" in content else 0}
     if not len(names) == len(descriptions) == len(info) or info.shape[1] < 2:
         counts = f"{len(names)} names, {len(descriptions)} descriptions, dataInfo {info.shape}"
         raise OutputError(f"{source}: the trajectory contradicts itself ({counts}).")
@@ -104,7 +199,7 @@ def _matrices(source: str, content: Mapping[str, Any], transposed: bool) -> _Tra
             raise OutputError(f"{source}: variable {name!r} should be in {where}, which has no such row.")
     described = zip(names, descriptions, strict=True)
     signals = [SignalInfo(name, unit or "1", show, "continuous", text) for name, (text, unit, show) in described]
-    about = _texts(content[ABOUT], True)[0] if ABOUT in content else None
+    about = _texts(content[_ABOUT], True)[0] if _ABOUT in content else None
     return _Trajectory(signals, info[:, :2].astype(int), start, data, about)
 
 
@@ -128,7 +223,7 @@ def _foreign(source: str, trajectory: _Trajectory) -> ResultData:
 
 
 def _ours(trajectory: _Trajectory, about: str) -> ResultData:
-    """A trajectory that `write_modelica` wrote: nothing is converted, nothing is left out."""
+    """A trajectory that `_write_modelica` wrote: nothing is converted, nothing is left out."""
     more = json.loads(about)
     signals = [SignalInfo(**signal) for signal in more["signals"]]
     table = table_of(["time", *(s.name for s in signals)], list(trajectory.data))
@@ -179,7 +274,7 @@ class ModelicaFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        write_modelica(path, result)
+        _write_modelica(path, result)
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format

@@ -22,7 +22,7 @@ from cosim.results.optional import optional_module
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.table_layout import table_dtype
 
-ABOUT = b"fmu-observer"
+_ABOUT = b"fmu-observer"
 
 
 def _modules() -> tuple[Any, Any]:
@@ -91,7 +91,7 @@ class ParquetFormat(Format):
         fields += [arrow.field(s.name, arrow.float64(), nullable=False, metadata=_metadata(s)) for s in signals]
         units = {"units": {"time": "s"} | {s.name: s.unit for s in signals}}
         schema = arrow.schema(
-            fields, metadata={ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)}
+            fields, metadata={_ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)}
         )
         names = result.table.dtype.names or ()
         with (
@@ -108,7 +108,7 @@ class ParquetFormat(Format):
         with path.open("rb") as source:
             try:
                 file = parquet.ParquetFile(source)
-                about = (file.schema_arrow.metadata or {}).get(ABOUT)
+                about = (file.schema_arrow.metadata or {}).get(_ABOUT)
                 return _foreign(str(path), file.read()) if about is None else _ours(file, about.decode())
             except arrow.ArrowException as error:
                 raise ValueError(f"{path} is not a Parquet file that can be read: {error}") from error

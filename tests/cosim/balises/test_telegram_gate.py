@@ -13,7 +13,7 @@ import pytest
 
 from cosim import Scenario
 from cosim.errors import CosimError
-from cosim.run.after_run import _doubted
+from cosim.run.executed import _doubted
 
 STUDIES = Path(__file__).resolve().parents[3] / "docs" / "studies"
 OBSERVER = "takagi_sugeno_cdo"

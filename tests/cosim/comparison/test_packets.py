@@ -8,10 +8,10 @@ from math import nan
 import pytest
 from made_results import compared, made
 
+from cosim.comparison.compare import keeps_packets
 from cosim.comparison.comparison_text import comparison_text
-from cosim.comparison.packets import keeps_packets
 from cosim.comparison.verdict import Comparison
-from cosim.provenance.same import same_result
+from cosim.provenance.rerun import same_result
 from cosim.report.page.comparison import comparison_page
 from cosim.results.result import PacketRecord, Result
 

@@ -11,8 +11,7 @@ import pytest
 from test_fmus.events import hostile_fmu
 
 from cosim import Scenario
-from cosim.components.elf import read_linkage
-from cosim.components.shared_libraries import _own_needs
+from cosim.components.shared_libraries import _own_needs, read_linkage
 from cosim.errors import CosimError
 from fmus.toolchain.compile import find_compiler
 

@@ -17,9 +17,9 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.components.component import Component
 from cosim.errors import ScenarioError
-from cosim.expectations.check_expectations import check_expectations
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.registry import EXPECTATIONS
+from cosim.run.checked_tables import check_expectations
 from cosim.run.component_models import component_factories
 from cosim.scenario.schema import ScenarioTable
 

@@ -15,7 +15,7 @@ from test_fmus.build import linear_fmu
 
 import fmu_observer
 import fmus
-from cosim.fmu_model import exchange_events
+from cosim.fmu_model import exchange
 from cosim.fmu_model.co_simulation import CoSimulationModel
 from cosim.fmu_model.linearise import _objections, linearise_model
 from cosim.fmu_model.opening import Interface, open_model
@@ -194,7 +194,7 @@ def test_events_of_model_exchange_are_handled() -> None:
 
 
 def test_a_state_that_chatters_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exchange_events, "MOST_EVENTS", 1)
+    monkeypatch.setattr(exchange, "MOST_EVENTS", 1)
     model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3), "model-exchange")
     x = np.array([0.0, 0.02, 0.02 / 0.575])  # stops within the step
     with pytest.raises(FmuModelError, match=r"1 events between t = 2 s and 2\.\d+ s, the last .* event indicator \d"):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cosim.master.finite import make_finite_check
+from cosim.master.master import make_finite_check
 
 CONTENTS = arrays(np.float64, 5, elements=st.floats(allow_nan=True, allow_infinity=True))
 

@@ -13,7 +13,7 @@ from kept_runs import coast, coasting, everything, quietly
 from cosim import Scenario
 from cosim.errors import CosimError, OutputError, ProvenanceError
 from cosim.provenance import rerun
-from cosim.provenance.same import same_result
+from cosim.provenance.rerun import same_result
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.results_folder import read_results
 

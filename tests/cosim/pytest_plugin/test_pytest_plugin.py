@@ -17,7 +17,7 @@ import cosim.comparison.comparison_text
 import cosim.report.page.comparison
 import fmus
 import plant_models
-from cosim.pytest_plugin.baseline_names import baseline_name
+from cosim.pytest_plugin.fixture import baseline_name
 
 pytest_plugins = ["pytester"]
 

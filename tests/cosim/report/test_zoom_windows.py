@@ -15,8 +15,7 @@ from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 from cosim.evaluation.corrections import corrections, event_rows
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.spec import Phase, ReportSpec
-from cosim.report.figures.zoom_figure import zoom_figure
-from cosim.report.figures.zooms import draw_zooms
+from cosim.report.figures.zooms import draw_zooms, zoom_figure
 from cosim.report.page.phases import phases_table
 from cosim.report.page.render import groups
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows

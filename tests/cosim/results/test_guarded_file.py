@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import OutputError
-from cosim.results.formats.guarded_file import GuardedFile
+from cosim.results.formats.hdf5_file import GuardedFile
 from cosim.results.result import Result, SignalInfo
 from cosim.results.save import save_result
 

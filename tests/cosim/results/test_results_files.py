@@ -15,8 +15,7 @@ from scipy.io import loadmat
 
 from cosim.errors import OutputError
 from cosim.results.formats.csv_file import CsvFormat, write_csv
-from cosim.results.formats.mat_file import MatFormat
-from cosim.results.formats.matlab_names import matlab_names
+from cosim.results.formats.mat_file import MatFormat, matlab_names
 from cosim.results.record_rows import TELEGRAM_ROWS, outcomes_text, parse_outcomes
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.results_folder import check_writable, read_results, write_results

@@ -19,7 +19,7 @@ from scipy.io import savemat
 
 from cosim import load_result
 from cosim.errors import OutputError
-from cosim.results.formats.modelica_file import split_description
+from cosim.results.formats.foreign_mat import split_description
 from cosim.results.result import SignalInfo
 
 

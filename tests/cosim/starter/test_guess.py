@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.starter.guess import GuessedSignal, Quantity, guess
-from cosim.starter.words import words_of
+from cosim.starter.guess import GuessedSignal, Quantity, guess, words_of
 from plant_models.hybrid.units import parse_unit
 
 
