@@ -74,8 +74,8 @@ class _CoordinatedSystem(System):
         self.events = make_coordinator(self, events)
 
     @property
-    def divides_steps(self) -> bool:
-        return self.events is not None and not self.events.only_network
+    def meets_events(self) -> bool:
+        return self.events is not None and not self.events.all_foreseen
 
     def start(self, t: float) -> None:
         """All components were initialised at `t` [s]: handle what happens there already.
