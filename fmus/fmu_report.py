@@ -1,12 +1,13 @@
-"""Report: what an FMU file says about itself, in lines of text. Works with any FMU, ours or a vendor's; reads, never
-runs.
+"""Report: what an FMU file says about itself, as data and as tables. Works with any FMU, ours or a vendor's; reads,
+never runs.
 """
 
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
@@ -16,6 +17,7 @@ from fmus.fmi.capabilities import HELD_AS
 from fmus.fmi.description import read_description
 from fmus.fmi.standard import INTERFACES, fmi_version
 from fmus.fmi.types import enumeration_items
+from fmus.tables.table import Parts, Table, name_column, pairs_table, text_column
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
 
@@ -28,7 +30,6 @@ _CAPABILITIES = (
     "providesDirectionalDerivative",
     "completedIntegratorStepNotNeeded",
 )
-_SHOWN = ("input", "output", "parameter")
 _FOLDERS = {
     "linux32": {"x86-linux"},
     "linux64": {"x86_64-linux", "aarch64-linux"},  # many importers look there on any 64-bit processor
@@ -41,8 +42,16 @@ LARGEST = 2_000_000_000
 _HEADER_SIZE = 4096
 
 
-def describe_file(path: Path) -> list[str]:
-    """Lines that say what an FMU is: version, interfaces, capabilities, platforms, variables.
+_COLUMNS = (
+    name_column("name"),
+    text_column("start", write=lambda value: "" if value is None else f"= {value}"),
+    text_column("unit", write=lambda unit: f"[{unit or '-'}]"),
+    *(text_column(key) for key in ("type", "variability", "description")),
+)
+
+
+def describe_file(path: Path) -> dict[str, Any]:
+    """What an FMU says of itself, as plain data: version, interfaces, capabilities, platforms, variables.
 
     Args:
         path: an FMU file.
@@ -56,19 +65,33 @@ def describe_file(path: Path) -> list[str]:
         description = read_description(path)
     except Exception as error:
         raise ValueError(f"{path} cannot be read as an FMU: {_reason(error)}") from error
-    lines = [
-        f"{description.modelName}: FMI {description.fmiVersion}, "
-        f"{', '.join(_interfaces(description)) or 'no interface'}",
-        *([description.description] if description.description else []),
-        f"platforms: {', '.join(platforms) or 'none'}",
-        _on_this_machine(description, names),
-        *_capabilities(description),
-    ]
-    for causality in _SHOWN:
-        chosen = [v for v in description.modelVariables if v.causality == causality]
-        if chosen:
-            lines += [f"{causality}s:", *_variables(chosen)]
-    return lines
+    return {
+        "file": str(path),
+        "model": description.modelName,
+        "description": description.description or "",
+        "FMI version": description.fmiVersion,
+        "interfaces": [text for name, text in INTERFACES.items() if getattr(description, name) is not None],
+        "tool": description.generationTool or "",
+        "platforms": platforms,
+        f"this machine ({host_platform().name})": _on_this_machine(description, names),
+        **_capabilities(description),
+        "variables": [_variable(v) for v in description.modelVariables],
+    }
+
+
+def description_parts(data: Mapping[str, Any]) -> Parts:
+    """A description for people: its properties, then the variables by their causality.
+
+    Args:
+        data: from `describe_file`, or with the same keys for variables.
+    """
+    tables: list[Table | str] = []
+    for causality in ("input", "output", "parameter", "local"):
+        chosen = [v for v in data["variables"] if v["causality"] == causality]
+        title = f"{causality}s ({len(chosen)}):"
+        rows = [[v[column.key] for column in _COLUMNS] for v in chosen]
+        tables.append(Table("variables", _COLUMNS, rows, title).filled() if rows else title)
+    return [pairs_table("properties", {k: v for k, v in data.items() if k != "variables"}), *tables]
 
 
 def platforms_of(path: Path) -> list[str]:
@@ -110,7 +133,7 @@ def _on_this_machine(description: ModelDescription, names: Sequence[str]) -> str
     reason = why_not_here(description, {i.modelIdentifier for i in interfaces if i is not None}, names)
     has_sources = any(name.startswith("sources/") and name.endswith(".c") for name in names)
     rebuild = " Its sources can be compiled." if reason and has_sources else ""
-    return f"this machine ({host_platform().name}): {f'no, it {reason}{rebuild}' if reason else 'yes'}"
+    return f"no, it {reason}{rebuild}" if reason else "yes"
 
 
 def _damage(archive: zipfile.ZipFile) -> list[str]:
@@ -143,29 +166,27 @@ def _reason(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
-def _interfaces(description: ModelDescription) -> list[str]:
-    return [text for name, text in INTERFACES.items() if getattr(description, name) is not None]
-
-
-def _capabilities(description: ModelDescription) -> list[str]:
-    """A line for each interface, in the words of the FMI version."""
+def _capabilities(description: ModelDescription) -> dict[str, Any]:
+    """Those of each interface, in the words of the FMI version."""
     known = {held: name for name, held in HELD_AS.items()} if fmi_version(description) == 3 else {}
-    lines = []
+    found = {}
     for held, text in INTERFACES.items():
         interface = getattr(description, held)
         if interface is not None:
-            names = [known.get(name, name) for name in _CAPABILITIES if getattr(interface, name, False)]
-            lines.append(f"capabilities in {text}: {', '.join(names) or 'none'}")
-    return lines
+            declared = [name for name in _CAPABILITIES if getattr(interface, name, False)]
+            found[f"capabilities in {text}"] = [known.get(name, name) for name in declared]
+    return found
 
 
-def _variables(variables: Iterable[ModelVariable]) -> list[str]:
-    return [f"  {_value(v)}  {v.description or ''}".rstrip() for v in variables]
-
-
-def _value(variable: ModelVariable) -> str:
+def _variable(variable: ModelVariable) -> dict[str, Any]:
+    """A variable; of an enumeration the names of its items stand for their numbers."""
     items = {str(number): item for item, number in enumeration_items(variable).items()}
-    start = "" if variable.start is None else f" = {items.get(str(variable.start), variable.start)}"
-    if items:
-        return f"{variable.name}{start} [{', '.join(items.values())}]"
-    return f"{variable.name}{start} [{variable.unit or ('clock' if variable.type == 'Clock' else '1')}]"
+    return {
+        "name": variable.name,
+        "causality": variable.causality or "local",
+        "variability": variable.variability,
+        "type": f"{variable.type} ({', '.join(items.values())})" if items else variable.type,
+        "unit": variable.unit,
+        "start": items.get(str(variable.start), variable.start),
+        "description": variable.description or "",
+    }

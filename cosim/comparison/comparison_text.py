@@ -3,32 +3,38 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isnan, nan
 from typing import Any
 
 from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
+from fmus.tables.numbers import DASH
 from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
 
 
-def _number(value: float, digits: int = 3) -> str:
-    return "" if isnan(value) else f"{value:.{digits}g}"
-
-
-def _percent(value: float) -> str:
-    return "" if isnan(value) else f"{value:.3g} %"
+def _instant(value: float) -> str:
+    return DASH if isnan(value) else f"{value:.7g}"
 
 
 _COLUMNS = (
-    name_column("signal", "signal"),
-    text_column("unit", "unit"),
-    Column("max_error", "max error", "", "Of result minus reference", write=_number),
-    Column("max_error_at", "at", "s", "Where it is largest", write=lambda value: _number(value, 7)),
-    Column("allowed", "allowed", "", "There", write=_number),
-    Column("max_shift", "shift", "s", "Largest, of instants", write=lambda value: f"{value:.3g}" if value else ""),
-    Column("share_outside", "outside", "", "Share of the time outside the tolerance", factor=100.0, write=_percent),
-    text_column("verdict", "verdict"),
+    name_column("signal", "Signal"),
+    text_column("unit", "Unit"),
+    Column("max_error", "Largest error", "", "Of result minus reference"),
+    Column("max_error_at", "At", "s", "Where it is largest", write=_instant),
+    Column("allowed", "Allowed", "", "Where the error is largest"),
+    Column("max_shift", "Largest shift", "s", "Of instants", short="Shift"),
+    Column("rms_error", "Error, rms"),
+    Column("share_outside", "Outside", "%", "Share of the time outside the tolerance", factor=100.0),
+    text_column("verdict", "Verdict"),
 )
+VERDICTS = {
+    "equal": "equal to the bit",
+    "within": "within tolerance",
+    "missing": "missing in the result",
+    "extra": "only in the result",
+    "ignored": "not compared",
+}
 _POINT_COLUMNS = (
     Column("time", "time", "s", write="{:.9g}".format),
     Column("reference", "reference", write="{:.8g}".format),
@@ -56,7 +62,7 @@ def comparison_parts(comparison: Comparison, verbose: bool = False) -> Parts:
     limit = len(shown) if verbose else _FAILED_SHOWN
     more = [f"... and {len(shown) - limit} more signals that differ"] if len(shown) > limit else []
     parts: list[Table | str] = [_headline(comparison)]
-    parts.append(Table("signals", _COLUMNS, [_row(signal) for signal in shown[:limit]], notes=more))
+    parts.append(replace(signals_table(shown[:limit]), notes=more))
     parts += [f"  all {count} signals: {text}" for text, count in shared.items()]
     for signal in shown[:limit]:
         parts += _details(signal, verbose, shared)
@@ -112,17 +118,25 @@ def _events_text(what: str, events: EventComparison) -> str:
     return f"{events.matched} {what} match"
 
 
+def signals_table(signals: Sequence[SignalComparison], failed: Sequence[SignalComparison] = ()) -> Table:
+    """Errors and verdicts of signals.
+
+    Args:
+        signals: in the order in which they are shown. failed: of them, those that stand out on a page.
+    """
+    return Table("signals", _COLUMNS, [_row(signal) for signal in signals], bad={_verdict(signal) for signal in failed})
+
+
 def _row(signal: SignalComparison) -> list[Any]:
+    compared = signal.status in ("equal", "within", "differs")
     at = signal.max_error_at if signal.max_error else nan
-    share = nan if isnan(signal.max_error) else signal.share_outside
-    numbers = [signal.max_error, at, signal.allowed, signal.max_shift, share]
-    return [signal.name, signal.unit or "1", *numbers, _verdict(signal)]
+    errors = [signal.max_error, at, signal.allowed, signal.max_shift if compared else nan, signal.rms_error]
+    return [signal.name, signal.unit or "1", *errors, signal.share_outside if compared else nan, _verdict(signal)]
 
 
 def _verdict(signal: SignalComparison) -> str:
-    if signal.status != "differs":
-        return signal.status
-    return "differs: " + ", ".join(dict.fromkeys(finding.kind.replace("_", " ") for finding in signal.findings))
+    kinds = dict.fromkeys(finding.kind.replace("_", " ") for finding in signal.findings)
+    return VERDICTS.get(signal.status) or f"differs: {', '.join(kinds)}"
 
 
 def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int]) -> Parts:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
-from fmus.fmu_report import describe_file, problems_of
+from fmus.fmu_report import describe_file, description_parts, problems_of
 
 OK, PROBLEMS = 0, 1
 
@@ -26,7 +26,6 @@ def execute(options: argparse.Namespace) -> Output:
     """
     if not options.file.is_file():
         raise FileNotFoundError(f"{options.file} does not exist; give the path of an FMU.")
-    lines, problems = describe_file(options.file), problems_of(options.file)
-    text = "\n".join([*lines, *(f"problem: {problem}" for problem in problems)])
-    data = {"file": str(options.file), "description": lines, "problems": problems}
-    return Output([text], data, code=PROBLEMS if problems else OK)
+    data, problems = describe_file(options.file), problems_of(options.file)
+    parts = [*description_parts(data), "\n".join(f"problem: {problem}" for problem in problems)]
+    return Output(parts, data | {"problems": problems}, code=PROBLEMS if problems else OK)

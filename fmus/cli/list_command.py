@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from typing import Any
 
-from fmus.catalogue import CatalogueEntry, by_room, catalogue
+from fmus.catalogue import CatalogueEntry, Option, by_room, catalogue
 from fmus.cli.output import Output
 from fmus.tables.table import Table, name_column, text_column
 
@@ -13,32 +14,59 @@ GROUP = "Models"
 HELP = "models that can be exported, with their presets and options"
 PARSER: dict[str, Any] = {}
 ARGUMENTS = ()
-_COLUMNS = (name_column("name"), text_column("description"))
+COLUMNS = (name_column("name"), text_column("description"))
 
 
 def execute(_options: argparse.Namespace) -> Output:
-    """The models, by the room they live in."""
-    rooms = by_room(catalogue().values())
-    tables = [
-        Table("models", _COLUMNS, [[entry.name, _described(entry)] for entry in entries], title=f"# {room}")
-        for room, entries in rooms.items()
+    """The models."""
+    entries = catalogue().values()
+    return Output(model_tables("models", entries), {"models": model_data(entries)})
+
+
+def model_tables(key: str, entries: Iterable[CatalogueEntry]) -> list[Table]:
+    """Models with their descriptions, sources, presets and options, a table for each room that they live in.
+
+    Args:
+        key: of the tables in data. entries: of the catalogue.
+    """
+    return [
+        Table(key, COLUMNS, [[entry.name, _described(entry)] for entry in members], title=f"# {room}")
+        for room, members in by_room(entries).items()
     ]
-    return Output(tables, {"models": {e.name: _data(room, e) for room, entries in rooms.items() for e in entries}})
 
 
-def _data(room: str, entry: CatalogueEntry) -> dict[str, Any]:
-    options = {
-        option.name: {"default": option.default, "values": option.legal.removeprefix(", ")} for option in entry.options
+def model_data(entries: Iterable[CatalogueEntry]) -> dict[str, dict[str, Any]]:
+    """The same as plain data, by name; an option that no word can set is left out.
+
+    Args:
+        entries: of the catalogue.
+    """
+    return {
+        entry.name: {
+            "description": " ".join(entry.description.split()),
+            "room": entry.room,
+            "source": entry.source,
+            "presets": list(entry.presets),
+            "preset": entry.preset,
+            "options": {o.name: {"default": o.default, "choices": _choices(o)} for o in _settable(entry)},
+        }
+        for entry in entries
     }
-    presets = {"presets": list(entry.presets), "preset": entry.preset}
-    return {"description": entry.description, "room": room, "source": entry.source} | presets | {"options": options}
 
 
 def _described(entry: CatalogueEntry) -> str:
-    """First line of the description; presets and options, a line each; an option that no word can set is left out."""
-    lines = [next(iter(entry.description.strip().splitlines()), "")]
+    """Description, source, presets and options, a line each."""
+    lines = [" ".join(entry.description.split()), *([f"[{entry.source}]"] if entry.source else [])]
     if entry.presets:
         default = f" (default {entry.preset})" if entry.preset else ""
-        lines.append(f"  presets: {', '.join(entry.presets)}{default}")
-    settable = [option for option in entry.options if option.legal or option.default is not None]
-    return "\n".join([*lines, *(f"  option {option.name} = {option.default}{option.legal}" for option in settable)])
+        lines.append(f"presets: {', '.join(entry.presets)}{default}")
+    options = [f"{o.name} = {o.default} ({_choices(o) or 'any'})" for o in _settable(entry)]
+    return "\n".join([*lines, *([f"options: {', '.join(options)}"] if options else [])])
+
+
+def _settable(entry: CatalogueEntry) -> list[Option]:
+    return [option for option in entry.options if option.legal or option.default is not None]
+
+
+def _choices(option: Option) -> str:
+    return option.legal.removeprefix(", ").removeprefix("one of ")

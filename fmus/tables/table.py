@@ -175,6 +175,6 @@ def pairs_table(key: str, entries: Mapping[str, Any], title: str = "") -> Table:
     """
 
     def written(value: Any) -> str:
-        return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+        return (", ".join(map(str, value)) or "none") if isinstance(value, list | tuple) else str(value)
 
     return Table(key, [name_column("name"), text_column("value", write=written)], list(entries.items()), title)

@@ -5,6 +5,7 @@ left.
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -397,11 +398,11 @@ def test_info_on_an_fmu_for_another_platform(version: int, tmp_path: Path, capsy
     elsewhere = rewritten(fmu, tmp_path / "e.fmu", lambda n, b: (foreign, b"") if n.startswith("binaries/") else (n, b))
     main(["info", str(elsewhere)])
     shown = capsys.readouterr().out
-    assert "platforms: aarch64-solaris" in shown
-    assert "): no, it has no library for this platform" in shown
+    assert re.search("platforms +aarch64-solaris", shown)
+    assert re.search(r"this machine .*\) +no, it has no library for this platform", shown)
     assert "Its sources can be compiled" in shown
     main(["info", str(fmu)])
-    assert "): yes" in capsys.readouterr().out
+    assert re.search(r"this machine .*\) +yes", capsys.readouterr().out)
 
 
 @pytest.mark.compiler

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -47,8 +48,8 @@ def test_build_and_info(tmp_path: Path, capsys: Output) -> None:
     assert f"odometer: FMI 2.0, {built.stat().st_size / 1000:.0f} kB, {fmpy.platform}" in said.err
     assert main(["info", str(built)]) == 0
     shown = capsys.readouterr().out
-    assert "odometer: FMI 2.0, co-simulation" in shown
-    assert "wheel_speed = " in shown
+    assert re.search("FMI version +2.0\ninterfaces +co-simulation", shown)
+    assert re.search("wheel_speed +=", shown)
 
 
 @pytest.mark.compiler
@@ -95,7 +96,7 @@ def test_build_with_option(tmp_path: Path, capsys: Output) -> None:
 def test_build_with_preset(tmp_path: Path, capsys: Output) -> None:
     assert main(["build", "locomotive", "--preset", "chapter_3_four_axles", "-o", str(tmp_path)]) == 0
     assert main(["info", capsys.readouterr().out.strip()]) == 0
-    assert "n_axles = 4.0" in capsys.readouterr().out
+    assert re.search("n_axles += 4.0 ", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize(
@@ -134,10 +135,10 @@ def test_info_tells_capabilities_of_each_interface_and_items_by_name(capsys: Out
     ):
         assert main(["info", str(cached_fmu(recipe("takagi_sugeno_cdo"), version))]) == 0
         shown = capsys.readouterr().out
-        assert f"capabilities in co-simulation: {common}{tail}" in shown
-        assert "  late_policy = replay [replay, reject, late]" in shown
+        assert re.search(f"capabilities in co-simulation +{common}{tail}", shown)
+        assert re.search(r"late_policy += replay .*\(replay, reject, late\)", shown)
     lines = [line for line in shown.splitlines() if line.startswith("capabilities")]
-    assert [line.partition(":")[0] for line in lines] == [
+    assert [line[: len("capabilities in model exchange")].strip() for line in lines] == [
         "capabilities in co-simulation",
         "capabilities in model exchange",
     ]

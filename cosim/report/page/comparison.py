@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
 
+from cosim.comparison.comparison_text import VERDICTS, signals_table
 from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
 from cosim.drawing.style import png
 from cosim.report.figures.comparison_figure import comparison_picture
@@ -20,31 +20,12 @@ from cosim.report.page.render import render
 from cosim.report.page.run_statements import Statement
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
-from fmus.tables.table import Column, Table, name_column, text_column
+from fmus.tables.table import Table
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
 _MOST_PICTURES = 12  # on a page: the worst signals tell the story
 FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
-_COLUMNS = (
-    name_column("signal", "Signal"),
-    text_column("unit", "Unit"),
-    text_column("verdict", "Verdict"),
-    Column("max_error", "Largest error", "", "Of result minus reference"),
-    Column("allowed", "Allowed", "", "Where the error is largest"),
-    Column("max_error_at", "At", "s", digits=6),
-    Column("max_shift", "Largest shift", "s", "Of instants"),
-    Column("rms_error", "Error, rms"),
-    Column("share_outside", "Outside", "%", "Share of the time outside the tolerance", factor=100.0),
-)
-VERDICTS = {
-    "equal": "equal to the bit",
-    "within": "within tolerance",
-    "differs": "differs",
-    "missing": "missing in the result",
-    "extra": "only in the result",
-    "ignored": "not compared",
-}
 
 
 def write_comparison(
@@ -221,7 +202,7 @@ def _in_words(signal: SignalComparison) -> str:
     if signal.findings:
         return _text(signal, signal.findings[0])
     near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
-    return VERDICTS[signal.status] + near
+    return VERDICTS.get(signal.status, "differs") + near
 
 
 def _text(signal: SignalComparison, finding: ComparisonFinding) -> str:
@@ -234,8 +215,7 @@ def _table(comparison: Comparison) -> Table:
     failed = comparison.failed
     others = [s for s in comparison.signals if not any(s is f for f in failed)]
     others.sort(key=_use_of_tolerance, reverse=True)
-    rows = [_row(signal) for signal in (*failed, *others)]
-    return Table("signals", _COLUMNS, rows, bad={VERDICTS[s.status] for s in failed})
+    return signals_table([*failed, *others], failed)
 
 
 def _use_of_tolerance(signal: SignalComparison) -> float:
@@ -243,13 +223,6 @@ def _use_of_tolerance(signal: SignalComparison) -> float:
     if signal.status not in ("equal", "within") or not isfinite(signal.max_error):
         return -1.0
     return signal.max_error / signal.allowed if signal.allowed > 0.0 else (inf if signal.max_error > 0.0 else 0.0)
-
-
-def _row(signal: SignalComparison) -> list[Any]:
-    compared = signal.status in ("equal", "within", "differs")
-    errors = [signal.max_error, signal.allowed, signal.max_error_at, signal.max_shift if compared else None]
-    verdict, outside = VERDICTS[signal.status], signal.share_outside if compared else None
-    return [signal.name, signal.unit, verdict, *errors, signal.rms_error, outside]
 
 
 # -- files ------------------------------------------------------------------------------------------------------------

@@ -120,7 +120,7 @@ def test_a_library_under_another_name_is_named(tmp_path: Path, version: str, cap
     assert not look_into(path).runs_here
     if version == "1.0":
         return
-    assert re.search(rf"this machine .*: no, .*{words}", "\n".join(describe_file(path)))
+    assert re.search(rf"this machine .*: no, .*{words}", "\n".join(f"{k}: {v}" for k, v in describe_file(path).items()))
     assert fmus_main(["check", str(path)]) == 2
     assert re.search(words, capfd.readouterr().err)
 
