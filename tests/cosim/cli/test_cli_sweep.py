@@ -58,7 +58,7 @@ def test_a_sweep_prints_the_table_and_writes_every_run(
     )
     said = capsys.readouterr().out
     assert said.splitlines()[0].split() == ["run", "train.mass", "stop"]
-    assert [line.split() for line in said.splitlines()[1:5]] == [
+    assert [line.split() for line in said.splitlines()[2:6]] == [
         ["0", "70000", "0.1"],
         ["1", "70000", "0.2"],
         ["2", "80000", "0.1"],
