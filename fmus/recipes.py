@@ -64,11 +64,7 @@ def recipe(name: str, **options: Any) -> HybridSystem:
 
 
 def _recipe_options(name: str) -> dict[str, Any]:
-    """Options of a model and their defaults (None where it has none).
-
-    Args:
-        name: model name, one of `RECIPES`.
-    """
+    """Options of a model and their defaults (None where it has none)."""
     cls = RECIPES[name]
     named = {
         p.name: None if p.default is Parameter.empty else p.default
@@ -121,11 +117,7 @@ def _room(name: str) -> str:
 
 
 def _recipe_presets(name: str) -> tuple[list[str], str | None]:
-    """Presets of a model with its default options, and the default preset.
-
-    Args:
-        name: model name, one of `RECIPES`.
-    """
+    """Presets of a model with its default options, and the default preset."""
     cls = RECIPES[name]
     required = (
         p.default is Parameter.empty and p.kind is not Parameter.VAR_KEYWORD for p in signature(cls).parameters.values()

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
+from importlib.resources import files
 from math import isfinite
+from pathlib import Path
+from typing import Any
 from weakref import finalize
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fmus.batch.batch_library import BatchEvents, Columns, load_batch
 from fmus.batch.error import BatchError
 from fmus.batch.schedule import Schedule
-from fmus.build import plan_fmu
+from fmus.build import BuildPlan, plan_fmu
 from fmus.recipes import recipe
+from fmus.toolchain.cached_library import cached_library
+from fmus.toolchain.compile import find_compiler
+from plant_models.disk_cache.folder import cache_folder
 from plant_models.hybrid import HybridSystem
 
 _MEMBERS_AT_A_TIME = 256
@@ -53,7 +59,7 @@ class Batch:
         plan = plan_fmu(self.system, 3, preset)
         self._variables = {v.name: int(v.valueReference) for v in plan.description.modelVariables}
         self._vectors = _vectors(self._variables)
-        self._library = load_batch(plan)
+        self._library = _load(plan)
         self._batch = self._library.batch_create(members)
         if not self._batch:
             raise BatchError(f"There is not enough memory for {members} members of {self.system.name}; take fewer.")
@@ -73,7 +79,7 @@ class Batch:
         """
         references = self._find(name)
         rows = self._rows(name, values, len(references))
-        refused = self._library.batch_set(self._batch, Columns.of(references, rows[:, np.newaxis]))
+        refused = self._library.batch_set(self._batch, _Columns.of(references, rows[:, np.newaxis]))
         if refused >= 0:
             raise BatchError(f"{self.system.name}: {name}: {self._library.batch_message(self._batch).decode()}.")
 
@@ -91,7 +97,7 @@ class Batch:
         """
         references = self._find(name)
         values = np.empty((self.members, 1, len(references)))
-        self._library.batch_get(self._batch, Columns.of(references, values))
+        self._library.batch_get(self._batch, _Columns.of(references, values))
         return values[:, 0] if name in self._vectors else values[:, 0, 0]
 
     def start(self, t0: float = 0.0) -> None:
@@ -136,7 +142,7 @@ class Batch:
         self._schedule = waiting.joined(added)
         kept = self._schedule
         first = np.searchsorted(kept.members, np.arange(self.members + 1)).astype(np.int64)
-        events = BatchEvents(
+        events = _Events(
             kept.kinds.ctypes.data, kept.stamps.ctypes.data, kept.payloads.ctypes.data, kept.payloads.shape[1]
         )
         self._library.batch_schedule(self._batch, first.ctypes.data, events)  # which stay in `_schedule`
@@ -177,8 +183,8 @@ class Batch:
         times = self._instants(instants)
         given = self._inputs(inputs or {}, len(times))
         taken = np.empty((self.members, len(times), len(results)))
-        sources = Columns.of([self._scalar(name) for name in inputs or {}], given)
-        targets = Columns.of([self._scalar(name) for name in results], taken)
+        sources = _Columns.of([self._scalar(name) for name in inputs or {}], given)
+        targets = _Columns.of([self._scalar(name) for name in results], taken)
         for first in range(0, self.members, _MEMBERS_AT_A_TIME):
             last = min(first + _MEMBERS_AT_A_TIME, self.members)
             self._library.batch_run(self._batch, first, last, times.ctypes.data, len(times), sources, targets)
@@ -251,3 +257,87 @@ def _vectors(variables: Mapping[str, int]) -> dict[str, list[int]]:
         if name.endswith("]"):
             vectors.setdefault(name.partition("[")[0], []).append(reference)
     return vectors
+
+
+# -- the compiled loop: `batch.c` around the C of the system's FMU, compiled once and kept in the cache ---------------
+
+
+MAIN = "batch.c"
+
+
+class _Columns(ctypes.Structure):
+    """Values of variables by member and instant, as in `batch.c`; a stride of zero repeats what stands there."""
+
+    _fields_ = (
+        ("references", ctypes.c_void_p),
+        ("count", ctypes.c_int64),
+        ("values", ctypes.c_void_p),
+        ("member_stride", ctypes.c_int64),
+        ("instant_stride", ctypes.c_int64),
+    )
+
+    @classmethod
+    def of(cls, references: Sequence[int], values: np.ndarray) -> _Columns:
+        """Columns over an array.
+
+        Args:
+            references: value references of the variables.
+            values: shape (members, instants, variables), numbers of a row side by side; it must stay as long as the
+                columns. A broadcast axis has a stride of zero.
+        """
+        numbers = np.array(references, dtype=np.uint32)
+        strides = (values.strides[0] // 8, values.strides[1] // 8)
+        columns = cls(numbers.ctypes.data, len(numbers), values.ctypes.data, *strides)
+        columns.kept = numbers, values
+        return columns
+
+    kept: Any
+
+
+class _Events(ctypes.Structure):
+    """Events of all members, sorted by member and stamp, as in `batch.c`."""
+
+    _fields_ = (
+        ("kind", ctypes.c_void_p),
+        ("stamp", ctypes.c_void_p),
+        ("payload", ctypes.c_void_p),
+        ("stride", ctypes.c_int64),
+    )
+
+
+def _load(plan: BuildPlan) -> ctypes.CDLL:
+    """The library of a system's batch, compiled on the first call ever.
+
+    Args:
+        plan: of the system's FMU.
+
+    Raises:
+        CompilerMissing: no C compiler was found.
+        CompilationError: the compiler refused the sources.
+        OSError: the cache folder cannot be written, or the library not be loaded.
+    """
+    sources = plan.source_files() | plan.header_files() | {MAIN: (files("fmus.batch") / MAIN).read_bytes()}
+    path = cached_library(f"{plan.system.name}_batch", sources, MAIN, find_compiler(), cache_folder())
+    return _declared(path)
+
+
+def _declared(path: Path) -> ctypes.CDLL:
+    library = ctypes.CDLL(str(path))
+    batch, number, columns = ctypes.c_void_p, ctypes.c_int64, ctypes.POINTER(_Columns)
+    declarations: dict[str, tuple[Any, ...]] = {
+        "batch_create": (batch, number),
+        "batch_free": (None, batch),
+        "batch_reset": (None, batch),
+        "batch_start": (None, batch, ctypes.c_double),
+        "batch_message": (ctypes.c_char_p, batch),
+        "batch_failure": (ctypes.c_char_p, batch, number),
+        "batch_set": (number, batch, columns),
+        "batch_get": (None, batch, columns),
+        "batch_schedule": (None, batch, ctypes.c_void_p, ctypes.POINTER(_Events)),
+        "batch_next_event": (number, batch, number),
+        "batch_run": (None, batch, number, number, ctypes.c_void_p, number, columns, columns),
+    }
+    for name, (result, *arguments) in declarations.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,18 +11,21 @@ from time import perf_counter
 
 from fmpy.model_description import ModelDescription
 
+from fmus.check.check import Check
 from fmus.check.checked_instance import LOADING
 from fmus.check.checks.archive_checks import platforms, validation
 from fmus.check.conclusions import what_to_trust
 from fmus.check.findings import Class, Finding, Verdict, class_of
 from fmus.check.isolated import run_isolated
 from fmus.check.job import Job
-from fmus.check.known_checks import checks_of, registered_places
+from fmus.check.known_checks import CHECKS
 from fmus.check.runner import end_of_experiment
 from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
 from fmus.fmi.instance import INSTANTIATING
 from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION
 from fmus.fmi.types import NUMERIC_TYPES
+from plant_models.registry import log_left_out
+from plant_models.user_file import UserFileError, name_of
 
 _TIMEOUT = 30.0
 _DEFAULT_STEP = 0.01
@@ -148,8 +151,8 @@ def _run_findings(archive: Archive, job: Job, progress: Callable[[str], None]) -
             if interface == SCHEDULED_EXECUTION:
                 findings.append(Finding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
                 continue
-            names = tuple(checks_of(interface, left_out.__setitem__))
-            places = registered_places(names)
+            names = tuple(_checks_of(interface, left_out.__setitem__))
+            places = _registered_places(names)
             one = replace(job, folder=str(folder), interface=interface, checks=names, places=places)
             findings += _meant(archive, interface, run_isolated(one, progress))
     _demand_runnable(archive, findings)
@@ -165,7 +168,7 @@ def check_count(archive: Archive) -> int:
     Args:
         archive: the FMU file.
     """
-    return len(_STATIC) + sum(len(checks_of(interface)) for interface in archive.interfaces)
+    return len(_STATIC) + sum(len(_checks_of(interface)) for interface in archive.interfaces)
 
 
 def _default_step(description: ModelDescription) -> float:
@@ -204,7 +207,7 @@ def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Fi
     """Findings by what they mean for co-simulation: beside it those of model exchange are notes."""
     if interface == CO_SIMULATION or CO_SIMULATION not in archive.interfaces:
         return findings
-    own = checks_of(interface)
+    own = _checks_of(interface)
     meant = {Verdict.LIMIT, Verdict.DISTRUST}
     return [
         replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings
@@ -248,3 +251,29 @@ def _merged(findings: list[Finding]) -> tuple[Finding, ...]:
         held = worst.pop(finding.check, None)
         worst[finding.check] = held if held is not None and held.verdict.rank > finding.verdict.rank else finding
     return tuple(worst.values())
+
+
+def _checks_of(interface: str, left_out: Callable[[str, str], None] = log_left_out) -> dict[str, type[Check]]:
+    """The checks of an interface type by name, in order."""
+    found = {name: check for name, check in CHECKS.usable(left_out).items() if check.interface == interface}
+    return dict(sorted(found.items(), key=lambda item: item[1].place))
+
+
+def _registered_places(names: Iterable[str]) -> dict[str, str]:
+    """Where a process of their own finds the checks that this program has registered: ``file.py:Class`` by name.
+
+    Args:
+        names: of checks.
+
+    Raises:
+        ValueError: one stands where no other process finds it.
+    """
+    places = {}
+    for name in names:
+        check = CHECKS.own(name)
+        if check is None:
+            continue
+        if check.__module__ == "__main__":
+            raise UserFileError(f"the check {name!r} stands in the program itself; put it into a file and import that.")
+        places[name] = name_of(check)
+    return places

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isinf
 from typing import Any
+from weakref import WeakKeyDictionary
 
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
 from fmus.documentation.licences import model_terms
 from fmus.documentation.prose import blocks, pieces
 from fmus.documentation.rebuild import rebuild_commands
-from fmus.documentation.variable_tables import certificate_rows, preset_rows, variable_rows
 from fmus.fmi.standard import INTERFACES
 from fmus.templates import environment
 from fmus.toolchain.targets import Target
@@ -48,8 +50,8 @@ def page(system: HybridSystem, description: ModelDescription, preset: str | None
         names=by_name.keys(),
         late=LATE_POLICIES[int(policy.start) - 1] if policy is not None else None,
         counts=[name for name in OUTCOME_VARIABLES if name in by_name],
-        presets=preset_rows(system),
-        checked=certificate_rows(system),
+        presets=_preset_rows(system),
+        checked=_certificate_rows(system),
         commands=rebuild_commands(system.name),
         tool=_tool(),
         terms=model_terms(system),
@@ -67,7 +69,7 @@ def render(template: str, description: ModelDescription, **values: Any) -> str:
     Returns:
         The page.
     """
-    rows = {f"{causality}s": variable_rows(description, causality) for causality in CAUSALITIES}
+    rows = {f"{causality}s": _variable_rows(description, causality) for causality in CAUSALITIES}
     return PAGES.get_template(template).render(description=description, **rows, **values)
 
 
@@ -80,3 +82,132 @@ def _equations(system: HybridSystem) -> list[Any]:
 def _tool() -> str:
     version = installed_version("fmu-observer")
     return "fmu-observer" if version is None else f"fmu-observer {version}"
+
+
+# -- what the tables hold: variables, presets, certificates, as data --------------------------------------------------
+
+
+_UNITS_OF_TYPES = {"Clock": "clock", "Integer": "whole number", "Int32": "whole number", "Enumeration": "choice"}
+
+
+@dataclass(frozen=True, slots=True)
+class _VariableRow:
+    """A variable in words.
+
+    Args:
+        name: of the variable.
+        unit: with the unit in which it is to be shown, if any.
+        start: its start value; empty without one.
+        range: from its least to its largest value; empty without bounds.
+        meaning: its description.
+        has_start: whether it has a start value.
+    """
+
+    name: str
+    unit: str
+    start: str
+    range: str
+    meaning: str
+    has_start: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _CertificateRow:
+    """What the stability check says of a preset.
+
+    Args:
+        preset: its name.
+        aperiodic: up to which mixed gaps it is certified, in words.
+        constant: from which constant gap on it is unstable, in words.
+        text: what was checked.
+        event: the event that gaps lie between; empty where the check failed.
+    """
+
+    preset: str
+    aperiodic: str
+    constant: str
+    text: str
+    event: str
+
+
+_known: WeakKeyDictionary[HybridSystem, list[_CertificateRow]] = WeakKeyDictionary()
+
+
+def _variable_rows(description: ModelDescription, causality: str) -> list[_VariableRow]:
+    """The variables of one causality.
+
+    Args:
+        description: of the FMU.
+        causality: ``input``, ``output`` or ``parameter``.
+    """
+    return [_variable(v) for v in description.modelVariables if v.causality == causality]
+
+
+def _variable(variable: ModelVariable) -> _VariableRow:
+    unit = variable.unit or _UNITS_OF_TYPES.get(str(variable.type), "1")
+    shown = f"{unit} ({variable.displayUnit})" if variable.displayUnit else unit
+    has_start = variable.start is not None
+    return _VariableRow(variable.name, shown, _start(variable), _range(variable), variable.description or "", has_start)
+
+
+def _start(variable: ModelVariable) -> str:
+    items = variable.declaredType.items if variable.type == "Enumeration" and variable.declaredType else ()
+    names = [item.name for item in items if str(item.value) == str(variable.start)]
+    return _number(variable.start) + (f" ({names[0]})" if names else "")
+
+
+def _number(value: object) -> str:
+    try:
+        return f"{float(str(value)):.12g}"
+    except ValueError:
+        return "" if value is None else str(value)
+
+
+def _range(variable: ModelVariable) -> str:
+    low, high = variable.min, variable.max
+    if low is None and high is None:
+        return ""
+    return f"{'…' if low is None else _number(low)} to {'…' if high is None else _number(high)}"
+
+
+def _preset_rows(system: HybridSystem) -> list[list[str]]:
+    """Name and unit of each parameter that a preset sets, and its value in every preset."""
+    values = {name: system.preset_values(name) for name in system.presets}
+    signals = (*system.parameter_signals, *system.states)
+    starts = {name: start for s in signals for name, start in zip(s.scalar_names, s.start_values, strict=True)}
+    units = {name: s.unit for s in signals for name in s.scalar_names}
+    names = dict.fromkeys(name for preset in values.values() for name in preset)
+    return [
+        [name, units[name], *(_number(preset.get(name, starts[name])) for preset in values.values())] for name in names
+    ]
+
+
+def _certificate_rows(system: HybridSystem) -> list[_CertificateRow] | None:
+    """What the stability check says of each preset; None where the system has none.
+
+    A certificate is found with the values of the preset; whoever changes a gain in the FMU asks again.
+
+    Args:
+        system: the hybrid system.
+    """
+    if not hasattr(system, "certify"):
+        return None
+    if system not in _known:  # it takes up to half a second; FMI 2 and FMI 3 say the same
+        _known[system] = [_certificate(system, preset) for preset in (*system.presets,) or (None,)]
+    return _known[system]
+
+
+def _certificate(system: Any, preset: str | None) -> _CertificateRow:
+    name = preset or "declared starts"
+    try:
+        certificate = system.certify(0.1, preset=preset)  # the limits do not depend on the gap asked for
+        limits = (_limit(certificate.aperiodic_limit, certificate), _limit(certificate.constant_limit, certificate))
+        notes = f" Also checked: {'; '.join(certificate.notes)}." if certificate.notes else ""
+        return _CertificateRow(name, *limits, f"Checked on the {certificate.error_model}.{notes}", certificate.event)
+    except Exception as error:  # a user's own check may fail in any way; the FMU is none the worse
+        return _CertificateRow(name, "unknown", "unknown", f"The check failed: {error}", "")
+
+
+def _limit(limit: float, certificate: Any) -> str:
+    reach = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
+    return reach if isinf(limit) else f"{limit:.3g} s"

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
-from fmpy.model_description import ModelDescription
+from fmpy import read_model_description
+from fmpy.model_description import ModelDescription, ValidationError
 
 from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
-from fmus.fmi.description import FILE, read_description, why_unreadable
+from fmus.fmi.description import FILE, read_description
 from fmus.fmi.sense import nonsense, tell_apart
 from fmus.fmi.standard import INTERFACES
 
@@ -153,7 +154,7 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
     try:
         description = read_description(path)
     except Exception as error:  # whatever a broken file makes the parser throw
-        reason = why_unreadable(path, error)
+        reason = _why_unreadable(path, error)
         raise NotAnFmuError(
             f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({reason})."
         ) from error
@@ -168,3 +169,23 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
     if fault is not None:
         raise NotAnFmuError(f"{path} cannot be used: modelDescription.xml: {fault}")
     return description
+
+
+def _why_unreadable(source: Path, error: Exception) -> str:
+    """Why a model description could not be read: what the schema of the standard says first, else what the parser
+    threw.
+
+    Args:
+        source: the user's file.
+        error: what the parser threw.
+    """
+    try:
+        read_model_description(str(source), validate=True)
+    except ValidationError as found:
+        lines = [line.removeprefix("- ") for line in str(found).splitlines() if line.startswith("- ")]
+        return lines[0].rstrip(".") if lines else str(error)
+    except Exception:  # as before, with nothing learnt from the schema
+        pass
+    if isinstance(error, (KeyError, TypeError, AttributeError)):  # of the parser, on its way through the entries
+        return f"an attribute is missing, or a reference leads nowhere: {type(error).__name__} {error}"
+    return str(error)

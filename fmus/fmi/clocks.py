@@ -48,7 +48,7 @@ class Rhythm:
 
 
 @dataclass
-class TimeClock:
+class _TimeClock:
     """One clock and its next tick.
 
     Args:
@@ -104,10 +104,10 @@ class ClockSchedule:
     slave: Callable[[], Any]
     variables: Sequence[ModelVariable]
     refuse: Refuse
-    clocks: list[TimeClock] = field(init=False)
+    clocks: list[_TimeClock] = field(init=False)
 
     def __post_init__(self) -> None:
-        found = [TimeClock(v) for v in self.variables if is_time_based(v)]
+        found = [_TimeClock(v) for v in self.variables if _is_time_based(v)]
         self.clocks = sorted(found, key=lambda clock: clock.priority)
 
     def __bool__(self) -> bool:
@@ -118,7 +118,7 @@ class ClockSchedule:
         """When the first of them ticks [s]."""
         return min((clock.next for clock in self.clocks), default=NEVER)
 
-    def due(self, t: float) -> list[TimeClock]:
+    def due(self, t: float) -> list[_TimeClock]:
         """Those that tick at `t` [s], by priority."""
         return [clock for clock in self.clocks if clock.next <= t + TIME_TOLERANCE]
 
@@ -143,7 +143,7 @@ class ClockSchedule:
             else:
                 self._start(clock, Rhythm(t, 0.0, interval, resolution), 1)
 
-    def tick(self, clocks: Sequence[TimeClock]) -> None:
+    def tick(self, clocks: Sequence[_TimeClock]) -> None:
         """These clocks were set active: on to their next instants."""
         for clock in clocks:
             clock.ticked = True
@@ -180,7 +180,7 @@ class ClockSchedule:
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _start(self, clock: TimeClock, rhythm: Rhythm, number: int) -> None:
+    def _start(self, clock: _TimeClock, rhythm: Rhythm, number: int) -> None:
         seconds = rhythm.interval / rhythm.resolution if rhythm.resolution > 0.0 else math.nan
         least = "above 0" if clock.kind in PERIODIC else "0 or more"
         if not math.isfinite(seconds) or seconds < 0.0 or (seconds == 0.0 and clock.kind in PERIODIC):
@@ -193,7 +193,7 @@ class ClockSchedule:
             )
         clock.rhythm, clock.number = rhythm, number
 
-    def _shift(self, clock: TimeClock, resolution: float) -> float:
+    def _shift(self, clock: _TimeClock, resolution: float) -> float:
         references = (ctypes.c_uint32 * 1)(clock.variable.valueReference)
         if clock.variable.supportsFraction:
             counters, resolutions = (ctypes.c_uint64 * 1)(), (ctypes.c_uint64 * 1)()
@@ -203,7 +203,7 @@ class ClockSchedule:
         self.slave().getShiftDecimal(references, shifts)
         return float(shifts[0])
 
-    def _intervals(self, clocks: Sequence[TimeClock]) -> Iterator[tuple[TimeClock, tuple[float, float, int]]]:
+    def _intervals(self, clocks: Sequence[_TimeClock]) -> Iterator[tuple[_TimeClock, tuple[float, float, int]]]:
         for ask, some in ((self._decimals, False), (self._fractions, True)):
             group = [clock for clock in clocks if bool(clock.variable.supportsFraction) is some]
             if group:
@@ -223,7 +223,7 @@ class ClockSchedule:
         return [(float(c), float(r), int(q)) for c, r, q in zip(counters, resolutions, qualifiers, strict=True)]
 
 
-def is_time_based(variable: ModelVariable) -> bool:
+def _is_time_based(variable: ModelVariable) -> bool:
     """Whether a variable is a clock that the importer sets by the time."""
     return (
         variable.type == "Clock"
@@ -242,7 +242,7 @@ def clock_references(variable: ModelVariable) -> frozenset[int]:
     return frozenset(int(getattr(entry, "valueReference", entry)) for entry in variable.clocks or ())
 
 
-def _may_change(clock: TimeClock) -> bool:
+def _may_change(clock: _TimeClock) -> bool:
     """Whether the slave must be asked after an update of its discrete states."""
     if clock.kind == "changing":
         return clock.ticked

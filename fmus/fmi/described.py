@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +10,6 @@ from dataclasses import dataclass
 from fmpy.model_description import ModelDescription
 
 from fmus.fmi.capabilities import read_capabilities
-from fmus.fmi.description import declared_tolerance
 from fmus.fmi.elements import Variables, elements_of
 from fmus.fmi.standard import CO_SIMULATION
 from fmus.fmi.types import NUMERIC_TYPES, REAL_TYPE
@@ -66,7 +66,7 @@ class Described(ABC):
     def __init__(self, name: str, description: ModelDescription) -> None:
         self.name, self.description = name, description
         self.capabilities = read_capabilities(description, self.interface)
-        self.tolerance: float | None = declared_tolerance(description) if self.fmi_version > 1 else None
+        self.tolerance: float | None = _declared_tolerance(description) if self.fmi_version > 1 else None
         """Relative tolerance that it is told at set-up; FMI 1.0 co-simulation has no call for it."""
         self.variables = Variables({v.name: v for v in description.modelVariables})
         self.events: dict[str, EventPort] = self._find_events()
@@ -131,3 +131,13 @@ class Described(ABC):
             and self.variables[name].type == real
             and not self.variables[name].shape
         }
+
+
+def _declared_tolerance(description: ModelDescription) -> float | None:
+    """Relative tolerance of the default experiment; None where none is declared, or no positive number."""
+    experiment = description.defaultExperiment
+    try:
+        tolerance = math.nan if experiment is None or experiment.tolerance is None else float(experiment.tolerance)
+    except ValueError:
+        return None
+    return tolerance if 0.0 < tolerance < math.inf else None

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import zipfile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from fmpy import read_model_description
-from fmpy.model_description import ModelDescription, ModelVariable, Unknown, ValidationError
+from fmpy.model_description import ModelDescription, ModelVariable, Unknown
 
 from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from fmus.fmi.standard import OWN_TOOL
@@ -74,26 +73,6 @@ def read_description(source: Path) -> ModelDescription:
     return description
 
 
-def why_unreadable(source: Path, error: Exception) -> str:
-    """Why a model description could not be read: what the schema of the standard says first, else what the parser
-    threw.
-
-    Args:
-        source: the user's file.
-        error: what the parser threw.
-    """
-    try:
-        read_model_description(str(source), validate=True)
-    except ValidationError as found:
-        lines = [line.removeprefix("- ") for line in str(found).splitlines() if line.startswith("- ")]
-        return lines[0].rstrip(".") if lines else str(error)
-    except Exception:  # as before, with nothing learnt from the schema
-        pass
-    if isinstance(error, (KeyError, TypeError, AttributeError)):  # of the parser, on its way through the entries
-        return f"an attribute is missing, or a reference leads nowhere: {type(error).__name__} {error}"
-    return str(error)
-
-
 def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
     """The attributes of a clock, which fmpy 0.3.32 knows and does not read."""
     for name, convert in CLOCK_ATTRIBUTES.items():
@@ -131,20 +110,6 @@ def _annotation(entry: ElementTree.Element, name: str, element: str) -> ElementT
     """An annotation of a variable as FMI 2 or FMI 3 writes it."""
     places = (f"Tool[@name='{name}']", f"Annotation[@type='{name}']")
     return next((f for p in places if (f := entry.find(f"Annotations/{p}/{element}")) is not None), None)
-
-
-def declared_tolerance(description: ModelDescription) -> float | None:
-    """Relative tolerance of the default experiment; None where none is declared, or no positive number.
-
-    Args:
-        description: model description of the FMU.
-    """
-    experiment = description.defaultExperiment
-    try:
-        tolerance = math.nan if experiment is None or experiment.tolerance is None else float(experiment.tolerance)
-    except ValueError:
-        return None
-    return tolerance if 0.0 < tolerance < math.inf else None
 
 
 def negated_aliases(source: Path) -> frozenset[str]:

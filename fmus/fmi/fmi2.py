@@ -12,7 +12,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
 from fmus.fmi.native_log import fmi2_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.quick_calls import quicken_fmi2, quicken_states
+from fmus.fmi.quick_calls import quicken
 from fmus.fmi.slave import WholeStepSlave, make_step, status_of
 from fmus.fmi.standard import TIME_TOLERANCE
 
@@ -59,8 +59,7 @@ class FMI2Slave(FMI2Instance, WholeStepSlave):
         super()._instantiate()
         self._do_step = make_step(self.slave, "fmi2DoStep", *self._last)
         if is_native(self.slave):
-            quicken_fmi2(self.slave)
-            quicken_states(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
+            quicken(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
         self._forget()
 
     def _forget(self) -> None:

@@ -8,16 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any
 
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmus.fmi.clocks import ClockSchedule, clock_references
 from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
-from fmus.fmi.intermediate import IntermediateUpdate
 from fmus.fmi.interruption import EventMet
 from fmus.fmi.native_calls import prepared_call
 from fmus.fmi.ports import is_native
-from fmus.fmi.quick_calls import quicken_fmi3, quicken_states
+from fmus.fmi.quick_calls import quicken
 from fmus.fmi.slave import Slave
 from fmus.fmi.standard import DISCARD, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE
 
@@ -76,7 +75,7 @@ class FMI3Slave(FMI3Instance, Slave):
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
-        self._intermediate = IntermediateUpdate()
+        self._intermediate = _IntermediateUpdate()
         clocks = description.modelVariables if self.has_event_mode else []
         self.clocks = ClockSchedule(lambda: self.slave, clocks, self.failure)
         self.coordinated = self.event_pending = False
@@ -87,8 +86,7 @@ class FMI3Slave(FMI3Instance, Slave):
         native = is_native(self.slave)
         self._do_step = _native_step(self.slave) if native else self.slave.doStep
         if native:
-            quicken_fmi3(self.slave)
-            quicken_states(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
+            quicken(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
 
     def exit_initialization(self) -> None:
         if self.clocks:
@@ -293,3 +291,46 @@ def _native_step(slave: Any) -> Callable[[float, float], tuple[bool, bool, bool,
         return event.value, terminate.value, early.value, reached.value
 
     return do_step
+
+
+class _IntermediateUpdate:
+    """The callback of one slave.
+
+    `request` names the inputs before the slave is instantiated; afterwards `handler` is called with the time [s]
+    whenever the slave lets inputs be set within its step. An exception of the handler cannot pass through the slave's C
+    code; it is kept, and raised by `check` after the step.
+    """
+
+    def __init__(self) -> None:
+        self.requested: dict[str, int] = {}
+        self.handler: Callable[[float], None] | None = None
+        self._error: Exception | None = None
+
+    def request(self, variables: Sequence[ModelVariable]) -> None:
+        """Ask for calls for those of the inputs that may be set within a step.
+
+        Args:
+            variables: the inputs that are asked for.
+        """
+        self.requested = {v.name: v.valueReference for v in variables if v.intermediateUpdate}
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What to instantiate the slave with."""
+        if not self.requested:
+            return {}
+        return {"intermediateUpdate": self._called, "requiredIntermediateVariables": list(self.requested.values())}
+
+    def check(self) -> None:
+        """Raise what the handler raised within the last step."""
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+
+    def _called(self, _environment: Any, time: float, set_requested: bool, *_rest: Any) -> None:
+        if not set_requested or self.handler is None or self._error is not None:
+            return
+        try:
+            self.handler(time)
+        except Exception as error:  # it would be lost in the slave
+            self._error = error

@@ -7,7 +7,6 @@ called.
 from __future__ import annotations
 
 import ctypes
-import inspect
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -38,15 +37,6 @@ CAPABILITY_FUNCTIONS = {
     "hasEventMode": ("EnterEventMode", "UpdateDiscreteStates", "EnterStepMode"),
 }
 """Functions that belong to a capability, in FMI 2 spelling; case is ignored."""
-
-
-def functions_of(version: int, interface: str) -> list[str]:
-    """Names of the C functions that an interface type has in the standard.
-
-    Args:
-        version: of FMI.
-    """
-    return [name for name, _ in inspect.getmembers(FACES[version, interface]) if name.startswith(f"fmi{version}")]
 
 
 def functions_of_capabilities(description: ModelDescription, interface: str) -> Iterator[tuple[str, str]]:

@@ -18,7 +18,7 @@ from fmpy.fmi1 import fmi1CallbackFunctions, printLogMessage
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
 
-class Listener(Protocol):
+class _Listener(Protocol):
     """Somebody who hears the messages of one instance."""
 
     name: str
@@ -33,10 +33,10 @@ class Listener(Protocol):
 
 
 _numbers = count(1)
-_listeners: dict[int, Listener] = {}
+_listeners: dict[int, _Listener] = {}
 
 
-def fmi1_callbacks(listener: Listener) -> Any:
+def fmi1_callbacks(listener: _Listener) -> Any:
     """Callbacks for an instance of FMI 1.0; `forget` the listener once it is freed."""
     _listen(listener)
     made = fmi1CallbackFunctions()
@@ -47,7 +47,7 @@ def fmi1_callbacks(listener: Listener) -> Any:
     return made
 
 
-def fmi2_callbacks(listener: Listener) -> Any:
+def fmi2_callbacks(listener: _Listener) -> Any:
     """Callbacks for an instance of FMI 2.0; `forget` the listener once it is freed."""
     made = fmi2CallbackFunctions()
     made.logger = _shared.logger
@@ -56,7 +56,7 @@ def fmi2_callbacks(listener: Listener) -> Any:
     return made
 
 
-def forget(listener: Listener) -> None:
+def forget(listener: _Listener) -> None:
     """Messages of this one are of no interest any more.
 
     Args:
@@ -66,7 +66,7 @@ def forget(listener: Listener) -> None:
         del _listeners[number]
 
 
-def _listen(listener: Listener) -> int:
+def _listen(listener: _Listener) -> int:
     forget(listener)
     number = next(_numbers)
     _listeners[number] = listener
@@ -84,7 +84,7 @@ def _take_message(
             printLogMessage(environment, name or b"", status, category or b"", message or b"")
 
 
-def _named(name: bytes | None) -> Listener | None:
+def _named(name: bytes | None) -> _Listener | None:
     """The newest instance of this name: while an FMU is probed there are two."""
     wanted = (name or b"").decode("utf-8", "replace")
     return next((known for known in reversed(_listeners.values()) if known.name == wanted), None)

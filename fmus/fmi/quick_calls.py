@@ -15,29 +15,20 @@ from fmus.fmi.native_calls import prepared_call
 Discrete = tuple[bool, bool, bool, bool, bool, float]
 
 
-def quicken_states(slave: Any, version: int, names: Sequence[str]) -> None:
-    """Prepare the calls of an instantiated native slave that save, restore and free a state.
+def quicken(slave: Any, version: int, states: Sequence[str]) -> None:
+    """Prepare the calls of an instantiated native slave that save, restore and free a state, and notify of an event.
 
     Arguments and results are those of fmpy's methods.
 
     Args:
-        slave: fmpy's. version: of FMI. names: of its three methods.
+        slave: fmpy's. version: of FMI, 2 or 3. states: names of its methods that save, restore and free a state.
     """
-    functions = [f"fmi{version}{name[0].upper()}{name[1:]}" for name in names]
-    for name, function, make in zip(names, functions, (_getter, _restorer, _releaser), strict=True):
-        setattr(slave, name, make(slave, function))
-
-
-def quicken_fmi2(slave: Any) -> None:
-    """Prepare the calls of an instantiated native slave of FMI 2 that notify of an event; see `quicken_states`."""
-    slave.setReal = _setter(slave, "fmi2SetReal", type(slave).setReal, ctypes.c_double, counted=False)
-    slave.setInteger = _setter(slave, "fmi2SetInteger", type(slave).setInteger, ctypes.c_int, counted=False)
-
-
-def quicken_fmi3(slave: Any) -> None:
-    """Prepare the calls of an instantiated native slave of FMI 3 that enter and leave event mode, and notify of an
-    event; see `quicken_states`.
-    """
+    for name, make in zip(states, (_getter, _restorer, _releaser), strict=True):
+        setattr(slave, name, make(slave, f"fmi{version}{name[0].upper()}{name[1:]}"))
+    if version == 2:
+        slave.setReal = _setter(slave, "fmi2SetReal", type(slave).setReal, ctypes.c_double, counted=False)
+        slave.setInteger = _setter(slave, "fmi2SetInteger", type(slave).setInteger, ctypes.c_int, counted=False)
+        return
     slave.enterEventMode = prepared_call(slave, "fmi3EnterEventMode", slave.component)
     slave.enterStepMode = prepared_call(slave, "fmi3EnterStepMode", slave.component)
     slave.updateDiscreteStates = _update(slave)

@@ -20,14 +20,14 @@ from fmus.fmi.ports import is_native
 from fmus.fmi.standard import DISCARD, NEVER, OK, PENDING, STATUS, WARNING
 
 
-class CallNote(Protocol):
+class _CallNote(Protocol):
     """Where the step under way is noted: its number in `call[0]`, its time [s] in `time[0]`."""
 
     call: Any
     time: Any
 
 
-class Unnoted:
+class _Unnoted:
     """A note that nobody reads."""
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class Slave(Instance):
         super().__init__(name, slave, description)
         self.seconds, self.calls = 0.0, 0
         self.time, self.next_event = math.nan, NEVER
-        self._call_note: CallNote = Unnoted()
+        self._call_note: _CallNote = _Unnoted()
         self._step_number = 0
 
     def reset(self) -> None:

@@ -22,10 +22,10 @@ from fmpy.model_description import Category, CoSimulation, ModelDescription
 
 from fmu_observer.description import LOG_CATEGORIES
 from fmus.content.xml import model_description_xml
+from fmus.documentation.page import render
 from fmus.hosted.host import HostError, make_hosted_block, package_version
 from fmus.hosted.hosted_licences import hosted_licences
 from fmus.hosted.source import HostedExportError, Model, Source, find_source
-from fmus.hosted.wording import description_text, page
 from fmus.pack import check_target, pack_fmu
 from fmus.toolchain.compile import compile_library, find_compiler, library_name
 from fmus.toolchain.platforms import Platform, host_platform
@@ -177,7 +177,7 @@ def _papers(description: ModelDescription, source: Source) -> dict[str, bytes]:
         if source.file
         else f"imported from the installed module {source.module}"
     )
-    html = page(description, f"{source.name}, {text}", package_version(), _OLDEST_PYTHON, sys.version_info[1])
+    html = _page(description, f"{source.name}, {text}", package_version(), _OLDEST_PYTHON, sys.version_info[1])
     return {
         "modelDescription.xml": _xml(description).encode(),
         "documentation/index.html": html.encode(),
@@ -223,7 +223,7 @@ def _describe(recipe: Mapping[str, Any], resources: Path, digest: str) -> ModelD
     description = copy.copy(block.model_description)
     own = hashlib.sha256(f"{description.instantiationToken}{digest}".encode()).hexdigest()
     description.instantiationToken = f"{{{own[:8]}-{own[8:12]}-{own[12:16]}-{own[16:20]}-{own[20:32]}}}"
-    text = description_text(
+    text = _description_text(
         description.description or "", package_version(), _OLDEST_PYTHON, host_platform().fmi2_folder
     )
     description.description, description.modelExchange = text, None
@@ -271,3 +271,50 @@ def _try_alone(resources: Path, slave: str) -> None:
     messages = json.loads(done.stdout.splitlines()[-1])
     if messages:
         raise HostedExportError(f"the model does not run in a process of its own: {'; '.join(messages)}")
+
+
+# -- the words in it: its description, and the page in ``documentation/`` ---------------------------------------------
+
+
+_OVERHEAD = (
+    "a step costs about 10 us more than the block's own Python, which takes 10 us to more than 100 us where "
+    "native C takes 1 us"
+)
+"""Measured, see docs/hosted_export.md."""
+
+
+def _needs(package: str, oldest: tuple[int, int]) -> str:
+    """What must be there, in one sentence without full stop."""
+    return f"Python {oldest[0]}.{oldest[1]} or later with the package fmu-observer {package}"
+
+
+def _description_text(own: str, package: str, oldest: tuple[int, int], platform: str) -> str:
+    """The attribute `description` of modelDescription.xml: the limits first, then what the model says of itself."""
+    return (
+        f"NEEDS PYTHON: this FMU runs Python code and needs {_needs(package, oldest)} on the machine that runs it. "
+        f"Slow ({_OVERHEAD}); not for real-time targets. Only for {platform}; loads into Python processes such as "
+        f"fmpy, and into other programs if they find Python's library (see documentation/index.html). {own}"
+    ).strip()
+
+
+def _page(description: ModelDescription, source: str, package: str, oldest: tuple[int, int], built_minor: int) -> str:
+    """The page documentation/index.html.
+
+    Args:
+        description: of the FMU.
+        source: the model in words.
+        package: version of fmu-observer.
+        oldest: version of Python that suffices, major and minor.
+        built_minor: of the Python 3 it was built with.
+
+    Returns:
+        HTML.
+    """
+    return render(
+        "hosted.html.j2",
+        description,
+        needs=_needs(package, oldest),
+        source=source,
+        overhead=_OVERHEAD,
+        built_minor=built_minor,
+    )

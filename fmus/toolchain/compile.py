@@ -10,21 +10,14 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import fmpy
 
-from fmus.toolchain.cross import (
-    EXTRA,
-    LINK_FLAGS,
-    ZIG_FLAGS,
-    zig_command,
-    zig_environment,
-    zig_is_installed,
-    zig_version,
-)
 from fmus.toolchain.platforms import Platform, host_platform
+from plant_models.disk_cache.folder import cache_folder
 
 _CANDIDATES = ("cc", "gcc", "clang")
 
@@ -90,7 +83,7 @@ def find_compiler() -> Compiler:
         found = shutil.which(candidate)
         if found is not None:
             return _identified((found,), own)
-    if zig_is_installed() and host_platform().target is not None:
+    if _zig_is_installed() and host_platform().target is not None:
         return cross_compiler(host_platform())
     raise CompilerMissing(f"No C compiler was found (looked for {', '.join(_CANDIDATES)}). {_advice()}")
 
@@ -103,12 +96,14 @@ def cross_compiler(platform: Platform) -> Compiler:
     """
     if platform.target is None:
         raise CompilerMissing(f"Libraries for {platform.name} can be built on such a machine only.")
-    if not zig_is_installed():
+    if not _zig_is_installed():
         raise CompilerMissing(
-            f"Building for {platform.name} needs the package ziglang, which the extra 'cross' brings: {EXTRA}. "
+            f"Building for {platform.name} needs the package ziglang, which the extra 'cross' brings: {_EXTRA}. "
             "Without it, --platform host builds for this machine with the system's compiler."
         )
-    return Compiler(zig_command(platform.target), zig_version(), (*ZIG_FLAGS, *LINK_FLAGS[platform.system]), zig=True)
+    return Compiler(
+        _zig_command(platform.target), _zig_version(), (*_ZIG_FLAGS, *_LINK_FLAGS[platform.system]), zig=True
+    )
 
 
 def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], library: str) -> Path:
@@ -129,7 +124,7 @@ def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], li
     """
     command = [*compiler.command, *FLAGS, *compiler.flags, f"-I{header_folder()}", *sources, "-o", library, "-lm"]
     with tempfile.TemporaryDirectory(prefix="fmus-scratch-") as scratch:
-        environment = zig_environment(Path(scratch)) if compiler.zig else None
+        environment = _zig_environment(Path(scratch)) if compiler.zig else None
         done = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, errors="replace", check=False, env=environment
         )
@@ -163,7 +158,7 @@ def _system_flags() -> tuple[str, ...]:
 
 
 def _advice() -> str:
-    bring = f"install the one that the extra 'cross' brings ({EXTRA}), or set CC to yours."
+    bring = f"install the one that the extra 'cross' brings ({_EXTRA}), or set CC to yours."
     if sys.platform == "win32":
         return f"Install one, e.g. 'winget install BrechtSanders.WinLibs.POSIX.UCRT' (gcc) or LLVM (clang), {bring}"
     if sys.platform == "darwin":
@@ -176,3 +171,64 @@ def _identified(command: tuple[str, ...], own: tuple[str, ...]) -> Compiler:
     done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", check=False)
     lines = (done.stdout or done.stderr).splitlines()
     return Compiler(command, lines[0].strip() if lines else "unknown", (*_system_flags(), *own))
+
+
+# -- the cross compiler: ``zig cc`` of the package ``ziglang``, which builds for any platform on any machine ----------
+
+
+_EXTRA = "pip install 'fmu-observer[cross]'"
+
+_ZIG_FLAGS = (
+    "-fno-sanitize=all",  # zig adds checks of undefined behaviour, which would stop the importer's process
+    "-fno-stack-protector",
+    "-fno-lto",
+)
+"""What `zig cc` would else add of its own."""
+
+_LINK_FLAGS = {
+    "linux": ("-shared", "-fPIC", "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,--no-undefined", "-s"),
+    "windows": ("-shared", "-s"),
+    "darwin": ("-shared", "-fPIC", "-Wl,-dead_strip", "-Wl,-x"),
+}
+"""By system. The time stamp of a DLL is a digest of its content, and aarch64 libraries for macOS are signed: zig does
+both.
+"""
+
+
+def _zig_is_installed() -> bool:
+    """Whether the package ``ziglang`` can be found."""
+    return find_spec("ziglang") is not None
+
+
+def _zig_command(target: str) -> tuple[str, ...]:
+    """Program and fixed arguments of the compiler for a target, e.g. ``x86_64-linux-gnu.2.17``."""
+    return (sys.executable, "-m", "ziglang", "cc", "-target", target)
+
+
+@cache
+def _zig_version() -> str:
+    """What it says about itself, e.g. ``zig 0.15.1``."""
+    done = subprocess.run([sys.executable, "-m", "ziglang", "version"], capture_output=True, text=True, check=False)
+    return f"zig {done.stdout.strip() or 'unknown'}"
+
+
+def _zig_environment(scratch: Path) -> dict[str, str]:
+    """The environment it runs in: its caches never lie in the user's working folder.
+
+    The C library of each target is compiled once and kept in the user's cache, or in ``$ZIG_GLOBAL_CACHE_DIR``.
+
+    Args:
+        scratch: a temporary folder for what belongs to one build.
+    """
+    environment = dict(os.environ)
+    environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(_kept(scratch)))
+    return environment | {"ZIG_LOCAL_CACHE_DIR": str(scratch / "zig-local")}
+
+
+def _kept(scratch: Path) -> Path:
+    folder = cache_folder() / "zig"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return scratch / "zig-global"
+    return folder if os.access(folder, os.W_OK) else scratch / "zig-global"

@@ -53,16 +53,16 @@ def spied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Wrap], None]]:
     itself.
     """
     kept: list[Any] = []
-    real = dialect.quicken_fmi3
+    real = dialect.quicken
 
     def install(wrap: Wrap) -> None:
-        def quicken(slave: Any) -> None:
+        def quicken(slave: Any, *more: Any) -> None:
             counts: dict[str, int] = dict.fromkeys(FUNCTIONS, 0)
             for function in FUNCTIONS if slave.instanceName in (RECEIVER, PLANT) else ():
                 slave._functions[function] = _in_front(slave, function, wrap, counts, kept)
-            real(slave)
+            real(slave, *more)
 
-        monkeypatch.setattr(dialect, "quicken_fmi3", quicken)
+        monkeypatch.setattr(dialect, "quicken", quicken)
 
     yield install
     kept.clear()
