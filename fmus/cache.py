@@ -117,7 +117,7 @@ def cache_entry(
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether an FMU is there and the one that was put there; another one is told in the log."""
+    """Whether an FMU is there and the one that was put there; another one is reported in the log."""
     whole = is_sealed(path)
     if not whole and path.is_file():
         LOG.warning("The cached FMU %s is not the one that was put there; it is built again.", path)

@@ -49,7 +49,7 @@ def _tool_digest() -> str:
 
 
 def _own_files() -> dict[str, bytes]:
-    """What writes the FMU, and what checks the gains that its documentation tells of."""
+    """What writes the FMU, and what checks the gains that its documentation reports."""
     rooms = ("content", "toolchain", "documentation", "documentation/templates", "licenses")
     kinds = (".py", ".txt", ".j2", ".css")
     folders = (files("fmus"), *(files("fmus") / room for room in rooms), files("fmu_observer") / "certificates")

@@ -156,7 +156,7 @@ def _strays(archive: zipfile.ZipFile) -> list[str]:
             with archive.open(name) as stream:
                 found = platforms_of_library(stream.read(_HEADER_SIZE))
         except Exception:
-            continue  # told as damage
+            continue  # reported as damage
         if not expected & set(found):
             problems.append(f"{name} is a library for {', '.join(found)}, not for {' or '.join(sorted(expected))}.")
     return problems

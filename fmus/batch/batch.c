@@ -143,7 +143,7 @@ EXPORT void batch_start(Batch *batch, double t0) {
 
 /* -- variables --------------------------------------------------------------------------------------------------- */
 
-/* Number of the first member that refuses, which is told by `batch_message`, or -1. Members that failed are passed over. */
+/* Number of the first member that refuses, which `batch_message` explains, or -1. Members that failed are passed over. */
 EXPORT int64_t batch_set(Batch *batch, const Columns *columns) {
     for (int64_t i = 0; i < batch->count; i++) {
         const double *values = columns->values + i * columns->member_stride;

@@ -24,7 +24,7 @@ from plant_models.disk_cache.folder import cache_folder
 from plant_models.hybrid import HybridSystem
 
 _MEMBERS_AT_A_TIME = 256
-"""Between so many members of a run, an interruption is felt and progress told."""
+"""Between so many members of a run, an interruption is felt and progress reported."""
 
 
 class Batch:

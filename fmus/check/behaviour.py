@@ -1,6 +1,6 @@
 """Behaviour: steps of any length, saved states, resets. Each check returns what is wrong in words, or nothing.
 
-The master's probe and ``fmus check`` both judge by these functions, so that they cannot disagree.
+The master's probe and ``fmus check`` both evaluate by these functions, so that they cannot disagree.
 """
 
 from __future__ import annotations

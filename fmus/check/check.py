@@ -1,6 +1,6 @@
 """What a check of an FMU is: a name, what it does, and what it means where it fails.
 
-What a failure means is judged by what becomes of a run of this package's master: NOTE, where no master of this package
+What a failure means follows from what becomes of a run of this package's master: NOTE, where no master of this package
 does such a thing; LIMIT, where a run is right as long as the advice is followed; DISTRUST, where a plain run may be
 wrong or may not come to its end. A crash is never less than a limit.
 """

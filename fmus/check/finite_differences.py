@@ -28,7 +28,7 @@ rounding.
 
 
 _SCATTERED = 0.5 + np.sqrt(np.arange(2.0, 10.0)) % 1.0
-"""Steps, as multiples of that of the differences, at which the rounding of a column is looked at: unevenly spaced, for
+"""Steps, as multiples of that of the differences, at which the rounding of a column is measured: unevenly spaced, for
 steps that fall on the grid of what is rounded show nothing.
 """
 
@@ -54,8 +54,8 @@ def compare(
         knowns: their present values. unknowns: names for messages. nominal: size of each known.
 
     A kink between the two points is no mistake: a derivative between the two one-sided differences is right. Nor is
-    what the FMU rounds away inside, where large terms cancel: a column that seems wrong is judged again with twice the
-    scatter of its values about a line, over steps too short for anything else to bend it.
+    what the FMU rounds away inside, where large terms cancel: a column that seems wrong is evaluated again with twice
+    the scatter of its values about a line, over steps too short for anything else to bend it.
     """
     pairs = 0
     for name, value in knowns.items():

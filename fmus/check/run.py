@@ -1,4 +1,4 @@
-"""A whole check run: look at the archive, validate, run the FMU in child processes, say what to trust."""
+"""A whole check run: examine the archive, validate, run the FMU in child processes, say what to trust."""
 
 from __future__ import annotations
 

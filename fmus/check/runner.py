@@ -21,7 +21,7 @@ END = 1e6
 """Stop time that is announced where the FMU has no default experiment, seconds after the start [s]."""
 
 _LOOKED_AT = 200
-"""Local variables that are looked at where there is no output."""
+"""Local variables that are read where there is no output."""
 
 
 class Runner:

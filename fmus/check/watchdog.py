@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 PERIOD = 0.05
-"""Between two looks [s]."""
+"""Between two counts [s]."""
 
 LAST = 5.0
 """Time for ending all descendants [s]."""

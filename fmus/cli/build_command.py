@@ -68,7 +68,7 @@ ARGUMENTS = (
     argument(
         "--events",
         choices=("clocks", "counts"),
-        help="how an FMI 3 FMU is told of events: by clocks, in event "
+        help="how an FMI 3 FMU is notified of events: by clocks, in event "
         "mode (default), or by counts, for tools without event mode",
     ),
     argument(

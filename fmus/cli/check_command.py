@@ -1,7 +1,7 @@
 """Command line: ``fmus check FILE.fmu``.
 
-Exit codes: 0 use it as it is, or with the limits that are told; 1 do not trust it, with ``--strict`` also where there
-are limits; 2 the file cannot be checked, the check itself failed, or a mistake of the user.
+Exit codes: 0 use it as it is, or with the limits that are reported; 1 do not trust it, with ``--strict`` also where
+there are limits; 2 the file cannot be checked, the check itself failed, or a mistake of the user.
 """
 
 from __future__ import annotations

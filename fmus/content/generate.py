@@ -1,7 +1,7 @@
 """Generation: the equations of a hybrid system become the C file ``model.c``.
 
 CasADi writes the straight-line functions; this file adds the constant table (`runtime/model.h`) by which the runtime
-knows them. It touches no files.
+knows them. It reads and writes no files.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Archives: an FMU file is looked at before anything of it is unpacked, and refused where it is broken, dangerous or
+"""Archives: an FMU file is examined before anything of it is unpacked, and refused where it is broken, dangerous or
 foreign.
 """
 
@@ -99,7 +99,7 @@ class Archive:
 
 
 def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequence[str] = ("2.0", "3.0")) -> Archive:
-    """Look at an FMU file; nothing is unpacked.
+    """Examine an FMU file; nothing is unpacked.
 
     Args:
         path: the file.

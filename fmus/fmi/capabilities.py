@@ -92,7 +92,7 @@ def read_capabilities(description: ModelDescription, interface: str = CO_SIMULAT
 
 
 def tool_warning(name: str, description: ModelDescription) -> str | None:
-    """What to tell the user before the run of an FMU that needs another program, or None.
+    """What to warn the user of before the run of an FMU that needs another program, or None.
 
     Args:
         name: of the component. description: of its FMU.

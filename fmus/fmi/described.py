@@ -67,7 +67,7 @@ class Described(ABC):
         self.name, self.description = name, description
         self.capabilities = read_capabilities(description, self.interface)
         self.tolerance: float | None = _declared_tolerance(description) if self.fmi_version > 1 else None
-        """Relative tolerance that it is told at set-up; FMI 1.0 co-simulation has no call for it."""
+        """Relative tolerance that it is given at set-up; FMI 1.0 co-simulation has no call for it."""
         self.variables = Variables({v.name: v for v in description.modelVariables})
         self.events: dict[str, EventPort] = self._find_events()
 

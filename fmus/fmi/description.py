@@ -19,7 +19,7 @@ LEFT_OUT = {
     "providesDirectionalDerivatives": "providesDirectionalDerivative",
     "providesAdjointDerivatives": "providesAdjointDerivatives",
 }
-"""Attributes of FMI 3.0 by their name in fmpy 0.3.32, which looks for the name of FMI 2.0 and finds nothing."""
+"""Attributes of FMI 3.0 by their name in fmpy 0.3.32, which expects the name of FMI 2.0 and finds nothing."""
 
 ELEMENTS = {"CoSimulation": "coSimulation", "ModelExchange": "modelExchange"}
 TRUE = {"true", "1"}
@@ -87,15 +87,15 @@ def _complete_annotations(description: ModelDescription, root: ElementTree.Eleme
     entries = {entry.get("name"): entry for entry in root.iterfind("ModelVariables/*")}
     for variable in description.modelVariables:
         entry = entries[variable.name]
-        told = _annotation(entry, ANNOTATION, ELEMENT)
+        said = _annotation(entry, ANNOTATION, ELEMENT)
         marks = [mark for mark, names in MARKS.items() if _annotation(entry, *names) is not None]
         warning = None
-        if told is not None and told.text:
-            reaches = told.get("reaches")
+        if said is not None and said.text:
+            reaches = said.get("reaches")
             warning = OutputWarning(
-                told.text,
-                tuple(told.get("shows", "").split()),
-                told.get("atEnd") in TRUE,
+                said.text,
+                tuple(said.get("shows", "").split()),
+                said.get("atEnd") in TRUE,
                 None if reaches is None else float(reaches),
             )
         if warning is not None or marks:

@@ -93,5 +93,5 @@ class FMI2Slave(FMI2Instance, WholeStepSlave):
         self.terminated = True
 
     def _says_why(self) -> bool:
-        """Whether what the slave logged last tells why it did nothing."""
+        """Whether what the slave logged last says why it did nothing."""
         return False

@@ -356,7 +356,7 @@ class Instance(ValueHolder):
 
     @property
     def said_why(self) -> bool:
-        """Whether the slave itself said what is wrong, which `failure` then tells."""
+        """Whether the slave itself said what is wrong, which `failure` then repeats."""
         return False
 
     # -- what versions and interface types add ----------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The interruption: how a component tells whoever steps it that it met an event on the way. Imports nothing."""
+"""The interruption: how a component notifies whoever steps it that it met an event on the way. Imports nothing."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 checks.
 
 fmpy's call looks its function up, converts every argument and asks for the type of the result each time. What hangs
-itself into it (a logger of calls, somebody who answers in place of the library) is respected: such calls go through
+itself into it (a logger of calls, a function in place of that of the library) is respected: such calls go through
 fmpy.
 """
 
@@ -48,7 +48,7 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
     """
     functions, checked = slave._functions, getattr(slave, name)
     function = functions[name]
-    if not isinstance(function, FUNCTION):  # the library lacks it: fmpy's own call tells
+    if not isinstance(function, FUNCTION):  # the library lacks it: fmpy's own call says so
         return lambda: checked(*map(_plain, arguments))
     typed = tuple(_typed(argument, kind) for argument, kind in zip(arguments, function.argtypes, strict=True))
     raw = ctypes.CFUNCTYPE(ctypes.c_int)(ctypes.cast(function, ctypes.c_void_p).value or 0)
@@ -66,7 +66,7 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
 
 
 class JoinedCalls:
-    """Several calls as one: who hangs himself into a call is looked for once, not at every call.
+    """Several calls as one: who hangs himself into a call is searched once, not at every call.
 
     It raises what the first of them raises that fails.
 
@@ -91,7 +91,7 @@ class JoinedCalls:
 
     @property
     def hangs_in(self) -> bool:
-        """Whether somebody logs calls, or answers in place of the library."""
+        """Whether somebody logs calls, or stands in for the library."""
         answering = [*map(self._slave._functions.__getitem__, self._names)]
         return self._slave.fmiCallLogger is not None or answering != self._expected
 

@@ -1,9 +1,9 @@
 """The logger that native FMUs of FMI 1.0 and 2.0 are given: their messages arrive with the arguments filled in.
 
 That logger takes arguments as C's printf does, which Python cannot receive; fmpy brings a small library that fills them
-in and then calls one function of the whole process. So one function hears all FMUs here and finds out who speaks: in
-FMI 2.0 by the environment handed to the FMU, in FMI 1.0 by its instance name. Where a platform has no such library,
-messages arrive as written.
+in and then calls one function of the whole process. So one function takes the messages of all FMUs here and finds out
+whose they are: in FMI 2.0 by the environment handed to the FMU, in FMI 1.0 by its instance name. Where a platform has
+no such library, messages arrive as written.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLogge
 
 
 class _Listener(Protocol):
-    """Somebody who hears the messages of one instance."""
+    """Somebody who takes the messages of one instance."""
 
     name: str
 
@@ -60,7 +60,7 @@ def forget(listener: _Listener) -> None:
     """Messages of this one are of no interest any more.
 
     Args:
-        listener: who was told until now.
+        listener: who took them until now.
     """
     for number in [n for n, known in _listeners.items() if known is listener]:
         del _listeners[number]

@@ -105,7 +105,7 @@ def native_call(
         verb: which of both.
         kind: type in the name of the function.
         references: value references of the variables.
-        rest: buffers as in the signature, and the number of values, which FMI 3 alone is told.
+        rest: buffers as in the signature, and the number of values, which FMI 3 alone takes.
     """
     count, (*buffers, total) = len(references), rest
     numbers = (total,) if fmi_version == 3 else ()

@@ -60,7 +60,7 @@ def _setter(
     prepared: dict[tuple[int, ...], tuple[Callable[[], None], Any]] = {}
 
     def set_values(references: Sequence[int], values: Sequence[Any]) -> None:
-        if slave._functions[name] is not function:  # somebody answers in place of the library
+        if slave._functions[name] is not function:  # somebody stands in for the library
             slowly(slave, references, values)
             return
         key = tuple(references)

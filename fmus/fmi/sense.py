@@ -37,7 +37,7 @@ def tell_apart(description: ModelDescription) -> None:
 
 
 def doubled_names(description: ModelDescription) -> str | None:
-    """Which internal variables had to be told apart, as a sentence, or None.
+    """Which internal variables had to be distinguished, as a sentence, or None.
 
     Args:
         description: model description of the FMU.

@@ -1,6 +1,6 @@
 """The host: inside the importing process, makes the block that a hosted FMU is for, and puts its failures into words.
 
-Used by the copy of `slave.py` in the FMU, and by the build to look at what it packs. Knows the block, not pythonfmu.
+Used by the copy of `slave.py` in the FMU, and by the build to examine what it packs. Knows the block, not pythonfmu.
 """
 
 from __future__ import annotations

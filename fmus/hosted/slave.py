@@ -241,7 +241,7 @@ def _missing() -> list[str]:
 
 
 def _enter_virtual_environment() -> None:
-    """In a program that is not Python nobody has looked at the activated environment yet."""
+    """In a program that is not Python nobody has read the activated environment yet."""
     folder = os.environ.get("VIRTUAL_ENV")
     if folder and _missing():
         version = f"python{sys.version_info[0]}.{sys.version_info[1]}"

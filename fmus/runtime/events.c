@@ -1,4 +1,4 @@
-/* Triggered events with a stamp. The one place that decides what becomes of an event that is told too late. */
+/* Triggered events with a stamp. The one place that decides what becomes of an event that is announced too late. */
 #include "events.h"
 
 #include <math.h>
@@ -69,7 +69,7 @@ static Status reject(Instance *instance, int event, double stamp, const char *re
                          model.triggered[event].name, stamp, instance->runtime.clock.t, instance->runtime.outcomes[OUTCOME_REJECTED], reason);
 }
 
-/* In model exchange an event is late when it is told late; one that waits is not, wherever the solver stops. */
+/* In model exchange an event is late when it is announced late; one that waits is not, wherever the solver stops. */
 static Status check_exchange(Instance *instance, int event, double *stamp) {
     const Runtime *runtime = &instance->runtime;
     if (!instance->exchange || *stamp >= runtime->clock.t - TIME_TOLERANCE)
@@ -90,7 +90,7 @@ PRIVATE Status events_announce(Instance *instance, int event) {
         count_outcome(runtime, OUTCOME_LOST);
         return instance_warn(instance, "event %s: its stamp %g s is not a finite number; it is lost", model.triggered[event].name, stamp);
     }
-    double told = stamp;
+    double announced = stamp;
     Status late = check_exchange(instance, event, &stamp);
     if (late != STATUS_OK)
         return late;
@@ -100,7 +100,7 @@ PRIVATE Status events_announce(Instance *instance, int event) {
                              model.triggered[event].name, stamp, QUEUE_CAPACITY);
     }
     insert(runtime, event, stamp);
-    if (stamp != told)
+    if (stamp != announced)
         count_outcome(runtime, OUTCOME_LATE);
     return STATUS_OK;
 }

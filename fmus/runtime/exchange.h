@@ -8,7 +8,7 @@
 
 #include "instance.h"
 
-/* What the importer is told after an event. */
+/* What is reported to the importer after an event. */
 typedef struct {
     bool states_changed;
     bool next_defined;

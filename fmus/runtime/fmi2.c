@@ -26,7 +26,7 @@ static void log_fmi2(const Instance *instance, Status status, const char *catego
     fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->message_logger;
     if (logger == NULL)
         return;
-    /* Many importers show the format as it is and never look at the arguments after it. */
+    /* Many importers show the format as it is and never read the arguments after it. */
     if (strchr(message, '%') == NULL)
         logger(instance->environment, instance->name, (fmi2Status)status, category, message);
     else

@@ -99,7 +99,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     return (fmi3Status)status;
 }
 
-/* Time begins to run. Where the importer has given away the only way to tell events, the log says so; nothing went wrong, and
+/* Time begins to run. Where the importer has given away the only way to announce events, the log says so; nothing went wrong, and
    some importers end a run at a status other than OK. */
 static Status start(Instance *instance) {
     if (instance->exchange)
@@ -284,24 +284,15 @@ WHOLE_NUMBERS(Int64, ROLES(ROLE_POLICY))
         return (fmi3Status)instance_no_variables(instance, __func__, nValueReferences);                                   \
     }
 
-NO_VARIABLES(Get, Float32, fmi3Float32)
-NO_VARIABLES(Set, Float32, const fmi3Float32)
-NO_VARIABLES(Get, Int8, fmi3Int8)
-NO_VARIABLES(Set, Int8, const fmi3Int8)
-NO_VARIABLES(Get, UInt8, fmi3UInt8)
-NO_VARIABLES(Set, UInt8, const fmi3UInt8)
-NO_VARIABLES(Get, Int16, fmi3Int16)
-NO_VARIABLES(Set, Int16, const fmi3Int16)
-NO_VARIABLES(Get, UInt16, fmi3UInt16)
-NO_VARIABLES(Set, UInt16, const fmi3UInt16)
-NO_VARIABLES(Get, UInt32, fmi3UInt32)
-NO_VARIABLES(Set, UInt32, const fmi3UInt32)
-NO_VARIABLES(Get, UInt64, fmi3UInt64)
-NO_VARIABLES(Set, UInt64, const fmi3UInt64)
-NO_VARIABLES(Get, Boolean, fmi3Boolean)
-NO_VARIABLES(Set, Boolean, const fmi3Boolean)
-NO_VARIABLES(Get, String, fmi3String)
-NO_VARIABLES(Set, String, const fmi3String)
+#define NO_VARIABLES_OF(type)              \
+    NO_VARIABLES(Get, type, fmi3##type)    \
+    NO_VARIABLES(Set, type, const fmi3##type)
+
+NO_VARIABLES_OF(Float32)
+NO_VARIABLES_OF(Int8) NO_VARIABLES_OF(UInt8)
+NO_VARIABLES_OF(Int16) NO_VARIABLES_OF(UInt16)
+NO_VARIABLES_OF(UInt32) NO_VARIABLES_OF(UInt64)
+NO_VARIABLES_OF(Boolean) NO_VARIABLES_OF(String)
 
 fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                          size_t valueSizes[], fmi3Binary values[], size_t nValues) {

@@ -41,7 +41,7 @@ typedef struct {
 struct Instance {
     Runtime runtime;
     Undo undo;
-    Journal journal; /* the recent past, for events that are told late */
+    Journal journal; /* the recent past, for events that are announced late */
     const Face *face;
     int64_t mode;
     double start_time;

@@ -15,7 +15,7 @@
 
 #define TIME_TOLERANCE 1e-9 /* [s] closer than this is the same instant, as in the Python block */
 
-/* What a record tells, where it is not a jump: the number of the event else. */
+/* What a record says, where it is not a jump: the number of the event else. */
 #define RECORD_ADVANCE (-1)
 #define RECORD_COMMUNICATION (-2)
 

@@ -77,7 +77,7 @@ typedef struct {
 typedef enum { LATE_REPLAY = 1, LATE_REJECT = 2, LATE_LATE = 3 } LatePolicy;
 
 /* What became of an event, in the order of the variables that count them: it took effect; of these, late at its stamp, and late
-   when it was told; it was too late; it was announced and never seen; of the first, doubted by the model; doubted and kept out. */
+   when it was announced; it was too late; it was announced and never seen; of the first, doubted by the model; doubted and kept out. */
 typedef enum { OUTCOME_ACCEPTED, OUTCOME_REPLAYED, OUTCOME_LATE, OUTCOME_REJECTED, OUTCOME_LOST, OUTCOME_DOUBTED, OUTCOME_IGNORED, OUTCOMES } Outcome;
 
 /* What the model made of an event; the numbers of its memory. */

@@ -16,8 +16,8 @@ PRIVATE int move_jump(Runtime *runtime, Journal *journal, int event, double *pay
 /* A communication step ends now. */
 PRIVATE void move_communicate(Runtime *runtime, Journal *journal);
 
-/* Live the past again with an event at its stamp: what comes out is what would be, had it been told in time. What was given
-   last is kept. Returns the model's verdict on it (those after it are judged anew), or BEYOND_... with nothing changed where the memory does not reach back to the stamp. */
+/* Live the past again with an event at its stamp: what comes out is what would be, had it been announced in time. What was given
+   last is kept. Returns the model's verdict on it (those after it are evaluated anew), or BEYOND_... with nothing changed where the memory does not reach back to the stamp. */
 PRIVATE int move_replay(Runtime *runtime, Journal *journal, int event, double stamp, double *payload);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "instance.h"
 
-/* Advance from `current` by `size` [s]. `early`, where it is given, tells whether the step ended at a periodic instant inside
+/* Advance from `current` by `size` [s]. `early`, where it is set, says whether the step ended at a periodic instant inside
    it, which only happens where the importer allows it. STATUS_DISCARD: the step cannot be done and has left no trace. */
 PRIVATE Status instance_do_step(Instance *instance, const char *function, double current, double size, bool *early);
 

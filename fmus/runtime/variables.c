@@ -90,16 +90,16 @@ static int computed_with(Role role) {
 
 /* -- when a variable may be set ------------------------------------------------------------------------------------- */
 
-/* With counts an event is told at any time and seen at the next step or event; with clocks in event mode only. */
+/* With counts an event is announced at any time and seen at the next step or event; with clocks in event mode only. */
 static int settable_modes(const Instance *instance, const Variable *variable) {
-    int before = MODE_INSTANTIATED | MODE_INITIALIZATION, told = MODE_STEP | MODE_EVENT | MODE_CONTINUOUS;
+    int before = MODE_INSTANTIATED | MODE_INITIALIZATION, announced = MODE_STEP | MODE_EVENT | MODE_CONTINUOUS;
     bool flows = variable->index < model.continuous;
     switch (variable->role) {
     case ROLE_INPUT: return before | MODE_STEP | MODE_EVENT | MODE_CONTINUOUS;
     case ROLE_TUNABLE: return before | MODE_STEP | MODE_EVENT;
-    case ROLE_COUNT: return before | told;
+    case ROLE_COUNT: return before | announced;
     case ROLE_PAYLOAD:
-    case ROLE_STAMP: return before | (model.counts_events ? told : MODE_EVENT);
+    case ROLE_STAMP: return before | (model.counts_events ? announced : MODE_EVENT);
     case ROLE_STATE: return before | (flows && instance->face->solver_sets_reals ? MODE_CONTINUOUS : 0);
     case ROLE_FIXED:
     case ROLE_POLICY:

@@ -1,4 +1,4 @@
-"""Libraries for this machine that were compiled once and are kept in the cache folder. Touches that folder only."""
+"""Libraries for this machine that were compiled once and are kept in the cache folder. Writes to that folder only."""
 
 from __future__ import annotations
 

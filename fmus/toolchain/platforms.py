@@ -96,7 +96,7 @@ def binary_files(fmi_version: int, identifier: str, libraries: Mapping[Platform,
     """The files under ``binaries/`` of an FMU.
 
     FMI 3.0 has one folder for each platform tuple. FMI 2.0 has ``linux64``, ``win64`` and ``darwin64`` for x86-64, and
-    platform tuples for the rest; but many importers look into ``linux64`` and ``darwin64`` on any processor. So
+    platform tuples for the rest; but many importers search ``linux64`` and ``darwin64`` on any processor. So
     ``darwin64`` holds both architectures in one file, and ``linux64`` holds that of aarch64 where there is none of
     x86-64.
 

@@ -17,7 +17,7 @@ from fmus.fmi.standard import MODEL_EXCHANGE
 
 _NO_STATES = "has no continuous states"
 SHIFT = 0.01
-"""States are moved by this share, so that derivatives are not judged at a start at rest, where friction has its
+"""States are moved by this share, so that derivatives are not evaluated at a start at rest, where friction has its
 kink.
 """
 

@@ -21,13 +21,16 @@ _BEFORE = 3
 _NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
 
 
-Judge = Callable[[str, bool, str], CheckOutcome]
+_Evaluate = Callable[[str, bool, str], CheckOutcome]
 
 
 def _odd(
-    context: Context, size: Callable[[float], float], judge: Judge, shift: Callable[[float], float] = lambda _h: 0.0
+    context: Context,
+    size: Callable[[float], float],
+    evaluate: _Evaluate,
+    shift: Callable[[float], float] = lambda _h: 0.0,
 ) -> CheckOutcome:
-    """One odd step on an instance of its own after three ordinary ones; the judge says what it thinks of it."""
+    """One odd step on an instance of its own after three ordinary ones; its outcome is evaluated."""
     runner = context.fresh_runner()
     try:
         runner.begin()
@@ -41,7 +44,7 @@ def _odd(
         bad = not_finite(runner.output_names, after, slave.variables) if np.isfinite(before).all() else []
         moved = not np.array_equal(before, after, equal_nan=True)
         what = f"a step of {size(runner.h):g} s" + (f" from {shift(runner.h):g} s too late" if shift(runner.h) else "")
-        return judge(what, moved, listed(bad))
+        return evaluate(what, moved, listed(bad))
     finally:
         runner.put_away()
 

@@ -38,7 +38,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
         return fmi2Error;
     front->failed = front->discarded = false;
     fmi2Status status = front->library.Reset(front->component);
-    return status == fmi2OK ? heard(front) : fmi2Error;
+    return status == fmi2OK ? reported(front) : fmi2Error;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {

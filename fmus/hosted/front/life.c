@@ -1,4 +1,4 @@
-/* Life: an instance is made, told whether to log, and freed. */
+/* Life: an instance is made, set to log or not, and freed. */
 #include "front.h"
 
 static void front_free(Front *front) {
@@ -31,7 +31,7 @@ static Front *front_create(fmi2String name, const fmi2CallbackFunctions *functio
 }
 
 /* What Python reported by now: pythonfmu hands messages on at the end of most calls, but not at instantiation and reset. */
-static fmi2Status heard(Front *front) {
+static fmi2Status reported(Front *front) {
     front->library.GetInteger(front->component, NULL, 0, NULL);
     return front->failed ? fmi2Error : fmi2OK;
 }
@@ -49,7 +49,7 @@ static fmi2Status instantiate(Front *front, fmi2Type type, fmi2String guid, fmi2
     if (start_python(front) != fmi2OK || load_pythonfmu(front, resources) != fmi2OK)
         return fmi2Error;
     make_component(front, resources, visible);
-    return front->component != NULL ? heard(front) : fmi2Error;
+    return front->component != NULL ? reported(front) : fmi2Error;
 }
 
 const char *fmi2GetTypesPlatform(void) {

@@ -1,10 +1,10 @@
 /* Messages: to the importer's logger, from the front itself and from Python. */
 #include "front.h"
 
-static void tell(const Front *front, fmi2Status status, const char *category, const char *text) {
+static void send_message(const Front *front, fmi2Status status, const char *category, const char *text) {
     if (front->importer == NULL || front->importer->logger == NULL)
         return;
-    /* Many importers show the format as it is and never look at the arguments after it. */
+    /* Many importers show the format as it is and never read the arguments after it. */
     if (strchr(text, '%') == NULL)
         front->importer->logger(front->environment, front->name, status, category, text);
     else
@@ -18,7 +18,7 @@ static fmi2Status fail(Front *front, const char *format, ...) {
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     front->failed = true;
-    tell(front, fmi2Error, "logStatusError", text);
+    send_message(front, fmi2Error, "logStatusError", text);
     return fmi2Error;
 }
 
@@ -28,7 +28,7 @@ static void hear(fmi2ComponentEnvironment environment, fmi2String name, fmi2Stat
     if (status >= fmi2Error)
         fail(front, "%s", message); /* pythonfmu hands over finished text, without arguments */
     else if (status != fmi2OK)
-        tell(front, status, status == fmi2Discard ? "logStatusDiscard" : "logStatusWarning", message);
+        send_message(front, status, status == fmi2Discard ? "logStatusDiscard" : "logStatusWarning", message);
     else if (front->on)
-        tell(front, status, "logEvents", message);
+        send_message(front, status, "logEvents", message);
 }

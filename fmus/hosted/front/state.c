@@ -44,7 +44,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
     Front *front = c;
     front->failed = false;
     fmi2Status status = front->library.SerializedFMUstateSize(front->component, FMUstate, size);
-    return status == fmi2OK ? heard(front) : fmi2Error;
+    return status == fmi2OK ? reported(front) : fmi2Error;
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
@@ -66,5 +66,5 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     if (status != fmi2OK)
         return fmi2Error;
     *FMUstate = made;
-    return heard(front);
+    return reported(front);
 }
