@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.evaluation.event_counts import outcome_columns
+from cosim.evaluation.balise_gaps import GapErrors, gap_errors, largest
+from cosim.evaluation.consistency import filter_consistency
+from cosim.evaluation.consistency_table import consistency_table
+from cosim.evaluation.cost import cost_table
+from cosim.evaluation.event_counts import count_events, outcome_columns
+from cosim.evaluation.fault_detection import fault_detection
+from cosim.evaluation.fault_table import fault_table
 from cosim.evaluation.indicators import indicator_statistics
+from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.roles import label
 from cosim.evaluation.seed_table import seed_table
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.expectations.judged import Judged
+from cosim.report.page.phases import phases_table
 from cosim.results.result import Result
-from fmus.tables.numbers import DASH, number
+from fmus.tables.numbers import DASH, error_number, number
 from fmus.tables.table import Column, Table, name_column, text_column
 
 LIMITS = ("aperiodic_limit", "constant_limit")
@@ -42,35 +50,87 @@ _COMPONENT_COLUMNS = (
 MESSAGES_SHOWN = 100
 
 
-def expectations_table(judged: list[Judged]) -> Table:
-    """All expectations with what was measured.
+def run_tables(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> dict[str, Any]:
+    """Tables that follow from a run and its roles, by their names in the template.
 
     Args:
-        judged: in the order in which they are shown.
+        result: the run. spec: roles and labels. judged: expectations.
     """
+    certificates, explained = _certificates(result, spec)
+    return {
+        "expectations": _expectations(sorted(judged, key=lambda j: j.passed)),
+        "telegrams": telegrams_table(count_events(result.events).outcomes, spec.labels),
+        "seeds": _seeds(result),
+        "phases": phases_table(phase_details(result, spec), spec),
+        "gaps": gaps_table(gap_errors(result, spec)),
+        "certificates": certificates,
+        "explained": explained,
+        "packets": _packets(result),
+        "indicators": _indicators(result, spec),
+        "faults": fault_table(fault_detection(result, spec), spec),
+        "consistency": consistency_table(filter_consistency(result, spec), spec),
+        "components": _components(result),
+        "calls": cost_table(result),
+        "messages": _messages(result),
+        "versions": _versions(result),
+    }
+
+
+def _expectations(judged: Sequence[Judged]) -> Table:
+    """All expectations with what was measured."""
     columns = [name_column("verdict", "Verdict"), text_column("expected", "Expected"), text_column("text", "Measured")]
     return Table("expectations", columns, [["met" if j.passed else "not met", j.name, j.text] for j in judged])
 
 
-def seeds_table(result: Result) -> Table:
-    """Quartiles of the maximal speed errors over several seeds.
-
-    Args:
-        result: the run.
-    """
+def _seeds(result: Result) -> Table:
+    """Quartiles of the maximal speed errors over several seeds."""
     rows = mapping_entry(result, "seed_study").get("rows", [])
     return seed_table(row for row in rows if isinstance(row, Mapping))
 
 
-def certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str]]:
-    """Limits of the observers' certificates, those of the report first.
+_GAP_COLUMNS = (
+    Column("length", "Way", "m"),
+    Column("seconds", "Time", "s"),
+    Column("speed", "Speed at its end", "km/h", factor=3.6),
+    Column("envelope", "SUBSET-041", "m", "What is allowed to an odometer after this way"),
+)
+_GAP_ERROR = "Estimated minus true position in the last row before the telegram is used"
+
+
+def gaps_table(found: GapErrors) -> Table:
+    """Position errors at the end of the longest gaps, in metres and in seconds of running time; last row: the largest
+    of all gaps, and how many of them ended within the envelope.
 
     Args:
-        result: the run. spec: labels and order of the observers.
-
-    Returns:
-        The table, and what was checked by label of the observer.
+        found: from `gap_errors`.
     """
+    columns = [name_column("gap", "Gap"), *_GAP_COLUMNS]
+    columns += [
+        Column(name, f"{found.labels[name]} [m]\nrunning time [s]", "", _GAP_ERROR, write=_written)
+        for name in found.errors
+    ]
+    seconds = {name: found.running_time(name) for name in found.errors}
+    rows: list[list[Any]] = []
+    for i in found.longest():
+        gap = found.gaps[i]
+        errors = [{"error": float(found.errors[n][i]), "running_time": float(seconds[n][i])} for n in found.errors]
+        rows.append([f"{gap.origin} to {gap.target}", gap.length, gap.seconds, gap.speed, gap.envelope, *errors])
+    if rows:
+        name = f"all {len(found.gaps)}: largest\nand share within SUBSET-041"
+        worst = [{"largest": largest(e), "within": found.within_envelope(n)} for n, e in found.errors.items()]
+        rows.append([name, *[""] * len(_GAP_COLUMNS), *worst])
+    return Table("gaps", columns, rows)
+
+
+def _written(value: dict[str, float]) -> str:
+    """An error [m] above its running time [s]; of all gaps the largest [m] above the share that was within [1]."""
+    if "error" in value:
+        return f"{error_number(value['error'])}\n{error_number(value['running_time'])}"
+    return f"{error_number(value['largest'])} m\n{number(100.0 * value['within'])} %"
+
+
+def _certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str]]:
+    """Limits of the observers' certificates, those of the report first; and what was checked, by label."""
     known = mapping_entry(result, "certificates")
     order = dict.fromkeys([*(o for o in spec.observers if o in known), *known])
     entries = {label(spec, o): entry for o in order if isinstance(entry := known[o], Mapping)}
@@ -104,12 +164,8 @@ def telegrams_table(
     return Table("telegrams", columns, rows)
 
 
-def packets_table(result: Result) -> Table:
-    """What became of the packets of each node, and how old what receivers hold is.
-
-    Args:
-        result: the run.
-    """
+def _packets(result: Result) -> Table:
+    """What became of the packets of each node, and how old what receivers hold is."""
     entry = mapping_entry(result, "network")
     nodes = entry.get("nodes", {})
     rows = [
@@ -119,12 +175,8 @@ def packets_table(result: Result) -> Table:
     return Table("packets", [name_column("node", "Node"), text_column("signals", "Signals"), *_PACKET_COLUMNS], rows)
 
 
-def indicators_table(result: Result, spec: ReportSpec) -> Table:
-    """How long slip was indicated, and how late.
-
-    Args:
-        result: the run. spec: roles and zones.
-    """
+def _indicators(result: Result, spec: ReportSpec) -> Table:
+    """How long slip was indicated, and how late."""
     delay = "From the begin of the zone to the first indication in it"
     columns = [
         OBSERVER,
@@ -142,24 +194,16 @@ def indicators_table(result: Result, spec: ReportSpec) -> Table:
     return Table("indicators", columns, rows)
 
 
-def components_table(result: Result) -> Table:
-    """What was run.
-
-    Args:
-        result: the run.
-    """
+def _components(result: Result) -> Table:
+    """What was run."""
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping)]
     return Table(
         "components", _COMPONENT_COLUMNS, [[entry.get(c.key) for c in _COMPONENT_COLUMNS] for entry in entries]
     )
 
 
-def messages_table(result: Result) -> Table:
-    """What the components logged: the first and the last messages.
-
-    Args:
-        result: the run.
-    """
+def _messages(result: Result) -> Table:
+    """What the components logged: the first and the last messages."""
     messages, half = list(result.messages), MESSAGES_SHOWN // 2
     shown = messages if len(messages) <= MESSAGES_SHOWN else [*messages[:half], *messages[-half:]]
     columns = [
@@ -170,11 +214,7 @@ def messages_table(result: Result) -> Table:
     return Table("messages", columns, [[m.component, m.time, m.status, m.category or DASH, m.text] for m in shown])
 
 
-def versions_table(result: Result) -> Table:
-    """Versions of the packages that were used.
-
-    Args:
-        result: the run.
-    """
+def _versions(result: Result) -> Table:
+    """Versions of the packages that were used."""
     columns = [name_column("package", "Package"), text_column("version", "Version")]
     return Table("versions", columns, list(mapping_entry(result, "versions").items()))

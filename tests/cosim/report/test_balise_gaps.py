@@ -9,7 +9,7 @@ import pytest
 from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors, rows_before
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.gap_figure import GapErrorsPanel
-from cosim.report.page.run_page import gaps_table
+from cosim.report.page.run_tables import gaps_table
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit

@@ -14,7 +14,7 @@ from cosim.evaluation.indicators import indicator_statistics, on_intervals
 from cosim.evaluation.metrics import error_size, phase_metrics
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.scales import error_scale, running_maximum, value_limits
-from cosim.report.page.run_tables import indicators_table
+from cosim.report.page.run_tables import _indicators
 from cosim.results.result import BaliseRecord, Result
 from fmus.tables.numbers import error_number, number
 
@@ -130,7 +130,7 @@ def test_indicator_shares_and_delays() -> None:
 
 def test_a_zone_that_the_run_does_not_reach_is_not_called_one_without_indication() -> None:
     result = small_result([0.0, 8.0, 10.0], obs__slip_indicator=[1, 2, 2])
-    table = indicators_table(result, ReportSpec(observers=["obs"], zones=[(2, 4), (7, 9), (10, 12)]))
+    table = _indicators(result, ReportSpec(observers=["obs"], zones=[(2, 4), (7, 9), (10, 12)]))
     ((*_, missed, seen, later),) = table.cells
     assert (missed, seen, later) == ("not indicated", "1.00", "not reached")
 
