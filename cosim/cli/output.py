@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from cosim.errors import OutputError
 from fmus.plain import plain
@@ -20,25 +19,6 @@ def print_json(data: Any) -> None:
         data: what to print.
     """
     print(json.dumps(jsonable(data), indent=2))
-
-
-def print_paths(paths: Mapping[str, Path], file: TextIO | None = None) -> None:
-    """Print what was written, a line for each.
-
-    Args:
-        paths: by kind. file: where to; None for standard output.
-    """
-    for kind, path in paths.items():
-        print(f"{kind:>10}: {path}", file=file)
-
-
-def texts_of(paths: Mapping[str, Path]) -> dict[str, str]:
-    """Paths as texts, for JSON.
-
-    Args:
-        paths: by kind.
-    """
-    return {kind: str(path) for kind, path in paths.items()}
 
 
 def print_notice(text: str) -> None:

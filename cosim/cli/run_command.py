@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,6 +30,7 @@ from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
+from fmus.cli.progress import ProgressBar
 from fmus.tables.table import Table
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
@@ -172,20 +172,17 @@ def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) 
 
 
 def _study(scenario: Scenario, options: argparse.Namespace, directory: Path) -> Any:
-    def report(done: int, count: int) -> None:
-        if not (options.quiet or options.json) and sys.stderr.isatty():
-            print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
-
-    return studies.seed_study(
-        scenario.copy().master(log_calls=False),
-        range(options.seeds),
-        report,
-        workers=options.workers,
-        directory=directory,
-        resume=options.resume,
-        retry=options.retry,
-        scheduler=options.scheduler,
-    )
+    with ProgressBar("seed", silent=options.quiet or options.json) as bar:
+        return studies.seed_study(
+            scenario.copy().master(log_calls=False),
+            range(options.seeds),
+            bar,
+            workers=options.workers,
+            directory=directory,
+            resume=options.resume,
+            retry=options.retry,
+            scheduler=options.scheduler,
+        )
 
 
 def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> Output:

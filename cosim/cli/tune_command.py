@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from cosim.cli.arguments import QUIET, positive, scenario_arguments
-from cosim.cli.output import print_json
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import check_writable
@@ -15,6 +14,7 @@ from cosim.tuning.parameters import Bounds
 from cosim.tuning.tune import tune
 from cosim.tuning.tuning_result import Tuning
 from fmus.cli.commands import argument
+from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 
 DONE, _NOT_BETTER = 0, 1
@@ -80,30 +80,23 @@ ARGUMENTS = (
     argument("--out", metavar="DIR", help="folder for history and results (default: results/NAME_tuned)"),
     argument("--resume", action="store_true", help="take over the evaluations that are in the folder already"),
     argument("--whole-runs", action="store_true", help="run the whole scenario, also where a recording would do"),
-    argument("--json", action="store_true", help="print the data as JSON"),
     QUIET,
 )
 
 
-def execute(options: argparse.Namespace) -> int:
-    """Search, write and print.
-
-    Args:
-        options: of the command line.
-    """
+def execute(options: argparse.Namespace) -> Output:
+    """Search, and write."""
     scenario = load_scenario(options)
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"
     )
     found = _tuned(scenario, options, directory)
-    if options.json:
-        print_json(found.to_data())
-    else:
-        print(found.text())
-        print(f"\nTuned scenario: {directory / 'tuned.toml'}")
-    if found.interrupted:
-        raise KeyboardInterrupt  # all there is has been printed
-    return _NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE
+    return Output(
+        [*found.parts(), f"Tuned scenario: {directory / 'tuned.toml'}"],
+        found.to_data() | {"tuned": directory / "tuned.toml"},
+        code=_NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE,
+        error=KeyboardInterrupt() if found.interrupted else None,
+    )
 
 
 def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> Tuning:

@@ -13,7 +13,7 @@ from typing import Any
 import tomli_w
 
 from cosim.starter.guess import Guess, GuessedSignal
-from fmus.text_table import text_table
+from fmus.tables.table import pairs_table
 
 WIDTH = 118
 _PLAIN_NAME = re.compile(r"[A-Za-z_][\w.]*(\[\d+(,\d+)*\])?", re.ASCII)
@@ -83,8 +83,9 @@ def listing(title: str, signals: Sequence[GuessedSignal]) -> str:
         title: what they are.
         signals: the variables.
     """
-    rows = [[one_line(s.name), f"[{one_line(s.unit or '-')}]  {one_line(s.description)}"] for s in signals[:LISTED]]
-    lines = [f"# {title} ({len(signals)}):", *(f"#   {line}" for line in text_table(rows, left=(0, 1)))]
+    units = {one_line(s.name): f"[{one_line(s.unit or '-')}]  {one_line(s.description)}" for s in signals[:LISTED]}
+    table = pairs_table("signals", units).text()
+    lines = [f"# {title} ({len(signals)}):", *(f"#   {line}" for line in table.splitlines())]
     more = len(signals) - LISTED
     return "\n".join(lines + ([f"#   ... and {more} more, see: cosim info"] if more > 0 else []))
 

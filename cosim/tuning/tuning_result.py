@@ -12,10 +12,23 @@ import numpy as np
 
 from cosim.studies.groups import Spread, mean_of
 from fmus.tables.numbers import number
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Parts, Table, joined, name_column
 
 if TYPE_CHECKING:
     from cosim.simulation.scenario import Scenario
+
+
+_COST_COLUMNS = (
+    name_column("seeds", "seeds"),
+    Column("count", "number", meaning="How many seeds"),
+    Column("before", "before", meaning="Mean cost with the values before, with its 95 % interval", write=Spread.text),
+    Column("after", "after", meaning="Mean cost of the best candidate, with its 95 % interval", write=Spread.text),
+)
+_VALUE_COLUMNS = (
+    name_column("parameter", "parameter"),
+    Column("before", "before", meaning="Value before"),
+    Column("after", "after", meaning="Value of the best candidate"),
+)
 
 
 @dataclass(frozen=True)
@@ -73,38 +86,37 @@ class Tuning:
         pairs = pairs or zip(self.before, self.after, strict=True)
         return mean_of([float(b) - float(a) for b, a in pairs])
 
-    def rows(self) -> list[dict[str, Any]]:
+    def costs(self) -> Table:
         """A row for each kind of seeds: costs before and after, with 95 % intervals."""
-        parts = [("training", self.seeds, self.before, self.after)]
+        rows = [["training", len(self.seeds), mean_of(self.before), mean_of(self.after)]]
         if self.judged:
-            parts.append(("judging", self.judged, self.judged_before, self.judged_after))
-        return [
-            {"seeds": kind, "count": len(seeds), "before": mean_of(before), "after": mean_of(after)}
-            for kind, seeds, before, after in parts
-        ]
+            rows.append(["judging", len(self.judged), mean_of(self.judged_before), mean_of(self.judged_after)])
+        return Table("costs", _COST_COLUMNS, rows, f"{self.method}: {self.cost}")
 
-    def text(self) -> str:
-        """For a terminal: costs before and after, spread over searches, values, warnings."""
-        table = [["seeds", "number", "before", "after"]]
-        table += [[r["seeds"], str(r["count"]), r["before"].text(), r["after"].text()] for r in self.rows()]
-        lines = [f"{self.method}: {self.cost}", *text_table(table, left=(0,), heading=True), ""]
-        if len(self.searches) > 1:
-            finals = np.array([search.costs[-1] for search in self.searches])
-            low, middle, high = np.percentile(finals, (25, 50, 75))
-            lines.append(
-                f"{len(finals)} searches end at {number(middle)} in the median, quartiles {number(low)} and "
-                f"{number(high)}, best {number(finals.min())}."
-            )
-        values = [["parameter", "before", "after"]]
-        values += [[name, number(self.start.get(name, np.nan)), number(v)] for name, v in self.best.items()]
-        lines += [*text_table(values, left=(0,), heading=True), ""]
-        if self.judged and not self.gain.low > 0.0:
-            lines.append(
-                "The judging seeds do not show that the scenario has become better: what was learnt may be luck."
-            )
+    def parts(self) -> Parts:
+        """Costs before and after, spread over searches, values, warnings."""
+        values = [[name, self.start.get(name), value] for name, value in self.best.items()]
+        luck = "The judging seeds do not show that the scenario has become better: what was learnt may be luck."
+        lines = [luck] if self.judged and not self.gain.low > 0.0 else []
         lines += [f"held: {name}, {why}" for name, why in self.fixed.items()]
         lines += [f"warning: {text}" for text in self.warnings]
-        return "\n".join([*lines, f"{self.runs} runs, {self.how}."])
+        remarks = "\n".join([*lines, f"{self.runs} runs, {self.how}."])
+        return [self.costs(), self._spread(), Table("parameters", _VALUE_COLUMNS, values), remarks]
+
+    def _spread(self) -> str:
+        """How far the searches end apart; empty for one search."""
+        if len(self.searches) < 2:
+            return ""
+        finals = np.array([search.costs[-1] for search in self.searches])
+        low, middle, high = np.percentile(finals, (25, 50, 75))
+        return (
+            f"{len(finals)} searches end at {number(middle)} in the median, quartiles {number(low)} and "
+            f"{number(high)}, best {number(finals.min())}."
+        )
+
+    def text(self) -> str:
+        """The same as text; see `parts`."""
+        return joined(self.parts())
 
     def to_data(self) -> dict[str, Any]:
         """Plain data."""

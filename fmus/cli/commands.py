@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import argparse
 import ast
+import shlex
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
@@ -19,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from fmus.cli.output import Output
+from fmus.cli.signals import BROKEN_PIPE, forget_output
+from fmus.plain import plain
 from fmus.tables.table import Table, name_column, text_column
 from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
@@ -26,6 +31,7 @@ from fmus.versions import version_text
 Execute = Callable[[argparse.Namespace], Output]
 """Runs a command with its options."""
 _ENDING = "_command.py"
+_FAILED = 2
 
 
 @dataclass(frozen=True)
@@ -149,19 +155,72 @@ def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], 
         parser.set_defaults(execute=execute)
 
 
-def executed(options: argparse.Namespace, program: str) -> int:
-    """Run the command that was typed, and show what it reports.
+@dataclass(frozen=True)
+class Program:
+    """A program with commands.
 
     Args:
-        options: of the command line. program: its name.
-
-    Returns:
-        The exit code.
+        name: of the program. description: one line. package: the room of the commands' files.
+        groups: of commands, in the order of the help. expected: errors that are for the user.
+        within: in what a command runs. in_words: what the user reads of an error and the options.
     """
-    output = options.execute(options)
-    if isinstance(output, int):
-        return output
-    return output.show(program, as_json=options.json)
+
+    name: str
+    description: str
+    package: str
+    groups: Sequence[str]
+    expected: tuple[type[BaseException], ...]
+    within: Callable[[], AbstractContextManager[None]]
+    in_words: Callable[[BaseException, argparse.Namespace], str]
+
+    def run(self, words: Sequence[str]) -> int:
+        """Run the command that was typed.
+
+        Args:
+            words: behind the name of the program.
+
+        Returns:
+            The exit code: that of the command, 2 for an error or an interruption, 141 where nobody reads any more.
+        """
+        options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
+        try:  # reading the words loads the command, which may be interrupted too
+            self.parser(words).parse_args(words, options)
+            with self.within():
+                output: Output = options.execute(options)
+                code = output if isinstance(output, int) else output.show(self.name, as_json=options.json)
+            sys.stdout.flush()
+            return code
+        except BrokenPipeError:  # whoever read has seen enough, as `head` does
+            forget_output()
+            return BROKEN_PIPE
+        except self.expected as error:
+            print(f"{self.name}: {plain(self.in_words(error, options))}", file=sys.stderr)
+        except KeyboardInterrupt:
+            print(f"{self.name}: interrupted.", file=sys.stderr)
+        return _FAILED
+
+    def parser(self, words: Sequence[str]) -> argparse.ArgumentParser:
+        """The parser of the program; of the commands, only the one that is used is loaded.
+
+        Args:
+            words: behind the name of the program.
+        """
+        raw = argparse.RawDescriptionHelpFormatter
+        parser = argparse.ArgumentParser(prog=self.name, description=self.description, formatter_class=raw)
+        versions = "versions of the package and of what it runs on"
+        parser.add_argument("--version", action=_Version, nargs=0, help=versions)
+        how = f"one of those below; '{self.name} COMMAND --help' says what it takes"
+        subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help=how)
+        used = next((word for word in words if not word.startswith("-")), None)
+        module = f"{used}{_ENDING}".replace("-", "_")
+        if used is not None and used.replace("-", "").isalnum() and (_folder(self.package) / module).is_file():
+            add_command(subparsers, used, import_module(f"{self.package}.{module.removesuffix('.py')}"))
+            return parser
+        commands = find_commands(self.package)
+        if used is not None:
+            parser.error(_unknown(used, commands))
+        parser.epilog = "commands:\n\n" + _listed(commands, self.groups)
+        return parser
 
 
 def find_commands(package: str) -> list[Command]:
@@ -184,32 +243,6 @@ def _declared(name: str, file: Path) -> Command:
     literals = {ast.unparse(s.targets[0]): s.value for s in assigned}
     found = {key: ast.literal_eval(literals[key]) for key in ("GROUP", "HELP", "FORMER") if key in literals}
     return Command(name, found["GROUP"], found["HELP"], found.get("FORMER", {}))
-
-
-def make_parser(
-    program: str, description: str, package: str, groups: Sequence[str], arguments: Sequence[str]
-) -> argparse.ArgumentParser:
-    """The parser of a program; of the commands, only the one that is used is loaded.
-
-    Args:
-        program: its name. description: one line. package: the room of the commands' files.
-        groups: in the order of the help. arguments: words after the name.
-    """
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(prog=program, description=description, formatter_class=raw)
-    parser.add_argument("--version", action=_Version, nargs=0, help="versions of the package and of what it runs on")
-    how = f"one of those below; '{program} COMMAND --help' says what it takes"
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help=how)
-    used = next((word for word in arguments if not word.startswith("-")), None)
-    module = f"{used}{_ENDING}".replace("-", "_")
-    if used is not None and used.replace("-", "").isalnum() and (_folder(package) / module).is_file():
-        add_command(subparsers, used, import_module(f"{package}.{module.removesuffix('.py')}"))
-        return parser
-    commands = find_commands(package)
-    if used is not None:
-        parser.error(_unknown(used, commands))
-    parser.epilog = "commands:\n\n" + _listed(commands, groups)
-    return parser
 
 
 def _unknown(name: str, commands: Sequence[Command]) -> str:

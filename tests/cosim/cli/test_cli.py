@@ -157,7 +157,7 @@ def test_a_reader_that_leaves_is_no_reason_for_a_traceback() -> None:
     assert process.stdout is not None
     process.stdout.close()
     _, told = process.communicate(timeout=120)
-    assert (process.returncode, told) == (2, "")
+    assert (process.returncode, told) == (141, "")
 
 
 def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from test_fmus.build import linear_fmu
 import cosim.cli
 import fmus.cli
 from cosim import Scenario
-from fmus.cli.commands import find_commands, make_parser
+from fmus.cli.commands import find_commands
 from fmus.cli.output import Output
 from fmus.tables.table import Table
 
@@ -46,6 +46,7 @@ LINES = {
         "run": "run TRAIN --quiet --out OUT_run --seeds 2",
         "show": "show TRAIN --picture OUT.svg",
         "sweep": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --quiet --out OUT_sweep",
+        "tune": "tune TRAIN --observer multirate_cdo --parameters theta=1:2 --iterations 1 --quiet --out OUT_tuned",
         "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT_by",
     },
     "fmus": {
@@ -55,14 +56,14 @@ LINES = {
         "list": "list",
     },
 }
-PENDING = {"bound", "limits", "tune"}
+PENDING = {"bound", "limits"}
 """Commands that print by themselves."""
-PROGRAMS = {"cosim": cosim.cli.GROUPS, "fmus": fmus.cli.GROUPS}
+PROGRAMS = {"cosim": cosim.cli.PROGRAM, "fmus": fmus.cli.PROGRAM}
 
 
 def output_of(program: str, words: list[str]) -> Output:
     """What a command reports, and prints nowhere."""
-    options = make_parser(program, "", f"{program}.cli", PROGRAMS[program], words).parse_args(words)
+    options = PROGRAMS[program].parser(words).parse_args(words)
     options.command_line = shlex.join([program, *words])
     output: Output = options.execute(options)
     return output
@@ -159,9 +160,9 @@ def test_every_command_is_among_them(program: str) -> None:
 
 @pytest.mark.parametrize("program", LINES)
 def test_the_help_lists_every_command_in_its_group(program: str) -> None:
-    text = make_parser(program, "", f"{program}.cli", PROGRAMS[program], ["--help"]).format_help()
+    text = PROGRAMS[program].parser(["--help"]).format_help()
     commands = find_commands(f"{program}.cli")
-    assert {command.group for command in commands} == set(PROGRAMS[program])
+    assert {command.group for command in commands} == set(PROGRAMS[program].groups)
     for command in commands:
         below = text[text.index(f"\n{command.group}\n") :]
         assert f"\n  {command.name} " in below
@@ -173,7 +174,7 @@ def test_an_old_spelling_is_answered_by_the_new_one(program: str, capsys: pytest
     for command in find_commands(f"{program}.cli"):
         for old, now in command.former.items():
             with pytest.raises(SystemExit) as stopped:
-                make_parser(program, "", f"{program}.cli", PROGRAMS[program], [old, "anything"])
+                PROGRAMS[program].parser([old, "anything"])
             assert stopped.value.code == 2
             assert f"'{old}' has become: {now}" in capsys.readouterr().err
             assert now.startswith(f"{program} {command.name}")
