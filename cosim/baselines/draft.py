@@ -11,13 +11,12 @@ import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import floor, inf, isfinite, log10
 from typing import Any
 
 import numpy as np
 
 from cosim.baselines.baseline import Header
-from cosim.baselines.digits import SHARE, column_text, decimals_for, time_text
 from cosim.baselines.header_data import VERSION
 from cosim.baselines.kept_signals import kept_rows, resolve, select_signals
 from cosim.baselines.model_identity import identities
@@ -30,6 +29,77 @@ from cosim.results.result import Result
 
 _EVENT_DIGITS = 12
 """Significant digits of the numbers of a telegram, where they need not be exact."""
+
+
+_SHARE = 1e-3
+"""The last digit kept, as a share of the difference allowed: rounding takes at most half of it from the tolerance."""
+LARGE = 1e16
+"""Size from which numbers are written in full: beyond it float64 knows no digits behind the point."""
+_MOST = 15
+"""Digits behind the point beyond which rounding gains nothing: numbers are then written in full."""
+
+
+def decimals_for(allowed: float) -> int | None:
+    """Digits behind the decimal point that a column keeps.
+
+    Args:
+        allowed: difference allowed, in the unit of the column.
+
+    Returns:
+        The number of digits, negative for tens and hundreds; None where every bit is kept (nothing is allowed to
+        differ).
+    """
+    if not (allowed > 0.0 and isfinite(allowed)):
+        return None
+    digits = -floor(log10(allowed * _SHARE))
+    return digits if digits <= _MOST else None
+
+
+def number_text(value: float, decimals: int | None) -> str:
+    """A number as text.
+
+    Args:
+        value: the number; NaN and infinities become ``nan``, ``inf`` and ``-inf``.
+        decimals: as from `decimals_for`; None for the shortest text that reads back as the same number.
+    """
+    full = repr(float(value)).removesuffix(".0")
+    if decimals is None or not isfinite(value) or abs(value) >= LARGE:
+        return full
+    short = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals > 0 else f"{round(value, decimals):.0f}"
+    return "0" if short in ("-0", "") else short
+
+
+def _column_text(values: Iterable[float], decimals: int | None) -> list[str]:
+    """A column of numbers as text, see `number_text`."""
+    return [number_text(value, decimals) for value in values]
+
+
+def time_text(times: list[float], decimals: int | None) -> list[str]:
+    """Instants as text. Those that rounding would make equal or put out of order are written in full.
+
+    Rows with the same time are the two sides of an event: rounding must make none and lose none.
+
+    Args:
+        times: of the rows [s], not decreasing. decimals: as from `decimals_for`.
+    """
+    texts = _column_text(times, decimals)
+    for row in range(1, len(times)):
+        if times[row] != times[row - 1] and not float(texts[row]) > float(texts[row - 1]):
+            for near in (row - 1, row):
+                texts[near] = _same_instant(times, texts, near)
+    return texts
+
+
+def _same_instant(times: list[float], texts: list[str], row: int) -> str:
+    """The full text of a row's time, given to the rows with the same time as well."""
+    full = number_text(times[row], None)
+    first = row
+    while first > 0 and times[first - 1] == times[row]:
+        first -= 1
+    while first < len(times) and times[first] == times[row]:
+        texts[first] = full
+        first += 1
+    return full
 
 
 @dataclass(frozen=True)
@@ -138,7 +208,7 @@ def _table_text(result: Result, rows: np.ndarray, tolerances: Tolerances) -> str
     for info in result.signals:
         values = result.table[info.name]
         decimals = decimals_for(tolerances.for_signal(info.name).value_for(value_range(values)))
-        columns.append(column_text(values[rows].tolist(), decimals))
+        columns.append(_column_text(values[rows].tolist(), decimals))
     lines = io.StringIO()
     csv.writer(lines, lineterminator="\n").writerow(["time", *(info.name for info in result.signals)])
     lines.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
@@ -180,7 +250,7 @@ def _event_cell(value: float | str, allowed: float) -> str:
     if isinstance(value, str):
         return value
     short = float(f"{value:.{_EVENT_DIGITS}g}")
-    return repr(value if abs(short - value) > SHARE * allowed else short).removesuffix(".0")
+    return repr(value if abs(short - value) > _SHARE * allowed else short).removesuffix(".0")
 
 
 def text_digest(table: str, events: str) -> str:

@@ -9,8 +9,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cosim.baselines.baseline import Baseline
-from cosim.baselines.baseline_files import Change, change_by, draft_texts, read_baseline, summary_of
-from cosim.baselines.baseline_tables import parse_events, parse_table
+from cosim.baselines.baseline_files import (
+    Change,
+    change_by,
+    draft_texts,
+    parse_events,
+    parse_table,
+    read_baseline,
+    summary_of,
+)
 from cosim.baselines.draft import BaselineDraft, make_draft
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.regression import Regression, check

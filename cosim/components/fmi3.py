@@ -8,8 +8,7 @@ from typing import Any
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
-from cosim.components.start_values import StartValue
-from cosim.components.structure import STRUCTURAL, resize
+from cosim.components.start_values import STRUCTURAL, StartValue, resize
 from fmus.fmi.exact_ports import make_exact_writer
 from fmus.fmi.fmi3 import FMI3Slave
 from fmus.fmi.ports import is_native

@@ -14,22 +14,68 @@ from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
 from cosim.components.description import open_fmu, read_description
-from cosim.components.fmi1 import FMI1Component
-from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.shared_libraries import refuse_foreign_libraries
 from cosim.components.surroundings import Surroundings
 from cosim.components.unpacking import unpack
-from cosim.errors import FmuLoadError, ScenarioError
+from cosim.errors import CouplingError, FmuLoadError, ScenarioError
 from cosim.process.exit_guard import guard_exit
 from cosim.process.last_call import LAST_CALL
 from fmu_observer.description import describe
 from fmus.fmi.archive import Archive, NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
+from fmus.fmi.fmi1 import FMI1Slave
+from fmus.fmi.fmi2 import FMI2Slave
 from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, fmi_version
 from plant_models.hybrid import HybridSystem, TracingError
+
+
+class FMI1Component(Component, FMI1Slave):
+    """An FMI 1.0 co-simulation slave.
+
+    Args:
+        name: name in the scenario.
+        slave: object with fmpy's slave call surface.
+        description: its model description.
+        negated: names of variables with ``alias="negatedAlias"``: the slave holds the value with the other sign.
+        more: further arguments of `Component`.
+
+    Raises:
+        CouplingError: a declared start value is none of its variable's type.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        slave: Any,
+        description: ModelDescription,
+        *,
+        negated: frozenset[str] = frozenset(),
+        **more: Any,
+    ) -> None:
+        super().__init__(name, slave, description, **more)
+        self.negated = negated
+        self._forget()
+
+    def _forget(self) -> None:
+        try:
+            super()._forget()
+        except ValueError as error:
+            raise CouplingError(str(error)) from error
+
+    def set_start(self, name: str, value: Any) -> None:  # noqa: D102 - see Component
+        super().set_start(name, value)
+        self._hold(name, value)
+
+
+class FMI2Component(Component, FMI2Slave):
+    """An FMI 2.0 co-simulation slave. Arguments as for `Component`."""
+
+    def _says_why(self) -> bool:
+        return bool(self.messages) or self.kind == "block"
+
 
 COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Component}
 

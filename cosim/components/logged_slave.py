@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from cosim.components.component import Component
-from cosim.diagnostics.call_log import CallLog
-from cosim.diagnostics.call_text import Names, describe_native, describe_prepared, describe_python
+from cosim.diagnostics.call_log import CallLog, Names, describe_native, describe_prepared, describe_python
 from fmus.fmi.ports import is_native
 from fmus.fmi.types import REAL_TYPE
 

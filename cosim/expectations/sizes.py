@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.evaluation.metrics import error_size, instants
 from cosim.expectations.judged import Judged, at, given, with_unit
-from cosim.expectations.time_window import TimeWindow
+from cosim.expectations.judged_run import TimeWindow
 
 
 def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -8,8 +8,7 @@ from typing import Any
 
 from cosim.balises.delivery import Receiver
 from cosim.balises.localise import Localiser, Method, choose, make_localiser
-from cosim.balises.plant_error import PlantError
-from cosim.balises.plant_monitor import PlantMonitor
+from cosim.balises.plant_monitor import PlantError, PlantMonitor
 from cosim.balises.recorded import RecordedChannel, RecordedLayout, RecordedLocaliser
 from cosim.balises.service import BaliseService
 from cosim.balises.telegram import Channel, FalseTelegram

@@ -8,12 +8,11 @@ from functools import partial
 from cosim.compiled.choice import choose_stepper
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
-from cosim.master.algorithms.algorithm import Algorithm
+from cosim.master.algorithms.algorithm import Algorithm, IterationSettings
 from cosim.master.algorithms.choose import AlgorithmChoice
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.algorithms.iterate import Iterate
 from cosim.master.algorithms.jacobi import Jacobi
-from cosim.master.algorithms.settings import IterationSettings
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.doubling import DoublingStep

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cosim.errors import nearest
+from cosim.ssp.annotation import LISTS
 from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.package_data import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
-from cosim.ssp.parameter_sets import LISTS
 from cosim.ssp.pipe import BOOLEANS, Pipe
 
 Scalar = float | str

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from cosim.errors import nearest
 from cosim.scenario.package_names import split_variant
-from cosim.ssp.annotation import read_extras
+from cosim.ssp.annotation import read_extras, read_mapping, read_parameter_set
 from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag, parse, short, validated
 from cosim.ssp.lapses import Lapses
@@ -24,7 +24,6 @@ from cosim.ssp.package_data import (
     SsdStructure,
     SystemElement,
 )
-from cosim.ssp.parameter_sets import read_mapping, read_parameter_set
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"

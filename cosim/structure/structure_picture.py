@@ -39,9 +39,8 @@ from cosim.drawing.style import (
     styled,
 )
 from cosim.errors import OutputError
-from cosim.structure.curves import CORNER, back_curve, forward_curves
 from cosim.structure.picture_layout import EVENT_PORT, lay_out
-from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
+from cosim.structure.shapes import CORNER, FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire, back_curve, forward_curves
 
 if TYPE_CHECKING:
     from cosim.structure.structure_data import Link, Part, StructureData

@@ -20,10 +20,10 @@ from linear_runs import LinearRun, run_cut  # noqa: E402 - the tests' own module
 from test_fmus.masses import Chain, Cut, cuts  # noqa: E402
 
 from cosim.coupling.plan import Plan  # noqa: E402
+from cosim.master.algorithms.algorithm import IterationSettings  # noqa: E402
 from cosim.master.algorithms.gauss_seidel import GaussSeidel  # noqa: E402
 from cosim.master.algorithms.iterate import Iterate  # noqa: E402
 from cosim.master.algorithms.jacobi import Jacobi  # noqa: E402
-from cosim.master.algorithms.settings import IterationSettings  # noqa: E402
 
 CHAIN = Chain.two()  # undamped: its energy is constant
 DURATION = 2.0

@@ -15,8 +15,8 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import BaseUnit, CoSimulation, ModelDescription, ModelVariable, Unit, Unknown
 
 from cosim.components.component import Component
-from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
+from cosim.components.loading import FMI2Component
 from cosim.components.start_values import start_values
 
 DISCARD, ERROR, FATAL = 2, 3, 4

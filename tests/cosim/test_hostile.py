@@ -21,7 +21,7 @@ from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
 from cosim.compiled.library import stepper_library
 from cosim.components import surroundings
-from cosim.components.fmi2 import FMI2Component
+from cosim.components.loading import FMI2Component
 from cosim.process import exit_guard, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
 from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page

@@ -15,10 +15,8 @@ from test_fmus.events import periodic_fmu, periodic_ticks, timed_fmu
 
 from cosim.components.component import Component
 from cosim.components.described import DescribedComponent
-from cosim.components.fmi1 import FMI1Component
-from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
-from cosim.components.loading import load_fmu
+from cosim.components.loading import FMI1Component, FMI2Component, load_fmu
 from fmus.check.checked_instance import FmuInstance, FmuSlave2, FmuSlave3, make_slave
 from fmus.check.exchange_model import FmuModel, FmuModel2, FmuModel3
 from fmus.fmi.description import read_description

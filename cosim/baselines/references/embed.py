@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from cosim.baselines.baseline import Baseline
-from cosim.baselines.digits import number_text
+from cosim.baselines.draft import number_text
 from cosim.baselines.header_data import header_data
 from cosim.baselines.references.manifest import (
     CSV,

@@ -27,9 +27,9 @@ from cosim.errors import BaselineError, CosimError, nearest
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.scenario.fmu_alone import run_times
+from cosim.ssp.annotation import read_parameter_set
 from cosim.ssp.document import parse
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.parameter_sets import read_parameter_set
 
 COMPONENT = "fmu"
 """What the component of an FMU alone is called, see `Scenario.fmu`."""

@@ -10,8 +10,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.event_counts import USED
 from cosim.expectations.expectation import Count, WindowExpectation
 from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, span
-from cosim.expectations.time_window import TimeWindow
+from cosim.expectations.judged_run import JudgedRun, TimeWindow, span
 from cosim.results.result_data import BaliseRecord
 from cosim.toml_table import Name
 

@@ -13,7 +13,7 @@ import pytest
 from test_fmus.adaptive import adaptive_fmu, crossings
 
 from cosim import Scenario
-from cosim.balises.plant_error import PlantError
+from cosim.balises.plant_monitor import PlantError
 from cosim.run.outcome import Outcome
 
 STOP = 8.0

@@ -8,7 +8,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.baselines.digits import decimals_for, number_text, time_text
+from cosim.baselines.draft import decimals_for, number_text, time_text
 
 VALUES = st.floats(-1e9, 1e9)
 ALLOWED = st.floats(1e-12, 1e6)

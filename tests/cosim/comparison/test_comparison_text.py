@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from made_results import STRICT, compared, made
 
-from cosim.comparison.compare import compare_results
+from cosim.comparison.compare import compare_results, notes
 from cosim.comparison.comparison_text import comparison_text
-from cosim.comparison.notes import notes
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.results.result import BaliseRecord
 

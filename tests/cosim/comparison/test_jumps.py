@@ -13,7 +13,7 @@ from made_results import compared, kinds, made, signal
 
 from cosim.comparison.curve import Curve, looks_held
 from cosim.comparison.jumps import Jumps, find_jumps, shifts
-from cosim.comparison.matching import UNMATCHED, match_jumps
+from cosim.comparison.points import UNMATCHED, match_jumps
 from cosim.comparison.tolerance import Tolerance
 
 TIME = np.arange(201) * 0.01

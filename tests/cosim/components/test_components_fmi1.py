@@ -15,8 +15,7 @@ from test_fmus.events import awkward_fmu
 from test_fmus.typed import typed_fmu
 
 from cosim.components.component import Component
-from cosim.components.fmi1 import FMI1Component
-from cosim.components.loading import describe_fmu, load_fmu
+from cosim.components.loading import FMI1Component, describe_fmu, load_fmu
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import check_algebraic_loops
 from cosim.errors import CouplingError, RunError

@@ -22,9 +22,8 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.components.loading import load_fmu
 from cosim.components.logged_slave import log_calls
-from cosim.diagnostics.call_log import HEADER, CallLog
+from cosim.diagnostics.call_log import HEADER, CallLog, DescribedCall
 from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
-from cosim.diagnostics.call_text import DescribedCall
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_table
 from cosim.master.master import close

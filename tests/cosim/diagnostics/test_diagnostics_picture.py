@@ -18,10 +18,9 @@ from matplotlib.transforms import Bbox
 
 from cosim.errors import OutputError
 from cosim.structure import structure_picture as picture
-from cosim.structure.curves import forward_curves
 from cosim.structure.picture_layout import EVENT_PORT, lay_out
 from cosim.structure.run_structure import Structure
-from cosim.structure.shapes import Box, Layout, Wire
+from cosim.structure.shapes import Box, Layout, Wire, forward_curves
 from cosim.structure.structure_data import Balises, Link
 from cosim.structure.structure_picture import COLOURS, box_size, structure_figure, text_width, wires_of
 

@@ -15,10 +15,10 @@ from linear_runs import run_cut
 from test_fmus.masses import Chain, cuts
 
 from cosim.coupling.plan import Plan
+from cosim.master.algorithms.algorithm import IterationSettings
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.algorithms.iterate import Iterate
 from cosim.master.algorithms.jacobi import Jacobi
-from cosim.master.algorithms.settings import IterationSettings
 from cosim.master.control.control import StepControl
 from cosim.master.system import Row, System
 
