@@ -23,6 +23,7 @@ from cosim.evaluation.error_table import error_table
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.fault_table import fault_table
 from cosim.evaluation.metrics import phase_metrics
+from cosim.expectations.judged import judged_table
 from cosim.process.last_call import LAST_CALL
 from cosim.results.results_folder import check_writable
 from cosim.results.unfinished import SPARE
@@ -200,7 +201,7 @@ def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpa
         *(_tables(outcome) if outcome.result.table.size else []),
         cost_table(outcome.result),
         "" if study is None else study.table(),
-        outcome.expectations_text(),
+        judged_table(outcome.expectations),
     ]
     return Output(parts, data, paths, code, [] if failure is None else [f"the run ended early: {failure}"])
 

@@ -1,4 +1,4 @@
-"""What became of an expectation: plain data and its text. Standard library only."""
+"""What became of an expectation: plain data and a table. Standard library only."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from math import isfinite, nan
 from typing import Any
 
 from fmus.tables.numbers import number
+from fmus.tables.table import Table, name_column, text_column
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +36,6 @@ class Judged:
     text: str = ""
     number: int = 1
 
-    @property
-    def line(self) -> str:
-        """Verdict, name and text on one line."""
-        return f"{'met' if self.passed else 'UNMET':5}  {self.name}: {self.text}"
-
     def to_data(self) -> dict[str, Any]:
         """Plain data for the summary of a run."""
         return asdict(self)
@@ -55,18 +51,24 @@ class Judged:
         return cls(**(values | {key: nan for key, value in values.items() if value is None}))
 
 
-def judged_text(judged: Sequence[Judged]) -> str:
-    """A list for people, what is not met first; empty without expectations; ends without a line break.
+_COLUMNS = (
+    name_column("verdict", "Verdict"),
+    text_column("name", "Expected"),
+    text_column("text", "Measured", "What was measured, the limit and when; or why nothing was decided"),
+)
+
+
+def judged_table(judged: Sequence[Judged]) -> Table:
+    """All expectations with what was measured, what is not met first.
 
     Args:
         judged: of the run.
     """
-    if not judged:
-        return ""
     unmet = [j for j in judged if not j.passed]
     everything = "The expectation is met:" if len(judged) == 1 else f"All {len(judged)} expectations met:"
     head = f"{len(unmet)} of {len(judged)} expectations not met:" if unmet else everything
-    return "\n".join([head, *(f"  {j.line}" for j in [*unmet, *(j for j in judged if j.passed)])])
+    rows = [["met" if j.passed else "not met", j.name, j.text] for j in sorted(judged, key=lambda j: j.passed)]
+    return Table("expectations", _COLUMNS, rows, head)
 
 
 def with_unit(value: float, unit: str, digits: int = 4) -> str:

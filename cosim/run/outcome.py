@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
-from cosim.expectations.judged import Judged, judged_text
+from cosim.expectations.judged import Judged, judged_table
 from cosim.results.result import Result
 from cosim.results.results_folder import remove_report, write_results
 from cosim.run.made_from import renewed
@@ -64,7 +64,7 @@ class Outcome:
 
     def expectations_text(self) -> str:
         """A list of all expectations for people, what is not met first; empty where the scenario has none."""
-        return judged_text(self.expectations)
+        return judged_table(self.expectations).text()
 
     def check(self) -> Self:
         """The outcome itself, where the run reached its end and all its expectations are met: the last line of a test.

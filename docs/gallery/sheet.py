@@ -19,7 +19,7 @@ from PIL import Image
 from shared.line import SAME, Line, table
 
 from cosim.drawing.style import RC
-from fmus.text_table import text_table
+from fmus.tables.table import Table, text_column
 
 mpl.use("Agg")
 mpl.rcParams.update(RC)
@@ -91,8 +91,7 @@ class Sheet:
 
 def sheet_text(lines: list[Line]) -> str:
     """The lines as aligned text, reasons below."""
-    rows = table([line.content() for line in lines])
+    headings, *rows = table([line.content() for line in lines])
     reasons = dict.fromkeys(line.why for line in lines if line.why)
-    return "\n".join(
-        [*text_table(rows, left=range(len(rows[0])), heading=True), *(f"- {reason}" for reason in reasons)]
-    )
+    columns = [text_column(heading, heading) for heading in headings]
+    return Table("lines", columns, rows, notes=[f"- {reason}" for reason in reasons]).text()

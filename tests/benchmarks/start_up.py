@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from test_fmus.build import linear_fmu
 
-from fmus.text_table import text_table
+from fmus.tables.table import Column, Table, name_column
 
 SCENARIO = "freight_profile_d"
 SPLIT = """
@@ -145,10 +145,11 @@ def main() -> None:
             f"cosim run {SCENARIO}": [*cosim, "run", SCENARIO, "--quiet"],
         }
         rows = [[name, f"{least_cpu(command, folder, repeat):.2f}"] for name, command in commands.items()]
-        print("\n".join(text_table([["command", "CPU [s]"], *rows], left=(0,))))
+        print(Table("commands", [name_column("command", "command"), Column("cpu", "CPU", "s")], rows).text())
         parts = split(folder, repeat)
         rows = [[name, f"{seconds:.3f}"] for name, seconds in parts.items()]
-        print("", *text_table([[f"parts of a run of {SCENARIO}", "CPU [s]"], *rows], left=(0,)), sep="\n")
+        columns = [name_column("part", f"parts of a run of {SCENARIO}"), Column("cpu", "CPU", "s")]
+        print("", Table("parts", columns, rows).text(), sep="\n")
 
 
 if __name__ == "__main__":

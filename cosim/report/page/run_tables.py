@@ -18,7 +18,7 @@ from cosim.evaluation.roles import label
 from cosim.evaluation.seed_table import seed_table
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
-from cosim.expectations.judged import Judged
+from cosim.expectations.judged import Judged, judged_table
 from cosim.report.page.phases import phases_table
 from cosim.results.result import Result
 from fmus.tables.numbers import DASH, error_number, number
@@ -58,7 +58,7 @@ def run_tables(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> di
     """
     certificates, explained = _certificates(result, spec)
     return {
-        "expectations": _expectations(sorted(judged, key=lambda j: j.passed)),
+        "expectations": judged_table(judged),
         "telegrams": telegrams_table(count_events(result.events).outcomes, spec.labels),
         "seeds": _seeds(result),
         "phases": phases_table(phase_details(result, spec), spec),
@@ -74,12 +74,6 @@ def run_tables(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> di
         "messages": _messages(result),
         "versions": _versions(result),
     }
-
-
-def _expectations(judged: Sequence[Judged]) -> Table:
-    """All expectations with what was measured."""
-    columns = [name_column("verdict", "Verdict"), text_column("expected", "Expected"), text_column("text", "Measured")]
-    return Table("expectations", columns, [["met" if j.passed else "not met", j.name, j.text] for j in judged])
 
 
 def _seeds(result: Result) -> Table:
