@@ -68,7 +68,7 @@ def execute(options: argparse.Namespace) -> Output:
         bar.close()
     failed = again.outcome.failure is not None and again.outcome.failure != again.stored_failure
     return Output(
-        [again.text()],
+        again.parts(),
         again.to_dict(),
         again.paths,
         ERROR if failed else EQUAL if again.equal else DIFFERS,

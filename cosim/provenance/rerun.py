@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cosim.comparison.compare import compare
+from cosim.comparison.comparison_text import comparison_parts
 from cosim.comparison.verdict import Comparison
 from cosim.errors import OutputError, ProvenanceError
 from cosim.results.load_result import load_result
@@ -20,6 +21,7 @@ from cosim.results.unfinished import DID_NOT_END
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import Manifest, read_manifest
 from cosim.simulation.scenario import Scenario
+from fmus.tables.table import Parts, joined
 
 if TYPE_CHECKING:
     from cosim.comparison.compare import Given
@@ -31,7 +33,6 @@ from cosim.results.result import BaliseRecord, PacketRecord, Result
 
 LOG = logging.getLogger("cosim")
 Verdict = Literal["bit-identical", "within tolerance", "differs"]
-_LOUDEST = 5  # signals named in the text
 
 
 CHUNK = 65536
@@ -112,24 +113,20 @@ class Rerun:
         return self.verdict != "differs"
 
     def text(self) -> str:
+        """The same as text; see `parts`."""
+        return joined(self.parts())
+
+    def parts(self) -> Parts:
         """Verdict, what differs, and what changed since, for people."""
         rows, telegrams = len(self.outcome.result.table), len(self.outcome.result.events)
         counts = f"{rows} rows, {len(self.comparison.signals)} signals, {telegrams} telegrams"
         lines = [f"{self.directory}: {self.verdict} ({counts})."]
-        failed = self.comparison.failed
-        lines += [f"  {signal.name}: {_worst(signal)}" for signal in failed[:_LOUDEST]]
-        lines += [f"  and {len(failed) - _LOUDEST} signals more"] if len(failed) > _LOUDEST else []
-        lines += [f"  {difference.text}" for difference in self.comparison.event_differences[:_LOUDEST]]
         if self.verdict == "within tolerance":
             largest = max((s.max_error for s in self.comparison.signals if s.status == "within"), default=0.0)
             lines.append(f"  the largest difference is {largest:.3g} in the unit of its signal")
-        lines += [f"  note: {note}" for note in self.comparison.notes]
-        lines += (
-            ["Changed since:", *(f"  {change}" for change in self.changes)]
-            if self.changes
-            else ["Nothing changed since."]
-        )
-        return "\n".join(lines)
+        lines += ["Changed since:", *(f"  {c}" for c in self.changes)] if self.changes else ["Nothing changed since."]
+        differing = comparison_parts(self.comparison)[1:]  # its first line is a verdict too
+        return ["\n".join(lines), *differing]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a JSON file."""
@@ -261,13 +258,3 @@ def _changes(manifest: Manifest, outcome: Outcome) -> list[str]:
     ]
     notes += [made["text"] for made in manifest.objects.values()]
     return lines + notes + manifest.moved_on()
-
-
-def _worst(signal: Any) -> str:
-    if signal.findings:
-        return str(signal.findings[0].text)
-    if signal.status in ("missing", "extra"):
-        return "not in the new results" if signal.status == "missing" else "only in the new results"
-    if np.isnan(signal.max_error):
-        return "differs"
-    return f"differs by {signal.max_error:.3g} {signal.unit} at t = {signal.max_error_at:g} s"
