@@ -68,7 +68,7 @@ class HermiteStep:
         if not self.turns():
             return [Segment(0.0, self.h, self.p0, self.p1)]
         forward = self.v0 > 0.0
-        turn = first_time(lambda s: (self.speed(s) <= 0.0) == forward, 0.0, self.h)
+        turn = _first_time(lambda s: (self.speed(s) <= 0.0) == forward, 0.0, self.h)
         place = self.position(turn)
         return [Segment(0.0, turn, self.p0, place), Segment(turn, self.h, place, self.p1)]
 
@@ -77,7 +77,7 @@ class HermiteStep:
         part = self.segments()[0] if segment is None else segment
         (cubic, square), rising = self._coefficients(), part.rising
         p0, linear, h, low, high = self.p0, self.h * self.v0, self.h, part.start, part.end
-        for _ in range(_MAX_HALVINGS):  # as `first_time`, of `position`: some sixty halvings, without a call in each
+        for _ in range(_MAX_HALVINGS):  # as `_first_time`, of `position`: some sixty halvings, without a call in each
             middle = 0.5 * (low + high)
             if middle in (low, high):
                 break
@@ -120,7 +120,7 @@ class HermiteStep:
         return 0.0 if min(speeds) <= 0.0 <= max(speeds) else min(map(abs, speeds))
 
 
-def first_time(reached: Callable[[float], bool], low: float, high: float) -> float:
+def _first_time(reached: Callable[[float], bool], low: float, high: float) -> float:
     """The first time in ``(low, high]`` at which `reached` is true, halved down to neighbouring floats; `high` must
     reach.
     """

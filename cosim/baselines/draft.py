@@ -39,16 +39,8 @@ _MOST = 15
 """Digits behind the point beyond which rounding gains nothing: numbers are then written in full."""
 
 
-def decimals_for(allowed: float) -> int | None:
-    """Digits behind the decimal point that a column keeps.
-
-    Args:
-        allowed: difference allowed, in the unit of the column.
-
-    Returns:
-        The number of digits, negative for tens and hundreds; None where every bit is kept (nothing is allowed to
-        differ).
-    """
+def _decimals_for(allowed: float) -> int | None:
+    """Digits behind the decimal point that a column keeps."""
     if not (allowed > 0.0 and isfinite(allowed)):
         return None
     digits = -floor(log10(allowed * _SHARE))
@@ -60,7 +52,7 @@ def number_text(value: float, decimals: int | None) -> str:
 
     Args:
         value: the number; NaN and infinities become ``nan``, ``inf`` and ``-inf``.
-        decimals: as from `decimals_for`; None for the shortest text that reads back as the same number.
+        decimals: as from `_decimals_for`; None for the shortest text that reads back as the same number.
     """
     full = repr(float(value)).removesuffix(".0")
     if decimals is None or not isfinite(value) or abs(value) >= LARGE:
@@ -80,7 +72,7 @@ def time_text(times: list[float], decimals: int | None) -> list[str]:
     Rows with the same time are the two sides of an event: rounding must make none and lose none.
 
     Args:
-        times: of the rows [s], not decreasing. decimals: as from `decimals_for`.
+        times: of the rows [s], not decreasing. decimals: as from `_decimals_for`.
     """
     texts = _column_text(times, decimals)
     for row in range(1, len(times)):
@@ -203,11 +195,11 @@ def versions_of(result: Result) -> dict[str, str]:
 def _table_text(result: Result, rows: np.ndarray, tolerances: Tolerances) -> str:
     length = float(result.time[-1] - result.time[0])
     entries = [tolerances.default, *tolerances.by_signal.values()]
-    decimals = decimals_for(min(entry.time_for(length) for entry in entries))
+    decimals = _decimals_for(min(entry.time_for(length) for entry in entries))
     columns = [time_text(result.time[rows].tolist(), decimals)]
     for info in result.signals:
         values = result.table[info.name]
-        decimals = decimals_for(tolerances.for_signal(info.name).value_for(value_range(values)))
+        decimals = _decimals_for(tolerances.for_signal(info.name).value_for(value_range(values)))
         columns.append(_column_text(values[rows].tolist(), decimals))
     lines = io.StringIO()
     csv.writer(lines, lineterminator="\n").writerow(["time", *(info.name for info in result.signals)])

@@ -110,12 +110,8 @@ def _is_list(entries: Any) -> bool:
     return isinstance(entries, Iterable) and all(isinstance(e, Mapping) and "name" in e for e in entries)
 
 
-def keeps_packets(result: Result) -> bool:
-    """Whether a result would have packets if there had been any: a folder does, a single file or a baseline does not.
-
-    Args:
-        result: result or reference.
-    """
+def _keeps_packets(result: Result) -> bool:
+    """Whether a result would have packets if there had been any: a folder does, a file or a baseline does not."""
     return bool(result.packets) or ("components" in result.summary and "events_recorded" not in result.summary)
 
 
@@ -126,7 +122,7 @@ def _compare_packets(reference: Result, result: Result, tolerance: Tolerance, le
         reference, result: whose packets. tolerance: of times and values. length: of the reference [s].
     """
     sides = (reference, result)
-    if any(side.packets for side in sides) and not all(map(keeps_packets, sides)):
+    if any(side.packets for side in sides) and not all(map(_keeps_packets, sides)):
         return EventComparison(compared=False)
     ours, theirs = ([_event(packet) for packet in side.packets] for side in sides)
     return compare_events(ours, theirs, tolerance, length)

@@ -22,7 +22,7 @@ _Pairs = tuple[np.ndarray, np.ndarray]
 """Index into the jumps of the reference, and of the result, both rising."""
 
 
-def match_jumps(reference: Jumps, result: Jumps, *, window: float, allowed: float, scale: float) -> _Pairs:
+def _match_jumps(reference: Jumps, result: Jumps, *, window: float, allowed: float, scale: float) -> _Pairs:
     """Pairs of jumps, in order, with the least sum of costs.
 
     A pair costs its shift as a share of the window, and where the values before or after differ by more than allowed
@@ -299,7 +299,7 @@ def _overlap_rows(curve: Curve, other: Curve) -> int:
 
 
 def _matched(one: Jumps, two: Jumps, allowed: Allowed, window: float) -> MatchedJumps:
-    first, second = match_jumps(one, two, window=window, allowed=allowed.value, scale=allowed.scale)
+    first, second = _match_jumps(one, two, window=window, allowed=allowed.value, scale=allowed.scale)
     pairs = choose(one, first), choose(two, second)
     alone = [np.delete(np.arange(len(jumps)), which) for jumps, which in ((one, first), (two, second))]
     return MatchedJumps(*pairs, shifts(*pairs), choose(one, alone[0]), choose(two, alone[1]))

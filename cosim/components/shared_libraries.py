@@ -42,12 +42,8 @@ class _Linkage:
     needed: tuple[str, ...] = ()
 
 
-def read_linkage(path: Path) -> _Linkage | None:
-    """The linkage of a 64-bit little-endian ELF file; None of any other file, and of a damaged one.
-
-    Args:
-        path: of the file.
-    """
+def _read_linkage(path: Path) -> _Linkage | None:
+    """The linkage of a 64-bit little-endian ELF file; None of any other file, and of a damaged one."""
     try:
         content = path.read_bytes()
         return _linkage(content) if content[:6] == MAGIC + b"\x02\x01" else None
@@ -120,12 +116,12 @@ def _own_needs(library: Path) -> dict[str, Path]:
     files |= {
         linkage.soname: path
         for path in files.values()
-        if (linkage := read_linkage(path)) is not None and linkage.soname
+        if (linkage := _read_linkage(path)) is not None and linkage.soname
     }
     found: dict[str, Path] = {}
     waiting = [library]
     while waiting:
-        linkage = read_linkage(waiting.pop())
+        linkage = _read_linkage(waiting.pop())
         for needed in () if linkage is None else linkage.needed:
             if needed in files and needed not in found:
                 found[needed] = files[needed]

@@ -24,10 +24,8 @@ from cosim.errors import CouplingError
 
 __all__ = [
     "Group",
-    "check_algebraic_loops",
     "declared_feedthrough",
     "execution_groups",
-    "execution_order",
     "undeclared",
 ]
 
@@ -122,34 +120,20 @@ def _ordered_group(
     return Group(ordered, is_loop, tuple(loops), tuple(maybe), knots)
 
 
-def execution_order(
+def _execution_order(
     components: Mapping[str, Component],
     connections: Sequence[Connection],
     before: Iterable[Pair] = (),
     first: Iterable[str] = (),
     last: Iterable[str] = (),
 ) -> list[str]:
-    """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate.
-
-    Args:
-        components, connections, before, first, last: as for `execution_groups`.
-
-    Raises:
-        CouplingError: an algebraic loop, with its signals named, or pairs in `before` that contradict each other.
-    """
-    check_algebraic_loops(components, connections)
+    """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate."""
+    _check_algebraic_loops(components, connections)
     return [name for group in execution_groups(components, connections, before, first, last) for name in group.names]
 
 
-def check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
-    """Refuse cycles of declared direct feedthrough.
-
-    Args:
-        components: by name, or those to look at. connections: of the run.
-
-    Raises:
-        CouplingError: there is one; its signals are named in order.
-    """
+def _check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
+    """Refuse cycles of declared direct feedthrough."""
     loops = algebraic_loops(components, connections)
     if loops:
         raise CouplingError(

@@ -30,7 +30,7 @@ _LONGEST = 60  # letters of a text
 
 
 @dataclass(frozen=True)
-class DescribedCall:
+class _DescribedCall:
     """A call in words.
 
     Args:
@@ -65,7 +65,7 @@ class Names:
 
 def describe_native(
     names: Names, function: str, argument_names: Sequence[str], arguments: Sequence[Any]
-) -> DescribedCall:
+) -> _DescribedCall:
     """A call of a native function: values that it gives are read from its arguments afterwards.
 
     Args:
@@ -77,21 +77,21 @@ def describe_native(
         count = int(arguments[2])
         called = names.of(kind, [int(arguments[1][i]) for i in range(count)])
         if verb == "Set":
-            return DescribedCall(
+            return _DescribedCall(
                 f"{function}({_pairs(called, _values(arguments[-1 - _counted(function)], count))})", _native_status
             )
-        return DescribedCall(
+        return _DescribedCall(
             f"{function}({_list(called)})", lambda status: (_word(status), _got(arguments, function, count))
         )
     shown = [f"{n}={_short(a)}" for n, a in zip(argument_names, arguments, strict=False) if not _is_hidden(n, a)]
     results = [(n, a) for n, a in zip(argument_names, arguments, strict=False) if _is_result(a)]
-    return DescribedCall(
+    return _DescribedCall(
         f"{function}({', '.join(shown)})",
         lambda status: (_word(status), ", ".join(f"{n}={_short(a._obj)}" for n, a in results)),
     )
 
 
-def describe_python(names: Names, function: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> DescribedCall:
+def describe_python(names: Names, function: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> _DescribedCall:
     """A call of a slave in Python: values that it gives are what it returns.
 
     Args:
@@ -101,15 +101,15 @@ def describe_python(names: Names, function: str, arguments: Sequence[Any], named
     if verb in ("get", "set") and arguments and _is_whole(arguments[0]) and kind not in ("RealStatus", "BooleanStatus"):
         called = names.of(kind, list(arguments[0]))
         if verb == "set" and len(arguments) > 1:
-            return DescribedCall(f"{function}({_pairs(called, list(arguments[1]))})", lambda _result: ("ok", ""))
-        return DescribedCall(f"{function}({_list(called)})", lambda result: ("ok", _short(result)))
+            return _DescribedCall(f"{function}({_pairs(called, list(arguments[1]))})", lambda _result: ("ok", ""))
+        return _DescribedCall(f"{function}({_list(called)})", lambda result: ("ok", _short(result)))
     shown = [_short(a) for a in arguments] + [f"{n}={_short(a)}" for n, a in named.items() if not callable(a)]
-    return DescribedCall(
+    return _DescribedCall(
         f"{function}({', '.join(shown)})", lambda result: ("ok", "" if result is None else _short(result))
     )
 
 
-def describe_prepared(names: Names, verb: str, kind: str, references: Sequence[int], values: Any) -> DescribedCall:
+def describe_prepared(names: Names, verb: str, kind: str, references: Sequence[int], values: Any) -> _DescribedCall:
     """A prepared call of a block, which reads into or writes from an array.
 
     Args:
@@ -118,8 +118,8 @@ def describe_prepared(names: Names, verb: str, kind: str, references: Sequence[i
     """
     called = names.of(kind, references)
     if verb == "set":
-        return DescribedCall(f"set{kind}({_pairs(called, values.tolist())})", lambda _result: ("ok", ""))
-    return DescribedCall(
+        return _DescribedCall(f"set{kind}({_pairs(called, values.tolist())})", lambda _result: ("ok", ""))
+    return _DescribedCall(
         f"get{kind}({_list(called)})", lambda _result: ("ok", _list([_short(v) for v in values.tolist()]))
     )
 
@@ -230,7 +230,7 @@ class CallLog:
             hint = "Choose another file."
             raise OutputError(f"The call log cannot be written to {path}: {error.strerror or error}. {hint}") from error
 
-    def call(self, time: float, component: str, described: DescribedCall, function: Callable[[], Any]) -> Any:
+    def call(self, time: float, component: str, described: _DescribedCall, function: Callable[[], Any]) -> Any:
         """Make a call and log it.
 
         Args:

@@ -150,12 +150,8 @@ def _deciding(entries: Sequence[FilterConsistency], observer: str) -> list[Filte
     return nees or single
 
 
-def true_value(result: Result, spec: ReportSpec, quantity: str) -> np.ndarray | None:
-    """The true value of a quantity, shape (rows,), or None where none was recorded.
-
-    Args:
-        result: the run. spec: roles. quantity: as observers call it.
-    """
+def _true_value(result: Result, spec: ReportSpec, quantity: str) -> np.ndarray | None:
+    """The true value of a quantity, shape (rows,), or None where none was recorded."""
     of_role = recorded(result, getattr(spec, f"true_{quantity}", None))
     if of_role is not None:
         return of_role
@@ -179,7 +175,7 @@ def _of_one(result: Result, spec: ReportSpec, observer: str) -> Iterator[FilterC
     quantities = [name.removesuffix(STD) for name in names if name.endswith(STD)]
     errors: dict[str, np.ndarray] = {}
     for quantity in quantities:
-        true, believed = true_value(result, spec, quantity), recorded(result, f"{observer}.{quantity}")
+        true, believed = _true_value(result, spec, quantity), recorded(result, f"{observer}.{quantity}")
         if true is not None and believed is not None:
             with np.errstate(invalid="ignore", over="ignore"):
                 errors[quantity] = (believed - true)[rows]

@@ -131,7 +131,7 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
     return [_judged(result, spec, observer, indicated[observer], faults, start) for observer in seen]
 
 
-def judged_detections(
+def _judged_detections(
     faults: Sequence[Interval],
     detections: Sequence[Interval],
     end: float,
@@ -242,7 +242,7 @@ def _judged(
     end = float(result.time[-1])
     detections = [] if indicated is None else [d for d in intervals(result.time, indicated) if d[1] > start]
     begun = [d for d in detections if d[0] >= start or any(d[1] > a for a, _ in faults)]
-    starts, ends, false = judged_detections(faults, begun, end, delay_limit=spec.delay_limit)
+    starts, ends, false = _judged_detections(faults, begun, end, delay_limit=spec.delay_limit)
     inside = sum(max(0.0, min(b, d) - max(a, c)) for a, b in faults for c, d in begun)
     outside = sum(d - max(c, start) for c, d in begun) - inside
     return FaultDetection(

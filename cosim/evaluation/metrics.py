@@ -16,7 +16,7 @@ FEWEST_INSTANTS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorSize:
+class _ErrorSize:
     """Size of an error over a time interval, in the unit of the error; NaN with too few rows, infinite once diverged.
 
     Args:
@@ -41,13 +41,13 @@ class PhaseMetrics:
 
     observer: str
     phase: str
-    speed: ErrorSize | None
-    position: ErrorSize | None
+    speed: _ErrorSize | None
+    position: _ErrorSize | None
     published: float | None = None
     independent: float | None = None
 
 
-def error_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
+def error_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
     """Maximum and time-weighted root mean square of an error.
 
     The square is integrated by the trapezoidal rule, so rows of the same time (before and after an event) count once,
@@ -61,17 +61,17 @@ def error_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
         The sizes; where no time passes, the root mean square is that of the rows.
     """
     if not len(error):
-        return ErrorSize(nan, nan)
+        return _ErrorSize(nan, nan)
     largest = float(np.max(np.abs(error)))
     if not np.isfinite(largest):
-        return ErrorSize(inf, inf)
+        return _ErrorSize(inf, inf)
     if largest < np.finfo(float).tiny:  # too small to divide by
-        return ErrorSize(largest, largest)
+        return _ErrorSize(largest, largest)
     square = (error / largest) ** 2  # scaled, so that a diverged estimate does not overflow
     steps = np.maximum(np.diff(time), 0.0)
     elapsed = float(np.sum(steps))
     mean = float(np.sum(steps * (square[1:] + square[:-1]))) / (2 * elapsed) if elapsed > 0 else float(np.mean(square))
-    return ErrorSize(largest, largest * float(np.sqrt(mean)))
+    return _ErrorSize(largest, largest * float(np.sqrt(mean)))
 
 
 def instants(time: np.ndarray) -> int:
@@ -83,14 +83,14 @@ def instants(time: np.ndarray) -> int:
     return int(np.count_nonzero(np.diff(time) > 0.0)) + 1 if len(time) else 0
 
 
-def judged_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
+def judged_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
     """As `error_size`; NaN where there are fewer than `FEWEST_INSTANTS` instants.
 
     Args:
         time: instants [s], shape (rows,), never falling.
         error: estimate minus true value, shape (rows,).
     """
-    return error_size(time, error) if instants(time) >= FEWEST_INSTANTS else ErrorSize(nan, nan)
+    return error_size(time, error) if instants(time) >= FEWEST_INSTANTS else _ErrorSize(nan, nan)
 
 
 def within(time: np.ndarray, phase: Phase, evaluate_after: float) -> np.ndarray:

@@ -77,7 +77,7 @@ class FmuFilterModel:
         self._P = np.zeros((len(self._estimated), len(self._estimated)))
         if table.kind != "particle":
             self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
-        self._words = legal_names([*model.inputs, *model.states, *model.outputs])
+        self._words = _legal_names([*model.inputs, *model.states, *model.outputs])
         self.inputs = [_signal(model, name, "input", self._words[name]) for name in model.inputs]
         self.inputs += [
             replace(_signal(model, name, "input", MEASURED + self._words[name]), can_be_missing=True)
@@ -218,12 +218,8 @@ class FmuFilterModel:
         raise AttributeError(name)
 
 
-def legal_names(names: Sequence[str]) -> dict[str, str]:
-    """Names of an FMU as those of signals: what is no letter, digit or ``_`` becomes ``_``, ``body.v[2]`` ``body_v_2``.
-
-    Args:
-        names: of variables, perhaps some twice.
-    """
+def _legal_names(names: Sequence[str]) -> dict[str, str]:
+    """Names of an FMU as those of signals: what is no letter, digit or ``_`` becomes ``_``."""
     found: dict[str, str] = {}
     for name in dict.fromkeys(names):
         word = re.sub(r"\W+", "_", name).strip("_") or "variable"

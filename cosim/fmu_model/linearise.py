@@ -70,12 +70,12 @@ def linearise_fmu(
         if simulate and t > 0.0 and set(states or {}) != set(model.states):
             x = _simulated(model, t, u, step)
         x = _filled(model, "state", model.states, x, states or {})
-        return linearise_model(model, t, x, u, step).part(by_inputs, None)
+        return _linearise_model(model, t, x, u, step).part(by_inputs, None)
     finally:
         model.close()
 
 
-def linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: float) -> Linearisation:
+def _linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: float) -> Linearisation:
     """Matrices of an open model at a point.
 
     Args:

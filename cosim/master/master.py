@@ -33,7 +33,7 @@ from fmus.fmi.standard import TIME_TOLERANCE
 _PROGRESS_INTERVAL = 64
 
 
-def make_finite_check(values: np.ndarray, can_be_missing: np.ndarray) -> Callable[[], bool]:
+def _make_finite_check(values: np.ndarray, can_be_missing: np.ndarray) -> Callable[[], bool]:
     """A call that says whether all values are finite, or NaN where one can be missing.
 
     Args:
@@ -162,7 +162,7 @@ class Master:
         self.exchange_rounds = 0
         self.ended_early: str | None = None
         self._progress = progress
-        self._all_finite = make_finite_check(plan.values, plan.can_be_missing)
+        self._all_finite = _make_finite_check(plan.values, plan.can_be_missing)
         self._stepper: StepperChoice | None = None
         self._choose_stepper = stepper
         self.between_steps: Callable[[], None] | None = None

@@ -38,18 +38,15 @@ Verdict = Literal["bit-identical", "within tolerance", "differs"]
 CHUNK = 65536
 
 
-def same_result(first: Result, second: Result) -> bool:
+def _same_result(first: Result, second: Result) -> bool:
     """Whether tables, telegrams and packets agree in every bit.
 
     One NaN is as good as another, since text files keep no more of it.
-
-    Args:
-        first: one of them. second: the other.
     """
     return (
         _same_table(first.table, second.table)
-        and same_events(first.events, second.events)
-        and same_events(first.packets, second.packets)
+        and _same_events(first.events, second.events)
+        and _same_events(first.packets, second.packets)
     )
 
 
@@ -65,12 +62,8 @@ def _same_table(first: np.ndarray, second: np.ndarray) -> bool:
     )
 
 
-def same_events(first: Sequence[BaliseRecord | PacketRecord], second: Sequence[BaliseRecord | PacketRecord]) -> bool:
-    """Whether two lists of telegrams or packets are the same.
-
-    Args:
-        first: one of them. second: the other.
-    """
+def _same_events(first: Sequence[BaliseRecord | PacketRecord], second: Sequence[BaliseRecord | PacketRecord]) -> bool:
+    """Whether two lists of telegrams or packets are the same."""
     return len(first) == len(second) and all(
         list(map(_bits, astuple(a))) == list(map(_bits, astuple(b))) for a, b in zip(first, second, strict=True)
     )
@@ -178,7 +171,7 @@ def rerun(
     paths = {} if out is None else outcome.write(out)  # before anything can be wrong with the comparison
     result = _as_far_as(stored, outcome.result)
     comparison = compare(stored, result, tolerance, extra_fails=True)
-    identical = same_result(stored, result)
+    identical = _same_result(stored, result)
     verdict: Verdict = "bit-identical" if identical else "within tolerance" if comparison.equal else "differs"
     changes = [*edited, *_changes(manifest, outcome), *(f"set: {name} = {value}" for name, value in settings.items())]
     return Rerun(Path(directory), manifest, outcome, comparison, verdict, tuple(changes), paths, stored.failure)

@@ -29,7 +29,7 @@ _LONGEST = 120
 """Characters of a name; some file systems end at 255, with folders and endings."""
 
 
-def baseline_name(node: str, call: str = "") -> str:
+def _baseline_name(node: str, call: str = "") -> str:
     """The name of a baseline, without folder and ending.
 
     Args:
@@ -131,7 +131,7 @@ class FmuRegression:
             )
         self._calls.append(call)
         node = self._node.nodeid.partition("::")[2] or self._node.name
-        return options.baseline_folder(self._config, self._file) / f"{baseline_name(node, call)}.json"
+        return options.baseline_folder(self._config, self._file) / f"{_baseline_name(node, call)}.json"
 
     def _check(self, call: Call) -> Regression:
         """Compare; a missing baseline or a difference fails the test, unless all differences were asked for."""

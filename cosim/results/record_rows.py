@@ -32,17 +32,13 @@ _PACKET_KINDS = ("sent", "lost", "duplicate")
 _ESCAPES = {ord("%"): "%25", ord(";"): "%3B", ord("="): "%3D"}
 
 
-def outcomes_text(outcomes: Mapping[str, str]) -> str:
-    """Outcomes as ``name=outcome;name=outcome``; ``%``, ``;`` and ``=`` inside a name are written as in a URL.
-
-    Args:
-        outcomes: by name of the receiver.
-    """
+def _outcomes_text(outcomes: Mapping[str, str]) -> str:
+    """Outcomes as ``name=outcome;name=outcome``; ``%``, ``;`` and ``=`` inside a name are written as in a URL."""
     return ";".join(f"{name.translate(_ESCAPES)}={what.translate(_ESCAPES)}" for name, what in outcomes.items())
 
 
 def parse_outcomes(text: str) -> dict[str, str]:
-    """The mapping that `outcomes_text` wrote.
+    """The mapping that `_outcomes_text` wrote.
 
     Raises:
         ValueError: a part of `text` is not ``name=outcome``.
@@ -166,7 +162,7 @@ class RecordRows(Generic[Record]):
 
 def _cell(value: Any, number: bool) -> float | str:
     if isinstance(value, Mapping):
-        return outcomes_text({k: v if isinstance(v, str) else repr(float(v)) for k, v in value.items()})
+        return _outcomes_text({k: v if isinstance(v, str) else repr(float(v)) for k, v in value.items()})
     return float(value) if number else str(value)
 
 

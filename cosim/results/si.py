@@ -109,12 +109,8 @@ class InFormerUnits:
         return values if unit is None else (values - unit.offset) / unit.factor
 
 
-def si_name(unit: Unit) -> str:
-    """A name for the SI unit of the same dimension, e.g. ``m/s`` for ``km/h``.
-
-    Args:
-        unit: of a column.
-    """
+def _si_name(unit: Unit) -> str:
+    """A name for the SI unit of the same dimension, e.g. ``m/s`` for ``km/h``."""
     if unit.exponents in NAMED:
         return NAMED[unit.exponents]
     return ".".join(f"{s}{'' if e == 1 else e}" for s, e in zip(BASE_SYMBOLS, unit.exponents, strict=True) if e)
@@ -131,4 +127,4 @@ def _to_convert(signal: SignalInfo, unit_of: UnitOf) -> Unit | None:
 def _described(signal: SignalInfo, unit: Unit | None) -> SignalInfo:
     if unit is None:
         return signal
-    return replace(signal, unit=si_name(unit), display_unit=signal.display_unit or signal.unit)
+    return replace(signal, unit=_si_name(unit), display_unit=signal.display_unit or signal.unit)

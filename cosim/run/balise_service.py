@@ -165,13 +165,13 @@ def choose_method(
     asked: Method | None = None if table.method == "auto" else table.method
     # a tolerance tells of a solver: it is looked at
     if asked is not None and asked in _UNTOUCHED and component.tolerance is None:
-        return Choice(asked, _ASKED_FOR, error=plant_error(table, asked, component, start))
+        return Choice(asked, _ASKED_FOR, error=_plant_error(table, asked, component, start))
     if component.kind == RECORDING:
         return Choice("rollback", _PLAYED_BACK) if asked is None else Choice(asked, _ASKED_FOR)
-    report = known_probe(make, starts, start, step)
+    report = _known_probe(make, starts, start, step)
     chosen, reason = choose(report.honest_step, report.restores, table.clock)
     method, why = (chosen, reason) if asked is None else (asked, _ASKED_FOR)
-    error = plant_error(table, method, component, start, report)
+    error = _plant_error(table, method, component, start, report)
     warnings = []
     if asked is not None and error.unknown:
         warnings.append(
@@ -181,12 +181,8 @@ def choose_method(
     return Choice(method, why, report, tuple(warnings), error)
 
 
-def known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start: float, step: float) -> ProbeReport:
-    """The report of a probe, from the cache where the same plant was probed in the same way before.
-
-    Args:
-        make, starts, start, step: as for `choose_method`.
-    """
+def _known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start: float, step: float) -> ProbeReport:
+    """The report of a probe, from the cache where the same plant was probed in the same way before."""
     key = identity(make, starts, start, step, code=_PROBING)
     known = None if key is None else recall("probe", key)
     if known is not None:
@@ -197,7 +193,7 @@ def known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start:
     return report
 
 
-def plant_error(
+def _plant_error(
     table: BalisesTable, method: Method, component: Component, start: float, report: ProbeReport | None = None
 ) -> PlantError:
     """What the plant itself adds to the error of the instants that a method finds.
@@ -218,7 +214,7 @@ def plant_error(
 
 
 def _why_unknown(method: Method, report: ProbeReport | None, position: str, tolerance: float) -> str:
-    """Why nothing can be said of the plant's own error, if so; arguments as for `plant_error`, the position by its own
+    """Why nothing can be said of the plant's own error, if so; arguments as for `_plant_error`, the position by its own
     name.
     """
     if method == "early-return" and not tolerance:

@@ -26,22 +26,10 @@ if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
 
 
-def check_expectations(
+def _check_expectations(
     table: ScenarioTable, components: Mapping[str, Component], receivers: Sequence[str], where: str
 ) -> ScenarioTable:
-    """Check the expectations of a scenario against its components.
-
-    Args:
-        table: the scenario. components: by name. receivers: of balise telegrams. where: place for messages.
-
-    Returns:
-        The scenario, with the thresholds of indicators that were left to us.
-
-    Raises:
-        ScenarioError: a signal, observer or receiver does not exist, a window lies outside the run, or an expectation
-        can never
-            be judged; one line for each expectation at fault.
-    """
+    """Check the expectations of a scenario against its components."""
     faults, items = [], []
     before = _before(table, components, receivers)
     for place, item in enumerate(table.expect, start=1):
@@ -127,5 +115,5 @@ def complete_tables(task: RunTask, coupled: Coupled, balises: BaliseRoles, remar
     roles = inferred_roles(table, coupled.components, coupled.connections, balises.plant)
     if roles:
         remarks.note(f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}.")
-    table = check_expectations(with_roles(table, roles), coupled.sources, balises.receivers, task.where)
+    table = _check_expectations(with_roles(table, roles), coupled.sources, balises.receivers, task.where)
     return task.with_table(table)

@@ -53,7 +53,7 @@ def make_master(
         axis,
         services.balises,
         None if progress is None else lambda t: progress(t, axis.stop),
-        algorithm=lambda plan: make_algorithm(table.master, plan, choice),
+        algorithm=lambda plan: _make_algorithm(table.master, plan, choice),
         control=_control(table.master),
         stepper=partial(choose_stepper, table.master.stepper),
         recorder=partial(make_recorder, table),
@@ -101,12 +101,8 @@ def make_recorder(
     )
 
 
-def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> Algorithm:
-    """The algorithm that was chosen.
-
-    Args:
-        table: threads and iteration. plan: prepared. choice: what it is to be.
-    """
+def _make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> Algorithm:
+    """The algorithm that was chosen."""
     algorithm: Algorithm
     if choice.algorithm == "iterate":
         algorithm = Iterate(plan, choice.iterated, IterationSettings(**table.iteration.model_dump()))

@@ -94,12 +94,8 @@ def _plain_letters(text: str) -> str:
     return "".join(c for c in unicodedata.normalize("NFKD", text.replace("ß", "ss")) if not unicodedata.combining(c))
 
 
-def words_of(text: str) -> list[str]:
-    """The words in a name or a sentence, in small letters: ``vTrain`` and ``v_train`` alike are ``v`` and ``train``.
-
-    Args:
-        text: the text.
-    """
+def _words_of(text: str) -> list[str]:
+    """The words in a name or a sentence, in small letters: ``vTrain`` and ``v_train`` alike are ``v`` and ``train``."""
     return [part.lower() for part in PARTS.findall(_plain_letters(text))]
 
 
@@ -217,8 +213,8 @@ def _key(quantity: Quantity) -> str:
 
 
 def _named(quantity: Quantity, name: str, has_unit: bool) -> int:
-    last = words_of(name.rpartition(".")[2])
-    words, key = words_of(name), _key(quantity)
+    last = _words_of(name.rpartition(".")[2])
+    words, key = _words_of(name), _key(quantity)
     if quantity == "wheel_speed" and not (WORDS["speed"] | SENSORS | TURNING) & set(words):
         return WEAK if has_unit and WORDS[key] & set(words) else 0
     if WORDS[key] & set(last):
@@ -229,7 +225,7 @@ def _named(quantity: Quantity, name: str, has_unit: bool) -> int:
 
 
 def _described(quantity: Quantity, description: str) -> int:
-    words = set(words_of(description))
+    words = set(_words_of(description))
     if quantity == "wheel_speed":
         return _SAID if words & WORDS["wheel"] and words & WORDS["speed"] else 0
     if quantity in ("speed", "position") and words & WORDS["wheel"]:
@@ -239,7 +235,7 @@ def _described(quantity: Quantity, description: str) -> int:
 
 def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
     """What speaks against it: it is named as a reference, a limit, an error, or as another force."""
-    name = set(words_of(signal.name))
+    name = set(_words_of(signal.name))
     against = (_FOREIGN | _NOT_THIS.get(quantity, frozenset())) - WORDS[_key(quantity)]
     if quantity == "effort" and name & _DRIVING:
         against -= _BRAKING  # one signal for both
@@ -247,4 +243,4 @@ def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
         return _DENIED
     if WORDS[_key(quantity)] & name or quantity == "effort":
         return 0  # what is named plainly may be described beside other things
-    return _DENIED if set(words_of(signal.description)) & against else 0
+    return _DENIED if set(_words_of(signal.description)) & against else 0

@@ -80,7 +80,7 @@ def draw_structure(structure: StructureData, path: str | Path) -> Path:
     kind = path.suffix.removeprefix(".").lower()
     if kind not in FORMATS:
         raise OutputError(f"Cannot draw to {path}: choose a file that ends in {', '.join(f'.{f}' for f in FORMATS)}.")
-    figure = structure_figure(structure)
+    figure = _structure_figure(structure)
     dpi = min(_PNG_DPI, MAX_PIXELS / max(figure.get_size_inches()))
     if kind == "png" and dpi < _LEAST_DPI:
         count = len(structure.parts)
@@ -97,17 +97,13 @@ def draw_structure(structure: StructureData, path: str | Path) -> Path:
 
 
 @styled
-def structure_figure(structure: StructureData) -> Figure:
-    """The picture as a figure of matplotlib, as large as it needs.
-
-    Args:
-        structure: of the run.
-    """
-    edges = wires_of(structure)
-    layout = lay_out(structure, {part.name: box_size(part, edges) for part in structure.parts}, edges)
+def _structure_figure(structure: StructureData) -> Figure:
+    """The picture as a figure of matplotlib, as large as it needs."""
+    edges = _wires_of(structure)
+    layout = lay_out(structure, {part.name: _box_size(part, edges) for part in structure.parts}, edges)
     kinds = [kind for kind in _MEANINGS if any(edge.kind == kind for edge in edges)]
     subtitle = _subtitle(structure)
-    headline = max(text_width(structure.title, HEADLINE, bold=True), text_width(subtitle, SMALL))
+    headline = max(_text_width(structure.title, HEADLINE, bold=True), _text_width(subtitle, SMALL))
     width = max(layout.width, headline) + 2 * MARGIN
     rows = _key_rows(kinds, width - 2 * MARGIN)
     height = HEAD + layout.height + MARGIN + _KEY_ROW * len(rows) + MARGIN
@@ -127,12 +123,8 @@ def structure_figure(structure: StructureData) -> Figure:
     return figure
 
 
-def wires_of(structure: StructureData) -> list[Edge]:
-    """The wires to draw: connections by kind, and telegrams from the watched plant to those who are notified.
-
-    Args:
-        structure: of the run.
-    """
+def _wires_of(structure: StructureData) -> list[Edge]:
+    """The wires to draw: connections by kind, and telegrams from the watched plant to those who are notified."""
     edges = [Edge(link.source, link.target, _kind(link)) for link in structure.links]
     edges += [Edge(clock.source, clock.target, "event") for clock in structure.clocks]
     balises = structure.balises
@@ -147,22 +139,18 @@ def _kind(link: Link) -> str:
     return "iterated" if link.iterated else "held" if link.held else "fresh"
 
 
-def box_size(part: Part, edges: Sequence[Edge]) -> Size:
-    """Ports that have wires, and the width that everything in the box needs.
-
-    Args:
-        part: component of the structure. edges: wires at the component.
-    """
+def _box_size(part: Part, edges: Sequence[Edge]) -> Size:
+    """Ports that have wires, and the width that everything in the box needs."""
     inputs = tuple(dict.fromkeys(e.target[1] for e in edges if e.target[0] == part.name))
     outputs = tuple(dict.fromkeys(e.source[1] for e in edges if e.source[0] == part.name))
-    left, right = (max((text_width(name, _PORT) for name in names), default=0.0) for names in (inputs, outputs))
+    left, right = (max((_text_width(name, _PORT) for name in names), default=0.0) for names in (inputs, outputs))
     gap = MIDDLE if inputs and outputs else 0.0
     foot = _foot_text(part)
     width = max(
         left + gap + right,
-        text_width(part.name, NAME, bold=True) + 3.2 * _BADGE,
-        text_width(_kind_text(part), SMALL),
-        text_width(foot, SMALL),
+        _text_width(part.name, NAME, bold=True) + 3.2 * _BADGE,
+        _text_width(_kind_text(part), SMALL),
+        _text_width(foot, SMALL),
         0.8,
     )
     return Size(width + 2 * _SIDE, inputs, outputs, bool(foot))
@@ -187,7 +175,7 @@ def _counted(number: int, what: str) -> str:
 
 
 @lru_cache(maxsize=2048)
-def text_width(text: str, size: float, bold: bool = False) -> float:
+def _text_width(text: str, size: float, bold: bool = False) -> float:
     """Width of a text in the pictures' font [inch].
 
     Args:
@@ -289,8 +277,8 @@ def _draw_feedthrough(ax: Axes, structure: StructureData, part: Part, box: Box) 
     """Thin lines inside a box from inputs to the outputs that they act on directly, between the names."""
     if not box.size.inputs or not box.size.outputs:
         return
-    left = box.x + _SIDE + max(text_width(n, _PORT) for n in box.size.inputs) + 0.04
-    right = box.right - _SIDE - max(text_width(n, _PORT) for n in box.size.outputs) - 0.04
+    left = box.x + _SIDE + max(_text_width(n, _PORT) for n in box.size.inputs) + 0.04
+    right = box.right - _SIDE - max(_text_width(n, _PORT) for n in box.size.outputs) - 0.04
     knots = {pair for loop in structure.loops for pair in pairwise(loop)}
     for port in part.outputs:
         for name in set(port.depends_on or ()) & set(box.size.inputs):
@@ -345,7 +333,7 @@ def _key_rows(kinds: Sequence[str], width: float) -> list[list[str]]:
 
 
 def _key_width(kind: str) -> float:
-    return _KEY_LINE + 0.07 + text_width(_MEANINGS[kind], SMALL) + 0.3
+    return _KEY_LINE + 0.07 + _text_width(_MEANINGS[kind], SMALL) + 0.3
 
 
 def _draw_key(ax: Axes, kinds: Sequence[str], x: float, y: float) -> None:

@@ -23,7 +23,7 @@ from masters import c_loop
 
 from cosim import Scenario
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import execution_order
+from cosim.coupling.graph import _execution_order
 from cosim.coupling.plan import make_plan
 from cosim.run.outcome import Outcome
 
@@ -105,7 +105,7 @@ def _parts(chain: Chain) -> dict[str, float]:
             component.instantiate()
         pairs = [(f"{source}.y", f"{target}.u") for source, target in chain.links]
         connections = timed("  connecting [ms]", lambda: connect(pairs, loaded))
-        order = timed("  order of execution [ms]", lambda: execution_order(loaded, connections))
+        order = timed("  order of execution [ms]", lambda: _execution_order(loaded, connections))
         timed("  plan [ms]", lambda: make_plan(loaded, connections, order))
     finally:
         for component in loaded.values():

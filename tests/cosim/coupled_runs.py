@@ -18,7 +18,7 @@ from cosim.balises.telegram import Channel
 from cosim.components.component import Component
 from cosim.components.loading import load_block
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import execution_order
+from cosim.coupling.graph import _execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.attach import attach_interpolators
@@ -180,7 +180,7 @@ def prepare(
     by_name = {c.name: c for c in components}
     pairs = connect(connections, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
-    order = order or execution_order(by_name, pairs, before, ["plant"])
+    order = order or _execution_order(by_name, pairs, before, ["plant"])
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():

@@ -15,7 +15,7 @@ from cosim.components.component import Component
 from cosim.components.loading import load_fmu
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import execution_order
+from cosim.coupling.graph import _execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
@@ -63,7 +63,7 @@ def prepare(
     clocks, pairs = connect_clocks([tuple(c.split(" -> ")) for c in connections], by_name)  # type: ignore[misc]
     connected = connect(pairs, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
-    order = order or execution_order(by_name, connected, before)
+    order = order or _execution_order(by_name, connected, before)
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():

@@ -17,7 +17,7 @@ from cosim.master.algorithms.choose import choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
-from cosim.run.master_setup import make_algorithm
+from cosim.run.master_setup import _make_algorithm
 from cosim.scenario.scenario_tables import MasterTable
 
 
@@ -38,7 +38,7 @@ def prepare(
     plan = make_plan(components, pairs, [name for group in groups for name in group.names])
     if wanted.inputs != "hold":
         attach_interpolators(plan, wanted.inputs)
-    return Master(plan, TimeAxis(0.0, h, count), algorithm=lambda plan: make_algorithm(wanted, plan, choice))
+    return Master(plan, TimeAxis(0.0, h, count), algorithm=lambda plan: _make_algorithm(wanted, plan, choice))
 
 
 def run(*arguments: Any, **keywords: Any) -> tuple[np.ndarray, Mapping[str, Any]]:

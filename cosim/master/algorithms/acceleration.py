@@ -57,7 +57,7 @@ class Acceleration(ABC):
         return
 
 
-class FixedPoint(Acceleration):
+class _FixedPoint(Acceleration):
     """``z + w (g - z)`` with a constant `w`; with ``w = 1`` the plain exchange.
 
     Args:
@@ -70,12 +70,12 @@ class FixedPoint(Acceleration):
         super().__init__(size)
         self.relaxation = relaxation
 
-    def next(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:  # noqa: D102 - see Acceleration
+    def next(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:
         following: np.ndarray = z + self.relaxation * (g - z)
         return following
 
 
-class Aitken(Acceleration):
+class _Aitken(Acceleration):
     """``z + w (g - z)`` with `w` from the last two residuals; exact for a linear loop of one value, whatever its gain.
 
     Args:
@@ -93,11 +93,11 @@ class Aitken(Acceleration):
         self._first = self._factor = relaxation
         self._residual: np.ndarray | None = None
 
-    def begin(self, scale: np.ndarray) -> None:  # noqa: D102 - see Acceleration
+    def begin(self, scale: np.ndarray) -> None:
         super().begin(scale)
         self._factor, self._residual = self._first, None
 
-    def next(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:  # noqa: D102 - see Acceleration
+    def next(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:
         residual = (g - z) / self._scale
         if self._residual is not None:
             change = residual - self._residual
@@ -188,7 +188,7 @@ def make_acceleration(
     """
     if method == "newton":
         return Newton(size, jacobian)
-    return Aitken(size, relaxation) if method == "aitken" else FixedPoint(size, relaxation)
+    return _Aitken(size, relaxation) if method == "aitken" else _FixedPoint(size, relaxation)
 
 
 def scaled_norm(z: np.ndarray, g: np.ndarray, relative: float, absolute: float) -> float:

@@ -105,7 +105,7 @@ class MeanInterpolator(InputInterpolator):
             self._inputs.send()
 
 
-class DerivativeInterpolator(InputInterpolator):
+class _DerivativeInterpolator(InputInterpolator):
     """Sets value and first derivative at the start of the step (setRealInputDerivatives).
 
     Args:
@@ -120,14 +120,14 @@ class DerivativeInterpolator(InputInterpolator):
         names = [inputs.names[i] for i in self._moving]
         self._write_slopes, self._slopes = component.make_derivative_writer(names)
 
-    def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
+    def send(self, t: float, until: float) -> None:
         self._inputs.buffer[:] = self.hold.at(t, begins=True)
         self._inputs.send()
         self._slopes[:] = self.hold.slopes(t, until)[self._moving]
         self._write_slopes()
 
 
-class IntermediateInterpolator(InputInterpolator):
+class _IntermediateInterpolator(InputInterpolator):
     """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate).
 
     Args:
@@ -143,7 +143,7 @@ class IntermediateInterpolator(InputInterpolator):
         self._set_moving, self._now = component.writer(names)
         self.taken = component.follow_within_step(names, self._set)
 
-    def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
+    def send(self, t: float, until: float) -> None:
         self._inputs.buffer[:] = self.hold.at(t, begins=True)
         self._inputs.send()
 
@@ -159,9 +159,9 @@ def make_interpolator(hold: FirstOrderHold, inputs: Inputs, component: Component
         hold: of the inputs. inputs: the connected inputs of the component.
     """
     if component.fmi_version in (1, 2) and component.capabilities.canInterpolateInputs and component.kind == "FMU":
-        return DerivativeInterpolator(hold, inputs, component)
+        return _DerivativeInterpolator(hold, inputs, component)
     if isinstance(component, FMI3Component):
-        interpolator = IntermediateInterpolator(hold, inputs, component)
+        interpolator = _IntermediateInterpolator(hold, inputs, component)
         if interpolator.taken:
             return interpolator
     return MeanInterpolator(hold, inputs, component)

@@ -67,13 +67,8 @@ def comparison_figure(
 
 
 @styled
-def comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) -> Axes:
-    """Result minus reference with the band it may lie in, against time; arguments as for `comparison_figure`.
-
-    Args:
-        signal: the comparison, with its curves.
-        ax: axes to draw on; None for a figure of its own.
-    """
+def _comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) -> Axes:
+    """Result minus reference with the band it may lie in, against time; arguments as for `comparison_figure`."""
     ax = axes_or_new(ax)
     curves = signal.curves
     if curves is None:
@@ -107,8 +102,8 @@ def comparison_picture(signal: SignalComparison) -> Figure:
     headline(figure, f"{signal.name}: {signal.status}")
     whole, error, zoom = figure.subplots(3, 1, height_ratios=(1.15, 0.8, 1.15))
     comparison_figure(signal, whole)
-    comparison_error_figure(signal, error)
-    window = worst_window(signal)
+    _comparison_error_figure(signal, error)
+    window = _worst_window(signal)
     comparison_figure(signal, zoom, window)
     for ax in (whole, error):
         ax.set_xlabel("")
@@ -119,12 +114,9 @@ def comparison_picture(signal: SignalComparison) -> Figure:
     return figure
 
 
-def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
+def _worst_window(signal: SignalComparison) -> tuple[float, float] | None:
     """From when to when the worst point is worth a close look [s]; None without curves, or where nothing is the
     worst.
-
-    Args:
-        signal: the comparison, with its curves.
     """
     curves = signal.curves
     if curves is None or not len(curves.reference_time):

@@ -29,7 +29,7 @@ _GRANTED = "SUBSET-041 (5 m + 5 %)"
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
 
 
-def sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
+def _sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
     """Time between consecutive balises that were used.
 
     Args:
@@ -43,13 +43,9 @@ def sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
     return stamps, np.diff(stamps)
 
 
-def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
+def _certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
     """Largest gap each observer is certified for when the gaps vary [s]; observers without a finite limit are left
     out.
-
-    Args:
-        result: with the certificates in its summary.
-        spec: roles of the signals, labels, phases and zones.
     """
     certificates = mapping_entry(result, "certificates")
     limits = {}
@@ -75,8 +71,8 @@ class GapsPanel(Panel):
 
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
-        stamps, gaps = sampling_gaps(result)
-        limits = certified_gaps(result, spec)
+        stamps, gaps = _sampling_gaps(result)
+        limits = _certified_gaps(result, spec)
         shade_zones(ax, spec)
         top = float(np.max(gaps)) if len(gaps) else max(limits.values(), default=1.0)
         if len(gaps):
@@ -98,7 +94,7 @@ class GapsPanel(Panel):
 
     @classmethod
     def available(cls, result: Result, spec: ReportSpec) -> bool:  # noqa: ARG003, D102 - see Panel
-        return len(sampling_gaps(result)[1]) > 0
+        return len(_sampling_gaps(result)[1]) > 0
 
 
 class GapErrorsPanel(Panel):

@@ -21,15 +21,9 @@ MARKERS = "osD^vP*Xph"
 
 
 @styled
-def errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes:
+def _errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes:
     """Speed errors of observers in m/s on a logarithmic axis: rms and largest over the whole run, rms just before
     telegrams.
-
-    Args:
-        scores: of the observers, the first one on top. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes. An observer without numbers keeps its line, with the word why.
     """
     ax = axes_or_new(ax, (8.2, 1.4 + 0.45 * len(scores)))
     names = [score.name for score in scores]
@@ -87,15 +81,8 @@ def _points(score: ObserverScore) -> dict[str, tuple[float, str, bool]]:
 
 
 @styled
-def cost_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes:
-    """Cost in us per communication step against the rms speed error in m/s; left and low is good.
-
-    Args:
-        scores: of the observers; those without numbers are left out. ax: axes to draw on; None for a figure of its own.
-
-    Returns:
-        The axes; a thin line spans the costs of all repetitions.
-    """
+def _cost_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes:
+    """Cost in us per communication step against the rms speed error in m/s; left and low is good."""
     ax = axes_or_new(ax, (8.2, 4.0))
     names = [score.name for score in scores]
     for number, score in enumerate(scores):
@@ -125,6 +112,6 @@ def observers_picture(scores: Sequence[ObserverScore]) -> Figure:
     """
     figure = new_figure((9.0, 5.4 + 0.45 * len(scores)))
     upper, lower = figure.subplots(2, 1, height_ratios=[1.0 + 0.45 * len(scores), 3.6])
-    errors_figure(scores, upper)
-    cost_figure(scores, lower)
+    _errors_figure(scores, upper)
+    _cost_figure(scores, lower)
     return figure

@@ -45,17 +45,17 @@ def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> li
         runs: from `make_runs`. signals: names of recorded signals to draw besides those that have a role.
     """
     made = [
-        ("speed", "Speed", "True speed of each run.", true_speed_figure(runs)),
-        ("speed_error", "Speed error", "Estimated minus true speed.", error_overlay(runs, "speed")),
-        ("position_error", "Position error", "Estimated minus true position.", error_overlay(runs, "position")),
-        ("slip", "Slip", "Estimated slip, and the true slip of the first run.", estimate_overlay(runs, "slip")),
+        ("speed", "Speed", "True speed of each run.", _true_speed_figure(runs)),
+        ("speed_error", "Speed error", "Estimated minus true speed.", _error_overlay(runs, "speed")),
+        ("position_error", "Position error", "Estimated minus true position.", _error_overlay(runs, "position")),
+        ("slip", "Slip", "Estimated slip, and the true slip of the first run.", _estimate_overlay(runs, "slip")),
         (
             "adhesion",
             "Adhesion force",
             "Estimated adhesion force, and the true one of the first run.",
-            estimate_overlay(runs, "adhesion_force"),
+            _estimate_overlay(runs, "adhesion_force"),
         ),
-        *((f"signal_{i}", name, "As recorded.", signal_figure(runs, name)) for i, name in enumerate(signals, 1)),
+        *((f"signal_{i}", name, "As recorded.", _signal_figure(runs, name)) for i, name in enumerate(signals, 1)),
     ]
     return [
         OverlayPicture(f"overlay_{key}", title, text, png(figure))
@@ -65,12 +65,8 @@ def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> li
 
 
 @styled
-def true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
-    """True speed of all runs in km/h, or None without any.
-
-    Args:
-        runs: from `make_runs`.
-    """
+def _true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
+    """True speed of all runs in km/h, or None without any."""
     found = [
         (i, run, speed)
         for i, run in enumerate(runs)
@@ -86,13 +82,8 @@ def true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
 
 
 @styled
-def error_overlay(runs: Sequence[OverlayRun], quantity: Literal["speed", "position"]) -> Figure | None:
-    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any.
-
-    Args:
-        runs: from `make_runs`.
-        quantity: ``speed`` or ``position``.
-    """
+def _error_overlay(runs: Sequence[OverlayRun], quantity: Literal["speed", "position"]) -> Figure | None:
+    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any."""
     unit = "m/s" if quantity == "speed" else "m"
     panels = _panels(runs, lambda run, observer: estimation_error(run.result, run.spec, observer, quantity) is not None)
     if not panels:
@@ -107,13 +98,8 @@ def error_overlay(runs: Sequence[OverlayRun], quantity: Literal["speed", "positi
 
 
 @styled
-def estimate_overlay(runs: Sequence[OverlayRun], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
-    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any.
-
-    Args:
-        runs: from `make_runs`.
-        signal: ``slip`` or ``adhesion_force``.
-    """
+def _estimate_overlay(runs: Sequence[OverlayRun], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
+    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any."""
     factor, text = (100.0, "Slip [%]") if signal == "slip" else (1e-3, "Adhesion force [kN]")
     panels = _panels(runs, lambda run, observer: estimate(run.result, observer, signal) is not None)
     if not panels:
@@ -137,13 +123,8 @@ def estimate_overlay(runs: Sequence[OverlayRun], signal: Literal["slip", "adhesi
 
 
 @styled
-def signal_figure(runs: Sequence[OverlayRun], name: str) -> Figure | None:
-    """One recorded signal of all runs in its SI unit, or None where no run has it.
-
-    Args:
-        runs: from `make_runs`.
-        name: name of the signal.
-    """
+def _signal_figure(runs: Sequence[OverlayRun], name: str) -> Figure | None:
+    """One recorded signal of all runs in its SI unit, or None where no run has it."""
     found = [(i, run) for i, run in enumerate(runs) if recorded(run.result, name) is not None]
     if not found:
         return None

@@ -36,15 +36,8 @@ _Curves = dict[str, np.ndarray]
 
 
 @styled
-def zoom_figure(result: Result, spec: ReportSpec, window: ZoomWindow) -> Figure:
-    """One or two panels over a window of time: speed error, and position error or slip.
-
-    Args:
-        result: the run. spec: roles. window: the window, and what to show.
-
-    Returns:
-        The figure. Rows before and after an event are joined upright, with a hollow and a filled mark.
-    """
+def _zoom_figure(result: Result, spec: ReportSpec, window: ZoomWindow) -> Figure:
+    """One or two panels over a window of time: speed error, and position error or slip."""
     panels = [panel for panel in _panels(result, spec, window) if panel[1]]
     figure = new_figure(_SIZE if len(panels) > 1 else _ONE_PANEL)
     if not panels:
@@ -185,7 +178,7 @@ def draw_zooms(result: Result, spec: ReportSpec) -> list[Zoom]:
         spec: roles of the signals, labels, phases and zones.
     """
     windows = notable_windows(result, spec)
-    pictures = [png(zoom_figure(result, spec, window)) for window in windows]
+    pictures = [png(_zoom_figure(result, spec, window)) for window in windows]
     return [
         Zoom(key, window.reasons[0], _caption(window), picture)
         for key, window, picture in zip(ZOOM_KEYS, windows, pictures, strict=False)

@@ -46,11 +46,11 @@ def write_comparison(
         OutputError: the folder cannot be written.
     """
     folder = Path(directory)
-    pictures = draw_pictures(comparison, most_pictures)
+    pictures = _draw_pictures(comparison, most_pictures)
     with _explained(folder):
         _remove_pictures(folder / PICTURES)
         drawn = _write_pictures(pictures, folder / PICTURES)
-        write_file(folder / PAGE, page_bytes(comparison_page(comparison, pictures)))
+        write_file(folder / PAGE, page_bytes(_comparison_page(comparison, pictures)))
         write_file(folder / DATA, page_bytes(_comparison_json(comparison)))
     paths = {"html": folder / PAGE, "json": folder / DATA}
     return paths | ({"png": next(iter(drawn.values())), "pictures": folder / PICTURES} if drawn else {})
@@ -71,7 +71,7 @@ def write_page(comparison: Comparison, path: str | Path, most_pictures: int = _M
         OutputError: it cannot be written.
     """
     file = Path(path)
-    text = comparison_page(comparison, draw_pictures(comparison, most_pictures))
+    text = _comparison_page(comparison, _draw_pictures(comparison, most_pictures))
     with _explained(file):
         write_file(file, page_bytes(text))
     return file
@@ -93,21 +93,13 @@ def write_pictures(
     Raises:
         OutputError: the folder cannot be written.
     """
-    pictures = draw_pictures(comparison, most_pictures)
+    pictures = _draw_pictures(comparison, most_pictures)
     with _explained(Path(directory)):
         return _write_pictures(pictures, Path(directory))
 
 
-def draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[str, bytes]:
-    """Pictures of the worst signals that can be drawn.
-
-    Args:
-        comparison: what to draw.
-        most: number of pictures at most.
-
-    Returns:
-        PNG by signal, the worst first.
-    """
+def _draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[str, bytes]:
+    """Pictures of the worst signals that can be drawn."""
     drawable = [s for s in comparison.failed if s.curves is not None]
     return {s.name: png(comparison_picture(s).figure) for s in drawable[:most]}
 
@@ -117,16 +109,8 @@ def _comparison_json(comparison: Comparison) -> str:
     return json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"
 
 
-def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
-    """The page as text.
-
-    Args:
-        comparison: what was found.
-        pictures: PNG by signal, from `draw_pictures`.
-
-    Returns:
-        The page.
-    """
+def _comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
+    """The page as text."""
     return render(
         "comparison.html.j2",
         f"{comparison.result} against {comparison.reference}",

@@ -84,7 +84,7 @@ def write_overlay_page(
     Raises:
         OutputError: the file cannot be written.
     """
-    return write_page(path, overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures))
+    return write_page(path, _overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures))
 
 
 def _pictures(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[OverlayPicture]:
@@ -92,16 +92,8 @@ def _pictures(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[Overla
     return draw_overlays(runs, signals) or draw_overlays(runs, changing_signals(runs, SIGNALS_SHOWN))
 
 
-def overlay_page(runs: Sequence[OverlayRun], pictures: Sequence[OverlayPicture]) -> str:
-    """The page as text.
-
-    Args:
-        runs: from `make_runs`.
-        pictures: from `draw_overlays`.
-
-    Returns:
-        The page.
-    """
+def _overlay_page(runs: Sequence[OverlayRun], pictures: Sequence[OverlayPicture]) -> str:
+    """The page as text."""
     errors, different = measured(runs), differences(runs)
     return render(
         "overlay.html.j2",

@@ -32,27 +32,13 @@ def render(template: str, title: str, **values: Any) -> str:
     return _pages().get_template(template).render(title=title, filled=[], **values)
 
 
-def anchor(title: str) -> str:
-    """The id of a chapter in its page.
-
-    Args:
-        title: of the chapter.
-
-    Returns:
-        Small letters, digits and hyphens.
-    """
+def _anchor(title: str) -> str:
+    """The id of a chapter in its page."""
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"
 
 
-def first_sentence(text: object) -> tuple[str, str]:
-    """A long text cut behind its first sentence.
-
-    Args:
-        text: whatever has a text.
-
-    Returns:
-        What is shown, and what unfolds; the second is empty for a text that is seen whole.
-    """
+def _first_sentence(text: object) -> tuple[str, str]:
+    """A long text cut behind its first sentence."""
     whole = str(text)
     first, *rest = _SENTENCE_END.split(whole, 1) if len(whole) > LONGEST else [whole]
     return (first.removesuffix(";"), rest[0]) if rest else (whole, "")
@@ -73,6 +59,6 @@ def groups(table: Table) -> list[tuple[str | None, list[list[str]]]]:
 @cache
 def _pages() -> Environment:
     pages = environment("cosim.report.page")
-    filters: dict[str, Any] = {"anchor": anchor, "first_sentence": first_sentence, "groups": groups, "number": number}
+    filters: dict[str, Any] = {"anchor": _anchor, "first_sentence": _first_sentence, "groups": groups, "number": number}
     pages.filters |= filters | {"base64": lambda data: b64encode(data).decode("ascii")}
     return pages

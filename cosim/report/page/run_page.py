@@ -43,7 +43,7 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Pat
     """
     folder = Path(directory)
     figures, zooms = draw_all(result, spec), draw_zooms(result, spec)
-    text = report_page(result, spec, figures, zooms)
+    text = _report_page(result, spec, figures, zooms)
     files = {panel.name: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
     with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)
@@ -68,23 +68,13 @@ def write_report_page(result: Result, spec: ReportSpec, path: str | Path) -> Pat
     Raises:
         OutputError: the file cannot be written.
     """
-    return write_page(path, report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec)))
+    return write_page(path, _report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec)))
 
 
-def report_page(
+def _report_page(
     result: Result, spec: ReportSpec, figures: Mapping[type[Panel], bytes], zooms: Sequence[Zoom] = ()
 ) -> str:
-    """The page as text.
-
-    Args:
-        result: the run.
-        spec: roles of the signals, phases, published numbers.
-        figures: PNG by panel, from `draw_all`.
-        zooms: from `draw_zooms`.
-
-    Returns:
-        The page.
-    """
+    """The page as text."""
     metrics, counts = phase_metrics(result, spec), count_events(result.events)
     shown = metrics if spec.true_speed or spec.true_position else []  # a turbine has no errors of speed
     judged = [Judged.from_data(data) for data in list_entry(result, "expectations")]

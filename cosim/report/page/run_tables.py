@@ -62,7 +62,7 @@ def run_tables(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> di
         "telegrams": telegrams_table(count_events(result.events).outcomes, spec.labels),
         "seeds": _seeds(result),
         "phases": phases_table(phase_details(result, spec), spec),
-        "gaps": gaps_table(gap_errors(result, spec)),
+        "gaps": _gaps_table(gap_errors(result, spec)),
         "certificates": certificates,
         "explained": explained,
         "packets": _packets(result),
@@ -91,12 +91,9 @@ _GAP_COLUMNS = (
 _GAP_ERROR = "Estimated minus true position in the last row before the telegram is used"
 
 
-def gaps_table(found: GapErrors) -> Table:
+def _gaps_table(found: GapErrors) -> Table:
     """Position errors at the end of the longest gaps, in metres and in seconds of running time; last row: the largest
     of all gaps, and how many of them ended within the envelope.
-
-    Args:
-        found: from `gap_errors`.
     """
     columns = [name_column("gap", "Gap"), *_GAP_COLUMNS]
     columns += [

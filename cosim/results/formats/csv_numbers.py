@@ -37,7 +37,7 @@ def native_rows() -> Rows | None:
     function = library.shortest_rows
     function.restype = ctypes.c_int64
     function.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
-    powers = powers_of_ten()
+    powers = _powers_of_ten()
 
     def rows(values: np.ndarray) -> bytes:
         numbers = np.ascontiguousarray(values, dtype=np.float64)
@@ -48,7 +48,7 @@ def native_rows() -> Rows | None:
     return rows
 
 
-def powers_of_ten() -> np.ndarray:
+def _powers_of_ten() -> np.ndarray:
     """The upper 128 bits of 10^k for each k in `POWERS`, rounded up, as two words each, shape (617, 2)."""
     words = [divmod(_upper_bits(10 ** abs(k), inverse=k < 0), 2**64) for k in POWERS]
     return np.array(words, dtype=np.uint64)

@@ -88,13 +88,10 @@ def _description(signal: SignalInfo) -> str:
     return f"{signal.description} [{unit}]" if signal.description else f"[{unit}]"
 
 
-def split_description(text: str) -> tuple[str, str | None, str | None]:
+def _split_description(text: str) -> tuple[str, str | None, str | None]:
     """Description, unit and display unit of a description in such a file, e.g. ``Mass of the train [kg]``.
 
     Dymola puts types in too, ``[:#(type=Boolean)]``, which are left out.
-
-    Args:
-        text: the description.
     """
     start = text.rfind("[")
     if start < 0 or not text.endswith("]"):
@@ -184,7 +181,7 @@ def _trajectory(source: str, content: Mapping[str, Any]) -> ResultData:
 
 def _matrices(source: str, content: Mapping[str, Any], transposed: bool) -> _Trajectory:
     names = _texts(content["name"], transposed)
-    descriptions = [split_description(text) for text in _texts(content["description"], transposed)]
+    descriptions = [_split_description(text) for text in _texts(content["description"], transposed)]
     info = _rows_first(content["dataInfo"], transposed)
     constants = _rows_first(content["data_1"], transposed)
     start = constants[0] if len(constants) else np.zeros(0)  # nothing is constant

@@ -35,7 +35,7 @@ CHUNK = 16384  # rows compressed together at most
 FEW = 256  # rows that are not worth it
 
 
-class GuardedFile:
+class _GuardedFile:
     """A new binary file to write and read back, for ``h5py.File``.
 
     Args:
@@ -114,7 +114,7 @@ class GuardedFile:
     def flush(self) -> None:
         """Nothing is held back."""
 
-    def __enter__(self) -> GuardedFile:
+    def __enter__(self) -> _GuardedFile:
         return self
 
     def __exit__(
@@ -246,7 +246,7 @@ class Hdf5Format(Format):
         chunk = min(CHUNK, max(BLOCK // result.table.dtype.itemsize, 1))
         options = {"libver": ("v108", "latest"), "rdcc_nbytes": 8 * chunk}  # it keeps so much of each column
         h5py = _h5py()
-        with GuardedFile(path) as target, h5py.File(target, "w", **options) as file:
+        with _GuardedFile(path) as target, h5py.File(target, "w", **options) as file:
             file.attrs["layout"] = LAYOUT
             file.attrs["summary"] = json.dumps(jsonable(result.summary), ensure_ascii=False, allow_nan=False)
             if result.failure is not None:

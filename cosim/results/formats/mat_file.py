@@ -51,16 +51,8 @@ def _legal(name: str) -> str:
     return legal[:_MAX_LENGTH]
 
 
-def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
-    """A legal and unique MATLAB variable name for each name: ``locomotive.position`` gives ``locomotive_position``.
-
-    Args:
-        names: names to translate.
-        taken: legal names that are in use already.
-
-    Returns:
-        Legal names by original name, in the order given; clashes get ``_2``, ``_3``, ...
-    """
+def _matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """A legal and unique MATLAB variable name for each name: ``locomotive.position`` gives ``locomotive_position``."""
     used, legal = set(taken), {}
     for name in names:
         stem = candidate = _legal(name)
@@ -140,7 +132,7 @@ class MatFormat(Format):
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
         signals = signals_of(result)
         names = [signal.name for signal in signals]
-        legal = matlab_names(names, _RESERVED)
+        legal = _matlab_names(names, _RESERVED)
         content: dict[str, Any] = {"time": result.table["time"]}
         content |= {legal[name]: result.table[name] for name in names}
         content["units"] = {legal[s.name]: s.unit for s in signals}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.balises.hermite import HermiteStep, first_time, time_to_reach
+from cosim.balises.hermite import HermiteStep, _first_time, time_to_reach
 
 speeds = st.floats(-20.0, 20.0)
 
@@ -40,7 +40,7 @@ def test_crossing_is_found_to_the_last_bit() -> None:
     s = step.crossing(0.5)
     assert step.position(s) >= 0.5
     assert step.position(np.nextafter(s, 0.0)) <= 0.5
-    assert first_time(lambda x: x >= 0.3, 0.0, 1.0) == 0.3
+    assert _first_time(lambda x: x >= 0.3, 0.0, 1.0) == 0.3
 
 
 @given(st.floats(0.2, 20.0), st.floats(-8.0, 8.0), st.floats(-8.0, 8.0), st.floats(0.02, 0.98), st.floats(0.05, 0.95))

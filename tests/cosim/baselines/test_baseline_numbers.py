@@ -8,7 +8,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.baselines.draft import decimals_for, number_text, time_text
+from cosim.baselines.draft import _decimals_for, number_text, time_text
 
 VALUES = st.floats(-1e9, 1e9)
 ALLOWED = st.floats(1e-12, 1e6)
@@ -16,14 +16,14 @@ ALLOWED = st.floats(1e-12, 1e6)
 
 @given(VALUES, ALLOWED)
 def test_rounding_takes_less_than_a_thousandth_of_the_tolerance(value: float, allowed: float) -> None:
-    text = number_text(value, decimals_for(allowed))
+    text = number_text(value, _decimals_for(allowed))
     # two roundings of float64
     assert abs(float(text) - value) <= 0.5e-3 * allowed * (1.0 + 1e-9) + 2.0 * math.ulp(value)
 
 
 @given(VALUES, ALLOWED)
 def test_one_digit_less_would_be_too_coarse(value: float, allowed: float) -> None:
-    decimals = decimals_for(allowed)
+    decimals = _decimals_for(allowed)
     if decimals is not None:
         assert 10.0 ** -(decimals - 1) > 1e-3 * allowed * (1.0 - 1e-9)
         assert len(number_text(value, decimals).partition(".")[2]) <= max(decimals, 0)
@@ -31,14 +31,14 @@ def test_one_digit_less_would_be_too_coarse(value: float, allowed: float) -> Non
 
 @given(VALUES, ALLOWED)
 def test_what_was_read_is_written_the_same(value: float, allowed: float) -> None:
-    decimals = decimals_for(allowed)
+    decimals = _decimals_for(allowed)
     text = number_text(value, decimals)
     assert number_text(float(text), decimals) == text
 
 
 @given(st.floats(allow_nan=False))
 def test_nothing_allowed_keeps_every_bit(value: float) -> None:
-    assert decimals_for(0.0) is None
+    assert _decimals_for(0.0) is None
     assert float(number_text(value, None)) == value
 
 
@@ -59,6 +59,6 @@ def test_instants_stay_apart_and_together(steps: list[tuple[float, bool]], allow
     for step, twice in steps:
         times.append(times[-1] + step)
         times += [times[-1]] * twice
-    read = [float(text) for text in time_text(times, decimals_for(allowed))]
+    read = [float(text) for text in time_text(times, _decimals_for(allowed))]
     assert [b > a for a, b in pairwise(times)] == [b > a for a, b in pairwise(read)]
     assert all(b >= a for a, b in pairwise(read))

@@ -13,7 +13,7 @@ from made_results import compared, kinds, made, signal
 
 from cosim.comparison.curve import Curve, looks_held
 from cosim.comparison.jumps import Jumps, find_jumps, shifts
-from cosim.comparison.points import UNMATCHED, match_jumps
+from cosim.comparison.points import UNMATCHED, _match_jumps
 from cosim.comparison.tolerance import Tolerance
 
 TIME = np.arange(201) * 0.01
@@ -96,7 +96,7 @@ def test_alignment_is_the_cheapest_one(a: Jumps, b: Jumps, window: float) -> Non
     for i in range(n):
         for j in range(m):
             best[i + 1, j + 1] = min(best[i, j + 1] + UNMATCHED, best[i + 1, j] + UNMATCHED, best[i, j] + cost[i, j])
-    first, second = match_jumps(a, b, window=window, allowed=0.5, scale=2.0)
+    first, second = _match_jumps(a, b, window=window, allowed=0.5, scale=2.0)
     assert np.all(np.diff(first) > 0)
     assert np.all(np.diff(second) > 0)
     found = cost[first, second].sum() + UNMATCHED * (n + m - 2 * len(first))

@@ -8,11 +8,11 @@ from math import nan
 import pytest
 from made_results import compared, made
 
-from cosim.comparison.compare import keeps_packets
+from cosim.comparison.compare import _keeps_packets
 from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.verdict import Comparison
-from cosim.provenance.rerun import same_result
-from cosim.report.page.comparison import comparison_page
+from cosim.provenance.rerun import _same_result
+from cosim.report.page.comparison import _comparison_page
 from cosim.results.result import PacketRecord, Result
 
 TIME = [0.0, 10.0]
@@ -54,7 +54,7 @@ def test_a_packet_that_is_not_as_in_the_reference_is_told(now: list[PacketRecord
     assert text in comparison.packets.differences[0].text
     assert comparison.packets.differences[0].text in comparison_text(comparison)
     assert comparison.to_dict()["packets"]["differences"][0]["kind"] == kinds[0]
-    assert "Packets of the network" in comparison_page(comparison, {})
+    assert "Packets of the network" in _comparison_page(comparison, {})
 
 
 def test_the_same_packets_agree_in_any_order_and_within_the_tolerance() -> None:
@@ -62,8 +62,8 @@ def test_the_same_packets_agree_in_any_order_and_within_the_tolerance() -> None:
     comparison = compared(result(PACKETS), result([near, *PACKETS[3:], *PACKETS[:2]]))
     assert comparison.equal
     assert "; 5 packets match." in comparison_text(comparison)
-    assert not same_result(result(PACKETS), result([*PACKETS[:2], near, *PACKETS[3:]]))
-    assert same_result(result([LOST]), result([replace(LOST)]))
+    assert not _same_result(result(PACKETS), result([*PACKETS[:2], near, *PACKETS[3:]]))
+    assert _same_result(result([LOST]), result([replace(LOST)]))
 
 
 def test_what_keeps_no_packets_is_not_compared() -> None:
@@ -76,5 +76,5 @@ def test_what_keeps_no_packets_is_not_compared() -> None:
 
 
 def test_packets_in_memory_are_kept_whatever_the_summary_says() -> None:
-    assert keeps_packets(result(PACKETS, {}))
-    assert not keeps_packets(result([], {}))
+    assert _keeps_packets(result(PACKETS, {}))
+    assert not _keeps_packets(result([], {}))

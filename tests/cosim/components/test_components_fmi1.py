@@ -17,7 +17,7 @@ from test_fmus.typed import typed_fmu
 from cosim.components.component import Component
 from cosim.components.loading import FMI1Component, describe_fmu, load_fmu
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import check_algebraic_loops
+from cosim.coupling.graph import _check_algebraic_loops
 from cosim.errors import CouplingError, RunError
 from fmus.fmi.described import EventPort
 
@@ -159,7 +159,7 @@ def test_declared_dependencies_are_read(tmp_path: Path) -> None:
     through.free()
     both = {"a": describe_fmu(tmp_path / "through.fmu", "a"), "b": describe_fmu(tmp_path / "through.fmu", "b")}
     with pytest.raises(CouplingError, match="Algebraic loop"):
-        check_algebraic_loops(both, connect([("a.y", "b.u"), ("b.y", "a.u")], both))
+        _check_algebraic_loops(both, connect([("a.y", "b.u"), ("b.y", "a.u")], both))
 
 
 class Old(Mock):

@@ -11,7 +11,7 @@ import pytest
 from test_fmus.events import hostile_fmu
 
 from cosim import Scenario
-from cosim.components.shared_libraries import _own_needs, read_linkage
+from cosim.components.shared_libraries import _own_needs, _read_linkage
 from cosim.errors import CosimError
 from fmus.toolchain.compile import find_compiler
 
@@ -45,13 +45,13 @@ def pair(folder: Path, soname: str, *values: int) -> Scenario:
 
 
 def test_the_names_are_read_from_the_file(tmp_path: Path) -> None:
-    linkage = read_linkage(helper(tmp_path / "a", 1, "libread_names.so.3"))
+    linkage = _read_linkage(helper(tmp_path / "a", 1, "libread_names.so.3"))
     assert linkage is not None
     assert linkage.soname == "libread_names.so.3"
     (tmp_path / "torn.so").write_bytes((tmp_path / "a" / "libread_names.so.3").read_bytes()[:100])
     (tmp_path / "text.so").write_text("INPUT(libm.so.6)")
-    assert read_linkage(tmp_path / "torn.so") is None
-    assert read_linkage(tmp_path / "text.so") is None
+    assert _read_linkage(tmp_path / "torn.so") is None
+    assert _read_linkage(tmp_path / "text.so") is None
 
 
 def test_different_libraries_of_one_name_are_refused(tmp_path: Path) -> None:

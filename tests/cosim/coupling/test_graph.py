@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mock_slaves import Mock, component
 
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import Group, declared_feedthrough, execution_groups, execution_order, undeclared
+from cosim.coupling.graph import Group, _execution_order, declared_feedthrough, execution_groups, undeclared
 from cosim.coupling.ordering import OrderedSignal, in_order, satisfied
 from cosim.coupling.strong import closed_path, strong_groups, topological
 from cosim.errors import CouplingError
@@ -30,7 +30,7 @@ class Direct(State):
 
 def order(slaves: dict[str, Mock], pairs: list[tuple[str, str]], before: Any = ()) -> list[str]:
     components = {n: component(s, n) for n, s in slaves.items()}
-    return execution_order(components, connect([(f"{a}.y", f"{b}.u") for a, b in pairs], components), before)
+    return _execution_order(components, connect([(f"{a}.y", f"{b}.u") for a, b in pairs], components), before)
 
 
 def test_a_source_comes_before_its_targets() -> None:
@@ -100,7 +100,7 @@ def test_acyclic_graphs_are_ordered_whatever_the_listing(case: tuple[int, list[i
     edges = [(k // n, k % n) for k in sorted(chosen) if k // n < k % n]
     components = {f"c{i}": component(Many(), f"c{i}") for i in listing}
     connections = connect([(f"c{a}.y", f"c{b}.u{a}") for a, b in edges], components)
-    found = execution_order(components, connections)
+    found = _execution_order(components, connections)
     assert sorted(found) == sorted(components)
     assert all(found.index(f"c{a}") < found.index(f"c{b}") for a, b in edges)
 

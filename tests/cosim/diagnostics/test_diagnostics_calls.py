@@ -22,12 +22,12 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.components.loading import load_fmu
 from cosim.components.logged_slave import log_calls
-from cosim.diagnostics.call_log import HEADER, CallLog, DescribedCall
+from cosim.diagnostics.call_log import HEADER, CallLog, _DescribedCall
 from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_table
 from cosim.master.master import close
-from cosim.report.page.run_page import report_page
+from cosim.report.page.run_page import _report_page
 
 LINE = re.compile(
     r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, "
@@ -211,8 +211,8 @@ def test_the_log_of_a_killed_process_ends_with_the_last_call_begun(version: Any,
 
 def test_a_call_within_a_call_and_one_that_raises(tmp_path: Path) -> None:
     log = CallLog(tmp_path / "calls.log")
-    words = DescribedCall("outer()", lambda _: ("ok", ""))
-    inner = DescribedCall("inner(x=1)", lambda _: ("warning", "2.5"))
+    words = _DescribedCall("outer()", lambda _: ("ok", ""))
+    inner = _DescribedCall("inner(x=1)", lambda _: ("warning", "2.5"))
     log.call(1.0, "a", words, lambda: log.call(1.5, "b", inner, int))
     with pytest.raises(ZeroDivisionError):
         log.call(2.0, "a", words, lambda: 1 // 0)
@@ -383,7 +383,7 @@ def test_the_closing_table_and_the_report_show_them() -> None:
     assert rows["locomotive"][4].startswith(f"{states} / ")
     text = cost_table(outcome.result).text()
     assert [line.split()[0] for line in text.splitlines()[2:]] == list(rows)
-    assert "<h2>Calls</h2>" in report_page(outcome.result, outcome.spec, {})
+    assert "<h2>Calls</h2>" in _report_page(outcome.result, outcome.spec, {})
 
 
 def test_seconds_of_a_component_are_those_of_its_calls() -> None:

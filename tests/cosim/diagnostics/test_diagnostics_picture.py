@@ -22,7 +22,7 @@ from cosim.structure.picture_layout import EVENT_PORT, lay_out
 from cosim.structure.run_structure import Structure
 from cosim.structure.shapes import Box, Layout, Wire, forward_curves
 from cosim.structure.structure_data import Balises, Link
-from cosim.structure.structure_picture import COLOURS, box_size, structure_figure, text_width, wires_of
+from cosim.structure.structure_picture import COLOURS, _box_size, _structure_figure, _text_width, _wires_of
 
 EDGE = 1e-6
 TOUCH = 0.6  # pixels; text boxes are rounded to whole ones
@@ -40,8 +40,8 @@ def structures(draw: st.DrawFn) -> Structure:
 
 
 def laid_out(structure: Structure) -> Layout:
-    edges = wires_of(structure)
-    return lay_out(structure, {part.name: box_size(part, edges) for part in structure.parts}, edges)
+    edges = _wires_of(structure)
+    return lay_out(structure, {part.name: _box_size(part, edges) for part in structure.parts}, edges)
 
 
 def rectangle(box: Box) -> tuple[float, float, float, float]:
@@ -91,7 +91,7 @@ def test_boxes_and_frames_lie_apart_and_wires_go_round_them(structure: Structure
 @given(structures())
 def test_wires_begin_and_end_at_their_ports_and_run_back_below_their_group(structure: Structure) -> None:
     layout = laid_out(structure)
-    assert {w.edge for w in layout.wires} == set(wires_of(structure))
+    assert {w.edge for w in layout.wires} == set(_wires_of(structure))
     for wire in layout.wires:
         source, target = layout.boxes[wire.edge.source[0]], layout.boxes[wire.edge.target[0]]
         assert wire.points[0] == (source.right, source.row(source.size.outputs, wire.edge.source[1]))
@@ -129,7 +129,7 @@ def texts_of(figure: Figure) -> dict[str, list[Bbox]]:
 @settings(max_examples=8)
 @given(structures())
 def test_no_text_lies_on_another_or_beyond_the_picture(structure: Structure) -> None:
-    figure = structure_figure(structure)
+    figure = _structure_figure(structure)
     boxes = [box for several in texts_of(figure).values() for box in several]
     width, height = figure.get_size_inches() * figure.dpi
     for box in boxes:
@@ -158,7 +158,7 @@ def loop() -> Structure:
 
 
 def test_each_kind_of_wire_has_its_colour_and_its_line_in_the_key() -> None:
-    figure = structure_figure(loop())
+    figure = _structure_figure(loop())
     drawn = {patch.get_edgecolor() for patch in figure.axes[0].patches}
     from matplotlib.colors import to_rgba
 
@@ -170,17 +170,17 @@ def test_each_kind_of_wire_has_its_colour_and_its_line_in_the_key() -> None:
     assert {"a", "b", "c", "d", "1", "2", "3", "4", "balises"} <= set(shown)
     red = [line for line in figure.axes[0].lines if line.get_color() == COLOURS["loop"]]
     assert len(red) == 2  # u to y within a and within b; u to z of b is no part of the loop
-    plain = texts_of(structure_figure(structure_of(["a", "b"], [Link(("a", "y"), ("b", "u"))])))
+    plain = texts_of(_structure_figure(structure_of(["a", "b"], [Link(("a", "y"), ("b", "u"))])))
     assert "algebraic loop" not in plain
 
 
 def test_telegrams_are_dashed_and_go_from_the_plant_to_those_told() -> None:
-    events = [edge for edge in wires_of(loop()) if edge.kind == "event"]
+    events = [edge for edge in _wires_of(loop()) if edge.kind == "event"]
     assert [(e.source, e.target) for e in events] == [(("a", EVENT_PORT), ("d", EVENT_PORT))]
     from matplotlib.colors import to_rgba
 
     green = to_rgba(COLOURS["event"])
-    dashes = {p.get_linestyle() for p in structure_figure(loop()).axes[0].patches if p.get_edgecolor() == green}
+    dashes = {p.get_linestyle() for p in _structure_figure(loop()).axes[0].patches if p.get_edgecolor() == green}
     assert dashes
     assert "-" not in dashes
     assert "solid" not in dashes
@@ -206,9 +206,9 @@ def test_a_file_that_cannot_be_drawn_is_refused_with_the_reason(tmp_path: Path) 
 
 
 def test_widths_of_texts_are_those_drawn() -> None:
-    figure = structure_figure(loop())
+    figure = _structure_figure(loop())
     (box,) = texts_of(figure)["iterated until it settles"]
-    assert text_width("iterated until it settles", 7.3) == pytest.approx(box.width / figure.dpi, abs=0.06)
+    assert _text_width("iterated until it settles", 7.3) == pytest.approx(box.width / figure.dpi, abs=0.06)
 
 
 def test_a_long_chain_of_long_names_stays_a_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

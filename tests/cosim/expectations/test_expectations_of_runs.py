@@ -20,7 +20,7 @@ from cosim.components.component import Component
 from cosim.errors import ScenarioError
 from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.registry import EXPECTATIONS
-from cosim.run.checked_tables import check_expectations
+from cosim.run.checked_tables import _check_expectations
 from cosim.run.component_models import component_factories
 from cosim.scenario.schema import ScenarioTable
 
@@ -38,7 +38,7 @@ def components() -> dict[str, Component]:
 def check(components: dict[str, Component]) -> Callable[..., ScenarioTable]:
     def run(*items: dict[str, Any], **changes: Any) -> ScenarioTable:
         table = small(expect=list(items), **changes).table()
-        return check_expectations(table, components, ["observer"], "test")
+        return _check_expectations(table, components, ["observer"], "test")
 
     return run
 
@@ -98,7 +98,7 @@ def test_without_balises_there_are_no_telegrams(kind: str, components: dict[str,
     more = {"used": 1} if kind == "telegrams" else {}
     table = small(expect=[{"check": kind, **more}]).table().model_copy(update={"balises": None})
     with pytest.raises(ScenarioError, match="no balises"):
-        check_expectations(table, components, [], "test")
+        _check_expectations(table, components, [], "test")
 
 
 def test_certificates_that_are_ignored_cannot_be_expected(check: Callable[..., ScenarioTable]) -> None:
@@ -109,7 +109,7 @@ def test_certificates_that_are_ignored_cannot_be_expected(check: Callable[..., S
 def test_a_window_that_ends_before_the_evaluation_begins(components: dict[str, Component]) -> None:
     scenario = small(expect=[{"check": "speed_error", "max": 1.0, "to": 0.2}]).report(evaluate_after=0.3)
     with pytest.raises(ScenarioError, match="evaluate_after"):
-        check_expectations(scenario.table(), components, ["observer"], "test")
+        _check_expectations(scenario.table(), components, ["observer"], "test")
 
 
 def test_thresholds_of_shipped_indicators_are_known(check: Callable[..., ScenarioTable]) -> None:

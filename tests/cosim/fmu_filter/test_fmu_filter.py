@@ -13,7 +13,7 @@ import cosim
 import fmus
 from cosim.errors import ScenarioError
 from cosim.fmu_filter import component
-from cosim.fmu_filter.component import FmuFilterModel, legal_names
+from cosim.fmu_filter.component import FmuFilterModel, _legal_names
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.formulas.filtering import kalman, unscented
@@ -295,7 +295,7 @@ def test_a_step_at_which_states_were_not_looked_at_is(path: Path, monkeypatch: p
 
 def test_names_of_an_fmu_become_names_of_signals() -> None:
     names = ["u[1]", "body.v", "der(x)", "body_v", "2nd", "body.v"]
-    assert list(legal_names(names).values()) == ["u_1", "body_v", "der_x", "body_v_2", "_2nd"]
+    assert list(_legal_names(names).values()) == ["u_1", "body_v", "der_x", "body_v_2", "_2nd"]
 
 
 def test_particles_over_an_fmu_without_states_to_write(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import fmu_observer
 import fmus
 from cosim.fmu_model import exchange
 from cosim.fmu_model.co_simulation import CoSimulationModel
-from cosim.fmu_model.linearise import _objections, linearise_model
+from cosim.fmu_model.linearise import _linearise_model, _objections
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states
@@ -128,7 +128,7 @@ def test_states_without_starts_are_set_in_step_mode_where_they_are_taken(tmp_pat
     x, u = np.array([3.0, -2.0]), ordinary.start_inputs + 0.7
     for one, other in zip(late.transition(0.5, 0.01, x, u), ordinary.transition(0.5, 0.01, x, u), strict=True):
         np.testing.assert_array_equal(one, other)
-    found = linearise_model(late, 0.0, late.start, late.start_inputs, 0.01)
+    found = _linearise_model(late, 0.0, late.start, late.start_inputs, 0.01)
     assert "set in Step Mode" in found.remarks[0]
     late.close()
     ordinary.close()

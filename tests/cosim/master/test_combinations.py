@@ -30,7 +30,7 @@ from cosim.balises.telegram import Channel, FalseTelegram
 from cosim.components.component import Component
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import execution_groups, execution_order
+from cosim.coupling.graph import _execution_order, execution_groups
 from cosim.coupling.plan import make_plan
 from cosim.errors import CouplingError, RunError
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
@@ -392,7 +392,7 @@ def everything(
     by_name = {c.name: c for c in components}
     clocks, pairs = connect_clocks([tuple(w.split(" -> ")) for w in wires], by_name)  # type: ignore[misc]
     connected = connect(pairs, by_name)
-    order = execution_order(by_name, connected, [("plant", "listener")])
+    order = _execution_order(by_name, connected, [("plant", "listener")])
     for c in components:
         c.instantiate()
     plan = make_plan(by_name, connected, order, None, clocks)

@@ -17,7 +17,7 @@ import cosim.comparison.comparison_text
 import cosim.report.page.comparison
 import fmus
 import plant_models
-from cosim.pytest_plugin.fixture import baseline_name
+from cosim.pytest_plugin.fixture import _baseline_name
 
 pytest_plugins = ["pytester"]
 
@@ -344,8 +344,8 @@ def test_markers_for_slow_and_vendor_tests(pytester: pytest.Pytester) -> None:
 
 
 def test_names_are_safe_and_never_shared() -> None:
-    assert baseline_name("test_brakes[wet]") == "test_brakes-wet"
-    assert baseline_name("TestDrive::test_start", "2") == "TestDrive.test_start@2"
+    assert _baseline_name("test_brakes[wet]") == "test_brakes-wet"
+    assert _baseline_name("TestDrive::test_start", "2") == "TestDrive.test_start@2"
     odd = [
         "test_a[x/y]",
         "test_a[x:y]",
@@ -355,7 +355,7 @@ def test_names_are_safe_and_never_shared() -> None:
         "test_a[" + 300 * "z" + "]",
         "test_a[" + 301 * "z" + "]",
     ]
-    names = [baseline_name(node) for node in odd]
+    names = [_baseline_name(node) for node in odd]
     assert len(set(names)) == len(odd)
     assert all(len(name) < 140 and not set(name) & set('/\\:*?"<>| @') for name in names)
 

@@ -9,7 +9,7 @@ import pytest
 from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors, rows_before
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.gap_figure import GapErrorsPanel
-from cosim.report.page.run_tables import gaps_table
+from cosim.report.page.run_tables import _gaps_table
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit
@@ -98,7 +98,7 @@ def test_gaps_that_end_before_the_evaluation_do_not_count() -> None:
 def test_nothing_without_a_place_or_with_one_balise() -> None:
     assert not gap_errors(run(), ReportSpec(observers=["a"])).errors
     assert not gap_errors(run(kinds=("true", "missed", "false", "missed")), SPEC).errors
-    assert not gaps_table(gap_errors(run(), ReportSpec()))
+    assert not _gaps_table(gap_errors(run(), ReportSpec()))
 
 
 def test_summary_table_and_measures_tell_the_same() -> None:
@@ -116,7 +116,7 @@ def test_summary_table_and_measures_tell_the_same() -> None:
     assert measures["a.gap_error_time_max"] == pytest.approx(0.4)
     assert measures["odo.gap_error_max"] == pytest.approx(16.0)
     assert (measure_unit("a.gap_error_max"), measure_unit("a.gap_error_time_max")) == ("m", "s")
-    rows = gaps_table(found).cells
+    rows = _gaps_table(found).cells
     assert rows[0][0] == "B1 to B2"
     assert "8.00\n0.400" in rows[0]
     assert rows[-1][-1] == "16.0 m\n100 %"
@@ -136,7 +136,7 @@ def test_an_estimate_that_is_no_number_has_diverged() -> None:
     found = gap_errors(run(spoilt=True), SPEC)
     assert np.isinf(found.errors["a"]).tolist() == [False, True, True]
     assert found.within_envelope("a") == pytest.approx(1.0 / 3.0)
-    assert "diverged\ndiverged" in gaps_table(found).cells[0]
+    assert "diverged\ndiverged" in _gaps_table(found).cells[0]
 
 
 def test_the_row_before_an_event() -> None:

@@ -21,12 +21,12 @@ from cosim.comparison.verdict import Comparison, ComparisonFinding, Curves, Even
 from cosim.drawing.style import new_figure, png
 from cosim.errors import OutputError
 from cosim.report.figures.comparison_figure import (
-    comparison_error_figure,
+    _comparison_error_figure,
+    _worst_window,
     comparison_figure,
     comparison_picture,
-    worst_window,
 )
-from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page, write_pictures
+from cosim.report.page.comparison import _comparison_page, _draw_pictures, write_comparison, write_page, write_pictures
 from cosim.results.result import Result, SignalInfo
 
 # -- pictures
@@ -34,7 +34,7 @@ from cosim.results.result import Result, SignalInfo
 
 
 def test_axes_have_names_with_units_and_a_legend() -> None:
-    whole, error = comparison_figure(differing()), comparison_error_figure(differing())
+    whole, error = comparison_figure(differing()), _comparison_error_figure(differing())
     for ax, what in ((whole, "Value"), (error, "Error")):
         assert ax.get_xlabel() == "Time [s]"
         assert ax.get_ylabel() == f"{what} [m/s]"
@@ -67,7 +67,7 @@ def test_the_tube_has_a_shape_for_each_piece() -> None:
 
 def test_the_axis_shows_the_error_and_its_band() -> None:
     for excess in (0.05, 0.001):
-        low, high = comparison_error_figure(differing(excess=excess)).get_ylim()
+        low, high = _comparison_error_figure(differing(excess=excess)).get_ylim()
         assert low < -max(excess, ALLOWED) < max(excess, ALLOWED) < high
 
 
@@ -79,7 +79,7 @@ def test_one_wild_value_does_not_hide_the_reference() -> None:
 @pytest.mark.parametrize("at", [0.0, 21.0, 60.0])
 def test_the_zoom_holds_the_worst_point(at: float) -> None:
     signal = replace(differing(), max_error_at=at, findings=[replace(differing().findings[0], time=at, end=at)])
-    window = worst_window(signal)
+    window = _worst_window(signal)
     assert window is not None
     assert 0.0 <= window[0] <= at <= window[1] <= 60.0
     assert 0.0 < window[1] - window[0] <= 0.31 * 60.0
@@ -88,7 +88,7 @@ def test_the_zoom_holds_the_worst_point(at: float) -> None:
 def test_the_zoom_shows_a_shifted_jump_and_what_may_be_shifted() -> None:
     jump = ComparisonFinding("jump_time", 30.0, 30.0, 30.0, 30.4, 0.4, 0.2, "late")
     signal = replace(differing(), findings=[jump], max_error_at=float("nan"), allowed_time=0.5)
-    window = worst_window(signal)
+    window = _worst_window(signal)
     assert window is not None
     assert window[0] <= 30.0 - 4 * 0.5
     assert window[1] >= 30.0 + 4 * 0.5
@@ -107,7 +107,7 @@ def test_the_zoom_of_several_late_jumps_holds_the_latest(late: list[float]) -> N
     table = [np.array(list(zip(time, v, strict=True)), [("time", float), ("a.b", float)]) for v in steps]
     results = [Result(rows, [SignalInfo("a.b", variability="discrete")]) for rows in table]
     (signal,) = compare_results(*results).signals
-    window = worst_window(signal)
+    window = _worst_window(signal)
     assert window is not None
     assert signal.findings[0].kind == "jump_time"
     latest = begins[int(np.argmax(late))]
@@ -121,8 +121,8 @@ def without_curves() -> SignalComparison:
 def test_without_curves_there_is_a_word_instead() -> None:
     ax = comparison_figure(without_curves())
     assert "no curves" in ax.texts[0].get_text()
-    assert "no curves" in comparison_error_figure(without_curves()).texts[0].get_text()
-    assert worst_window(without_curves()) is None
+    assert "no curves" in _comparison_error_figure(without_curves()).texts[0].get_text()
+    assert _worst_window(without_curves()) is None
 
 
 NOTHING = np.empty(0)
@@ -155,7 +155,7 @@ def test_long_runs_are_thinned() -> None:
 def test_it_draws_on_axes_given() -> None:
     ax = new_figure().add_subplot()
     assert comparison_figure(differing(), ax) is ax
-    assert comparison_error_figure(differing(), ax) is ax
+    assert _comparison_error_figure(differing(), ax) is ax
 
 
 # -- page
@@ -163,7 +163,7 @@ def test_it_draws_on_axes_given() -> None:
 
 
 def page_of(comparison: Comparison) -> str:
-    return comparison_page(comparison, draw_pictures(comparison))
+    return _comparison_page(comparison, _draw_pictures(comparison))
 
 
 def test_the_page_says_what_differs_before_all_else() -> None:
@@ -212,9 +212,9 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
         comparison,
         signals=[replace(s, findings=[replace(s.findings[0], size=sizes[s.name])]) for s in comparison.signals],
     )
-    pictures = draw_pictures(comparison, 1)
+    pictures = _draw_pictures(comparison, 1)
     assert list(pictures) == ["signal_2"]
-    text = comparison_page(comparison, pictures)
+    text = _comparison_page(comparison, pictures)
     assert text.count("<img") == 1
     assert "2 more could be drawn" in text
     images = re.findall(r'src="data:image/png;base64,([^"]+)"', text)
@@ -223,7 +223,7 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
 
 def test_the_verdict_says_how_many_it_does_not_list() -> None:
     six, eight = (
-        comparison_page(Comparison("x", "y", [differing(f"signal_{i}") for i in range(n)]), {}) for n in (6, 8)
+        _comparison_page(Comparison("x", "y", [differing(f"signal_{i}") for i in range(n)]), {}) for n in (6, 8)
     )
     assert "more, listed below" not in six
     assert "... and 2 more, listed below" in eight

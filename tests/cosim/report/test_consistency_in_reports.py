@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosim.evaluation.consistency import filter_consistency, true_value
+from cosim.evaluation.consistency import _true_value, filter_consistency
 from cosim.evaluation.consistency_table import consistency_table
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.consistency_figure import NeesPanel, NisPanel
-from cosim.report.page.run_page import report_page
+from cosim.report.page.run_page import _report_page
 from cosim.results.result import Result
 from cosim.results.result_data import SignalInfo
 from cosim.run.outcome import Outcome
@@ -85,8 +85,8 @@ def test_what_is_told_decides_what_is_judged() -> None:
     assert [e.kind for e in filter_consistency(alone, SPEC)] == ["error", "error"]
     assert "NEES of position" in next(w for w in result_warnings(alone, SPEC) if "confident" in w)
     assert filter_consistency(alone, replace(SPEC, true_position=None)) == []
-    assert true_value(alone, SPEC, "angle") is not None
-    assert true_value(alone, replace(SPEC, true_position=None, true_speed="plant.speed"), "angle") is not None
+    assert _true_value(alone, SPEC, "angle") is not None
+    assert _true_value(alone, replace(SPEC, true_position=None, true_speed="plant.speed"), "angle") is not None
 
 
 def test_a_held_nis_counts_once_a_sample_and_the_start_up_not_at_all() -> None:
@@ -100,7 +100,7 @@ def test_a_held_nis_counts_once_a_sample_and_the_start_up_not_at_all() -> None:
 
 def test_the_report_shows_it() -> None:
     result = run(4.0)
-    page = report_page(result, SPEC, {NisPanel: b""})
+    page = _report_page(result, SPEC, {NisPanel: b""})
     assert "Consistency of the filters" in page
     assert "overconfident" in page
     assert "Normalised innovations (NIS)" in page

@@ -12,11 +12,11 @@ import scipy.stats
 
 from cosim.evaluation.fault_detection import (
     FaultDetection,
+    _judged_detections,
     clopper_pearson,
     fault_detection,
     garwood,
     intervals,
-    judged_detections,
     position_errors,
 )
 from cosim.evaluation.fault_table import fault_table
@@ -94,19 +94,19 @@ def test_a_detection_that_never_ends_is_told_so() -> None:
 
 def test_a_detection_is_of_the_fault_in_which_it_begins() -> None:
     """What was on before a fault says nothing of it; two detections may be of one fault."""
-    assert judged_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5], [2.5], 0)
-    assert judged_detections([(3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([], [], 1)
-    assert judged_detections([(1.0, 5.0)], [(1.2, 2.0), (3.0, 5.1)], 10.0) == (
+    assert _judged_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5], [2.5], 0)
+    assert _judged_detections([(3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([], [], 1)
+    assert _judged_detections([(1.0, 5.0)], [(1.2, 2.0), (3.0, 5.1)], 10.0) == (
         [pytest.approx(0.2)],
         [pytest.approx(0.1)],
         0,
     )
-    assert judged_detections([], [(1.0, 2.0)], 10.0) == ([], [], 1)
+    assert _judged_detections([], [(1.0, 2.0)], 10.0) == ([], [], 1)
 
 
 @pytest.mark.parametrize(("limit", "told"), [(None, 1), (0.7, 1), (0.3, 0)])
 def test_a_detection_that_is_late_is_a_miss_and_no_false_alarm(limit: float | None, told: int) -> None:
-    starts, ends, false = judged_detections([(1.0, 5.0)], [(1.6, 5.0)], 10.0, delay_limit=limit)
+    starts, ends, false = _judged_detections([(1.0, 5.0)], [(1.6, 5.0)], 10.0, delay_limit=limit)
     assert (len(starts), len(ends), false) == (told, told, 0)
     (found, _) = fault_detection(made([(1.0, 5.0)], [(1.6, 5.0)]), replace(SPEC, delay_limit=limit))
     assert (found.detected, found.missed, found.false) == (told, 1 - told, 0)

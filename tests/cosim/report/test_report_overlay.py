@@ -21,17 +21,17 @@ from cosim.errors import ComparisonError, OutputError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.overlay_figures import (
+    _error_overlay,
+    _estimate_overlay,
+    _signal_figure,
+    _true_speed_figure,
     changing_signals,
-    error_overlay,
-    estimate_overlay,
-    signal_figure,
-    true_speed_figure,
 )
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.overlaid_runs import MOST_RUNS, OverlayRun, make_runs
 from cosim.report.overlay.overlay_measures import Measured, difference, measured, numbers_table
 from cosim.report.page import overlay
-from cosim.report.page.overlay import overlay_page, write_overlay
+from cosim.report.page.overlay import _overlay_page, write_overlay
 from cosim.results.result import Result
 from fmus.tables.table import Column
 
@@ -57,7 +57,7 @@ def test_all_are_judged_by_the_phases_of_the_first() -> None:
     other = replace(SPEC, phases=[Phase("else", 0, 1)], evaluate_after=50.0)
     runs = make_runs([scaled(1.0), scaled(1.0)], [SPEC, other], ["a", "b"])
     assert (runs[1].spec.phases, runs[1].spec.evaluate_after) == (SPEC.phases, SPEC.evaluate_after)
-    assert "b named other phases; all are judged over those of a." in overlay_page(runs, [])
+    assert "b named other phases; all are judged over those of a." in _overlay_page(runs, [])
 
 
 def test_without_phases_one_phase_holds_all_runs() -> None:
@@ -97,7 +97,7 @@ def test_runs_differ_in_colour_or_dashes_and_neighbours_in_both() -> None:
 
 
 def test_each_observer_has_a_panel_with_a_line_for_each_run() -> None:
-    figure = error_overlay(two(), "speed")
+    figure = _error_overlay(two(), "speed")
     assert figure is not None
     assert len(figure.axes) == len(OBSERVERS)
     for ax in figure.axes:
@@ -110,7 +110,7 @@ def test_each_observer_has_a_panel_with_a_line_for_each_run() -> None:
 def test_single_observers_share_a_panel_whatever_their_names() -> None:
     specs = [replace(SPEC, observers=[o]) for o in OBSERVERS[:2]]
     runs = make_runs([scaled(1.0), scaled(1.0)], specs, ["a", "b"])
-    figure = error_overlay(runs, "position")
+    figure = _error_overlay(runs, "position")
     assert figure is not None
     assert len(figure.axes) == 1
     assert {row.observer for row in measured(runs)} == {"differentiator + CDO / Takagi-Sugeno CDO"}
@@ -122,7 +122,7 @@ def test_an_observer_of_one_run_only_has_a_panel() -> None:
         [replace(SPEC, observers=OBSERVERS[:2]), replace(SPEC, observers=OBSERVERS[1:])],
         ["a", "b"],
     )
-    figure = estimate_overlay(runs, "slip")
+    figure = _estimate_overlay(runs, "slip")
     assert figure is not None
     drawn = [{str(line.get_label()) for line in ax.lines} & {"a", "b"} for ax in figure.axes]
     assert drawn == [{"a"}, {"a", "b"}, {"b"}, {"b"}]
@@ -130,8 +130,8 @@ def test_an_observer_of_one_run_only_has_a_panel() -> None:
 
 def test_what_no_run_has_is_no_figure() -> None:
     runs = make_runs([scaled(1.0)] * 2, [ReportSpec()] * 2, ["a", "b"])
-    assert true_speed_figure(runs) is error_overlay(runs, "speed") is estimate_overlay(runs, "slip") is None
-    assert signal_figure(runs, "no.such") is None
+    assert _true_speed_figure(runs) is _error_overlay(runs, "speed") is _estimate_overlay(runs, "slip") is None
+    assert _signal_figure(runs, "no.such") is None
 
 
 def test_signals_that_differ_most_are_drawn_where_nothing_has_a_role(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +178,7 @@ def test_difference_in_words(value: float, first: float, text: str) -> None:
 
 
 def test_the_page_names_the_largest_change() -> None:
-    text = overlay_page(two(), [])
+    text = _overlay_page(two(), [])
     first, *others = (run.label for run in two())
     assert f"{first} is what the others are compared with: {', '.join(others)}." in text
     assert "Largest rise of rms speed error" in text
@@ -253,4 +253,4 @@ def test_a_place_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
 def test_labels_are_escaped() -> None:
     evil = '<img src=x onerror="1">&\'"'
     runs = make_runs([scaled(1.0), scaled(2.0)], [SPEC, SPEC], [evil, "b"])
-    assert "<img src=x" not in overlay_page(runs, [])
+    assert "<img src=x" not in _overlay_page(runs, [])

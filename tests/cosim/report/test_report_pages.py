@@ -24,15 +24,15 @@ from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import spec_of
 from cosim.report.figures.drawing import thin
-from cosim.report.figures.gap_figure import GapErrorsPanel, GapsPanel, certified_gaps, sampling_gaps
+from cosim.report.figures.gap_figure import GapErrorsPanel, GapsPanel, _certified_gaps, _sampling_gaps
 from cosim.report.figures.main_picture import main_picture
 from cosim.report.figures.other_trains_figure import OtherTrainsPanel
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import FIGURES, draw_all, panels
 from cosim.report.figures.run_figures import AdhesionPanel, SlipPanel, SpeedPanel
 from cosim.report.figures.zooms import ZOOM_KEYS
-from cosim.report.page.render import first_sentence
-from cosim.report.page.run_page import report_page, write_report
+from cosim.report.page.render import _first_sentence
+from cosim.report.page.run_page import _report_page, write_report
 from cosim.results.result import Result
 from cosim.results.results_folder import read_results, write_results
 from cosim.run.outcome import Outcome
@@ -241,14 +241,14 @@ def test_thinning_keeps_the_extremes() -> None:
 
 
 def test_gaps_come_from_used_telegrams_only(result: Result) -> None:
-    stamps, gaps = sampling_gaps(result)
+    stamps, gaps = _sampling_gaps(result)
     used = [e.stamp for e in result.events if e.kind == "true"]
     assert stamps.tolist() == used
     assert gaps.tolist() == np.diff(used).tolist()
 
 
 def test_observer_without_a_limit_has_no_level(result: Result) -> None:
-    assert certified_gaps(result, synthetic_spec()) == dict(zip(OBSERVERS[:3], (0.5, 0.286, 0.5), strict=True))
+    assert _certified_gaps(result, synthetic_spec()) == dict(zip(OBSERVERS[:3], (0.5, 0.286, 0.5), strict=True))
 
 
 def test_certified_gaps_name_their_observers(result: Result) -> None:
@@ -286,7 +286,7 @@ def test_page_needs_nothing_from_outside(result: Result, tmp_path: Path) -> None
 
 
 def test_page_is_well_formed_and_says_what_was_run(result: Result) -> None:
-    page = Page(report_page(result, synthetic_spec(), {}))
+    page = Page(_report_page(result, synthetic_spec(), {}))
     assert len(page.all("h1")) == 1
     assert all(attrs.get("scope") for attrs in page.all("th"))
     for words in (
@@ -318,14 +318,14 @@ def test_every_text_is_escaped(result: Result) -> None:
         "components": [{"name": evil, "kind": evil}],
         "certificates": {evil: {"explanation": evil}},
     }
-    page = Page(report_page(replace(result, summary=summary, failure=evil), replace(spec, phases=phases), {}))
+    page = Page(_report_page(replace(result, summary=summary, failure=evil), replace(spec, phases=phases), {}))
     assert "onerror" not in {name for _, attrs in page.tags for name in attrs}
     assert page.text.count(evil) >= 10
 
 
 def test_failure_stands_at_the_top_in_a_red_box(result: Result) -> None:
     failed = replace(rows_of(result, 300), failure="Component 'locomotive' at t = 10 s: stopped.")
-    page = Page(report_page(failed, synthetic_spec(), {}))
+    page = Page(_report_page(failed, synthetic_spec(), {}))
     first = page.all("section")[0]
     assert (first["class"], first["role"]) == ("box failure", "alert")
     assert "Component 'locomotive' at t = 10 s: stopped." in page.text
@@ -357,13 +357,13 @@ def test_report_of_an_unusual_summary(result: Result) -> None:
         "components": [1],
         "versions": 2,
     }
-    Page(report_page(replace(result, summary=summary), synthetic_spec(), {}))
+    Page(_report_page(replace(result, summary=summary), synthetic_spec(), {}))
 
 
 def test_report_of_a_result_read_back_is_the_same(result: Result, tmp_path: Path) -> None:
     write_results(result, tmp_path / "a", ("csv",))
-    first = report_page(result, synthetic_spec(), {})
-    second = report_page(read_results(tmp_path / "a"), synthetic_spec(), {})
+    first = _report_page(result, synthetic_spec(), {})
+    second = _report_page(read_results(tmp_path / "a"), synthetic_spec(), {})
     assert _without_order(first) == _without_order(second)
 
 
@@ -398,10 +398,10 @@ def test_zones_are_shaded(result: Result) -> None:
 
 def test_a_long_text_folds_behind_its_first_part_and_loses_no_word() -> None:
     text = "unstable at a gap of 1 s: the error grows; " + "certified up to 0.5 s, and so on. " * 10
-    shown, rest = first_sentence(text)
+    shown, rest = _first_sentence(text)
     assert shown == "unstable at a gap of 1 s: the error grows"
     assert rest.count("certified up to 0.5 s") == 10
-    assert first_sentence("short; and seen whole") == ("short; and seen whole", "")
+    assert _first_sentence("short; and seen whole") == ("short; and seen whole", "")
 
 
 def test_a_figure_that_fails_is_left_out(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

@@ -20,7 +20,7 @@ from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.overlay.overlaid_runs import make_runs
 from cosim.report.overlay.overlay_measures import measured
-from cosim.report.page.run_page import report_page
+from cosim.report.page.run_page import _report_page
 from cosim.report.page.run_statements import run_statements
 from cosim.results.result import BaliseRecord, Result
 from cosim.run.outcome import Outcome
@@ -119,7 +119,7 @@ def test_the_page_is_not_green() -> None:
     assert card(standing, spec, "Run")[0] == "complete"
     assert card(standing, spec, "Run")[2] == "doubt"
     assert card(standing, spec, "Largest speed error") == ("–", "too few rows to judge", "doubt")
-    assert "The train never moves" in report_page(standing, spec, {})
+    assert "The train never moves" in _report_page(standing, spec, {})
     assert card(run(np.ones(50), np.ones(50)), SPEC, "Run")[2] == "good"
 
 
@@ -156,7 +156,7 @@ def test_what_was_delivered_and_what_became_of_it_stand_together() -> None:
 
 
 def test_the_page_counts_in_one_way() -> None:
-    page = report_page(synthetic_result(), synthetic_spec(), {})
+    page = _report_page(synthetic_result(), synthetic_spec(), {})
     assert " told" not in card(synthetic_result(), synthetic_spec(), "Balise telegrams")[0]
     assert ">told<" not in page  # a column of an outcome that nobody had
     assert "telegrams were delivered" in page

@@ -15,7 +15,7 @@ from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 from cosim.evaluation.corrections import corrections, event_rows
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.spec import Phase, ReportSpec
-from cosim.report.figures.zooms import draw_zooms, zoom_figure
+from cosim.report.figures.zooms import _zoom_figure, draw_zooms
 from cosim.report.page.phases import phases_table
 from cosim.report.page.render import groups
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
@@ -177,7 +177,7 @@ def test_the_picture_of_the_worst_point_shows_it() -> None:
     result = hand_made((), None, speed, other__speed=np.full(1001, 0.1), other__position=np.full(1001, 0.1))
     spec = replace(SPEC, observers=["other", "obs"])
     worst = next(m for m in notable_windows(result, spec) if m.about == "obs")
-    _, high = zoom_figure(result, spec, worst).axes[0].get_ylim()
+    _, high = _zoom_figure(result, spec, worst).axes[0].get_ylim()
     assert worst.start < 70.0 < worst.end
     assert 5e4 < high < 1e5
 
@@ -187,7 +187,7 @@ def test_the_picture_of_an_error_without_bound_shows_how_it_grew() -> None:
     worst = next(m for m in notable_windows(result, synthetic_spec()) if m.about == "multirate_cdo")
     error = result["multirate_cdo.speed"] - result["locomotive.speed"]
     before = np.abs(error[(result.time >= worst.start) & np.isfinite(error)]).max()
-    low, high = zoom_figure(result, synthetic_spec(), worst).axes[0].get_ylim()
+    low, high = _zoom_figure(result, synthetic_spec(), worst).axes[0].get_ylim()
     assert before < high - low < 3.0 * before
 
 
@@ -215,7 +215,7 @@ def test_hardly_any_rows_have_no_moment(count: int) -> None:
 def test_test_fmusm_shows_jumps_stamp_and_delivery() -> None:
     events = (telegram(20.03, 0.2),)
     result = hand_made(events, saw(events, 3.0, -1.0))
-    axes = zoom_figure(result, SPEC, ZoomWindow(20.03, 19.0, 21.0, ("x",))).axes
+    axes = _zoom_figure(result, SPEC, ZoomWindow(20.03, 19.0, 21.0, ("x",))).axes
     assert [ax.get_ylabel() for ax in axes] == ["Speed error [m/s]", "Position error [m]"]
     assert axes[1].get_xlabel() == "Time [s]"
     assert {ax.get_xlim() for ax in axes} == {(19.0, 21.0)}
@@ -232,7 +232,7 @@ def test_test_fmusm_shows_jumps_stamp_and_delivery() -> None:
 
 def test_test_fmusm_of_a_zone_shows_the_slip() -> None:
     window = next(m for m in notable_windows(synthetic_result(), synthetic_spec()) if m.view == "slip")
-    axes = zoom_figure(synthetic_result(), synthetic_spec(), window).axes
+    axes = _zoom_figure(synthetic_result(), synthetic_spec(), window).axes
     assert [ax.get_ylabel() for ax in axes] == ["Speed error [m/s]", "Slip [%]"]
 
 

@@ -51,7 +51,7 @@ def test_numbers_are_those_of_repr(kind: str) -> None:
 
 
 def test_powers_of_ten_are_rounded_up() -> None:
-    for k, (upper, lower) in zip(csv_numbers.POWERS, csv_numbers.powers_of_ten().tolist(), strict=True):
+    for k, (upper, lower) in zip(csv_numbers.POWERS, csv_numbers._powers_of_ten().tolist(), strict=True):
         bits, power = (upper << 64) + lower, Fraction(10) ** k
         scale = Fraction(2) ** (bits.bit_length() - 1 - floor_log2(power))
         assert bits.bit_length() == 128

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import OutputError
-from cosim.results.formats.hdf5_file import GuardedFile
+from cosim.results.formats.hdf5_file import _GuardedFile
 from cosim.results.result import Result, SignalInfo
 from cosim.results.save import save_result
 
@@ -35,7 +35,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("small_disk")
 def test_what_the_disk_refuses_reads_as_zeros_and_is_raised_at_the_end(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="File too large"), GuardedFile(tmp_path / "a") as file:  # noqa: PT012 - raised by its end
+    with pytest.raises(OSError, match="File too large"), _GuardedFile(tmp_path / "a") as file:  # noqa: PT012 - raised by its end
         assert file.write(b"x" * 100_000) == 100_000
         assert file.tell() == 100_000
         file.seek(65_534)

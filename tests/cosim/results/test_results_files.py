@@ -15,8 +15,8 @@ from scipy.io import loadmat
 
 from cosim.errors import OutputError
 from cosim.results.formats.csv_file import CsvFormat, write_csv
-from cosim.results.formats.mat_file import MatFormat, matlab_names
-from cosim.results.record_rows import TELEGRAM_ROWS, outcomes_text, parse_outcomes
+from cosim.results.formats.mat_file import MatFormat, _matlab_names
+from cosim.results.record_rows import TELEGRAM_ROWS, _outcomes_text, parse_outcomes
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.results_folder import check_writable, read_results, write_results
 from cosim.results.summary_file import read_summary, write_summary
@@ -161,13 +161,13 @@ def test_mat_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_matlab_names_are_legal_and_clashes_are_numbered() -> None:
-    names = matlab_names(["a.b_c", "a_b.c", "units", "end", "1st", "é"], ["units"])
+    names = _matlab_names(["a.b_c", "a_b.c", "units", "end", "1st", "é"], ["units"])
     assert list(names.values()) == ["a_b_c", "a_b_c_2", "units_2", "xend", "x1st", "x_"]
 
 
 @given(st.lists(st.text(max_size=80), unique=True, max_size=20))
 def test_matlab_names_are_unique_identifiers(names: list[str]) -> None:
-    legal = list(matlab_names(names).values())
+    legal = list(_matlab_names(names).values())
     assert len(set(legal)) == len(names)
     assert all(name.isidentifier() and name.isascii() and name[0].isalpha() and len(name) <= 63 for name in legal)
 
@@ -186,7 +186,7 @@ def test_events_read_back(result: Result, tmp_path: Path) -> None:
     )
 )
 def test_outcomes_read_back(outcomes: dict[str, str]) -> None:
-    assert parse_outcomes(outcomes_text(outcomes)) == outcomes
+    assert parse_outcomes(_outcomes_text(outcomes)) == outcomes
 
 
 def test_broken_event_row_names_its_line(result: Result, tmp_path: Path) -> None:

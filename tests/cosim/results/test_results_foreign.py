@@ -19,7 +19,7 @@ from scipy.io import savemat
 
 from cosim import load_result
 from cosim.errors import OutputError
-from cosim.results.formats.foreign_mat import split_description
+from cosim.results.formats.foreign_mat import _split_description
 from cosim.results.result import SignalInfo
 
 
@@ -110,7 +110,7 @@ def test_trajectory_that_contradicts_itself_is_refused(changed: dict[str, Any], 
     ],
 )
 def test_units_in_descriptions(text: str, expected: tuple[str, str | None, str | None]) -> None:
-    assert split_description(text) == expected
+    assert _split_description(text) == expected
 
 
 def test_workspace_of_matlab(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.results.result import SignalInfo
-from cosim.results.si import in_si, si_name
+from cosim.results.si import _si_name, in_si
 from plant_models.hybrid.units import Unit, UnitError, parse_unit
 
 SIGNALS = [
@@ -46,9 +46,9 @@ def test_columns_are_converted_and_say_so() -> None:
     ("unit", "name"), [("km/h", "m/s"), ("kN", "N"), ("bar", "Pa"), ("%", "1"), ("rpm", "rad/s"), ("t.km2", "kg.m2")]
 )
 def test_the_si_unit_has_its_usual_name(unit: str, name: str) -> None:
-    assert si_name(parse_unit(unit)) == name
+    assert _si_name(parse_unit(unit)) == name
 
 
 def test_an_unusual_unit_gets_a_name_that_means_the_same() -> None:
     unit = parse_unit("kg.m5/s3")
-    assert parse_unit(si_name(unit)).exponents == unit.exponents
+    assert parse_unit(_si_name(unit)).exponents == unit.exponents

@@ -74,10 +74,10 @@ def plant(name: str = "plant", **options: Any) -> Any:
 
 def test_a_probe_from_the_cache_is_the_one_that_was_made(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = balise_service.probe(plant(), {}, 0.0, 0.01)
-    assert balise_service.known_probe(plant(), {}, 0.0, 0.01) == seen
+    assert balise_service._known_probe(plant(), {}, 0.0, 0.01) == seen
     made: list[float] = []
     monkeypatch.setattr(balise_service, "probe", lambda *arguments: made.append(arguments[-1]) or seen)
-    assert balise_service.known_probe(plant(), {}, 0.0, 0.01) == seen
+    assert balise_service._known_probe(plant(), {}, 0.0, 0.01) == seen
     assert made == []
     for make, starts, start, step in (
         (plant(), {"mass": 80e3}, 0.0, 0.01),
@@ -86,7 +86,7 @@ def test_a_probe_from_the_cache_is_the_one_that_was_made(monkeypatch: pytest.Mon
         (plant("other"), {}, 0.0, 0.01),
         (partial(load_block, PLANTS["driver"](), "plant"), {}, 0.0, 0.01),
     ):
-        balise_service.known_probe(make, starts, start, step)
+        balise_service._known_probe(make, starts, start, step)
     assert len(made) == 5
 
 
@@ -95,7 +95,7 @@ def test_a_probe_that_saw_nothing_is_made_again(monkeypatch: pytest.MonkeyPatch)
     made: list[float] = []
     monkeypatch.setattr(balise_service, "probe", lambda *arguments: made.append(arguments[-1]) or nothing)
     for _ in range(2):
-        assert balise_service.known_probe(plant(), {}, 0.0, 0.01) is nothing
+        assert balise_service._known_probe(plant(), {}, 0.0, 0.01) is nothing
     assert len(made) == 2
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.starter.guess import GuessedSignal, Quantity, guess, words_of
+from cosim.starter.guess import GuessedSignal, Quantity, _words_of, guess
 from plant_models.hybrid.units import parse_unit
 
 
@@ -24,7 +24,7 @@ def signal(name: str, unit: str | None = None, description: str = "") -> Guessed
     ],
 )
 def test_words_of_a_name(text: str, words: list[str]) -> None:
-    assert words_of(text) == words
+    assert _words_of(text) == words
 
 
 NAMED: list[tuple[Quantity, str, str | None]] = [

@@ -16,7 +16,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import RunError, ScenarioError
-from cosim.evaluation.metrics import ErrorSize, PhaseMetrics, phase_metrics
+from cosim.evaluation.metrics import PhaseMetrics, _ErrorSize, phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
 from cosim.observer_benchmark.benchmark import ObserverBenchmark, benchmark_observers
@@ -269,7 +269,7 @@ def test_one_that_cannot_be_coupled_or_diverges_keeps_its_row_with_the_reason() 
 
 def test_an_estimate_that_is_worse_than_none_has_diverged() -> None:
     """Not at 1000 m/s only: beyond the speed of the train itself a zero were the better estimate."""
-    speeds = PhaseMetrics("o", "whole run", speed=ErrorSize(25.1, 3.0), position=None)
+    speeds = PhaseMetrics("o", "whole run", speed=_ErrorSize(25.1, 3.0), position=None)
     assert divergence(speeds, 25.0) == "diverged: its speed error reached 25.1 m/s, the train no more than 25 m/s"
     assert divergence(speeds, 25.2) is None
 
@@ -311,9 +311,9 @@ def test_page_picture_and_data_say_the_same(benchmark: ObserverBenchmark, tmp_pa
 
 
 def test_the_picture_has_units_and_a_point_for_each_observer(benchmark: ObserverBenchmark) -> None:
-    from cosim.report.figures.observers_figure import cost_figure, errors_figure
+    from cosim.report.figures.observers_figure import _cost_figure, _errors_figure
 
-    errors, cost = errors_figure(benchmark.scores), cost_figure(benchmark.scores)
+    errors, cost = _errors_figure(benchmark.scores), _cost_figure(benchmark.scores)
     assert errors.get_xlabel() == "Speed error [m/s]"
     assert [label.get_text() for label in errors.get_yticklabels()] == ["observer", "UIO"]
     points = [(line.get_xdata()[0], line.get_ydata()[0]) for line in cost.get_lines()]  # type: ignore[index]

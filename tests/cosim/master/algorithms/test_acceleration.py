@@ -11,9 +11,9 @@ from scipy.optimize import root
 from cosim.master.algorithms.acceleration import (
     LONGEST,
     Acceleration,
-    Aitken,
-    FixedPoint,
     Newton,
+    _Aitken,
+    _FixedPoint,
     make_acceleration,
     scaled_norm,
 )
@@ -37,7 +37,7 @@ def test_one_value_is_found_in_two_sweeps_whatever_the_gain(gain: float, offset:
     assume(abs(gain - 1.0) > 0.01)
     wanted = offset / (1.0 - gain)
     assume(abs(start - wanted) > 1e-3)
-    for made in (Aitken(1), Newton(1), Newton(1, lambda: np.array([[gain]]))):
+    for made in (_Aitken(1), Newton(1), Newton(1, lambda: np.array([[gain]]))):
         found = search(made, lambda z: gain * z + offset, np.array([start]), 2)
         # roundings over |1 - gain| >= 0.01 and a difference >= 1e-5
         assert found[0] == pytest.approx(wanted, rel=1e-9, abs=1e-9)
@@ -104,7 +104,7 @@ def test_what_broyden_has_learnt_serves_the_next_search() -> None:
 @pytest.mark.parametrize("slope", [1.0, 1.0 + 1e-15])
 def test_a_map_without_fixed_point_is_not_followed_to_infinity(slope: float) -> None:
     """``G(z) = z + 0.1``: 50 guesses stay within 50 * 1e4 residuals, where 0.1 is still a large share of the value."""
-    for made in (Aitken(1), Newton(1), Newton(1, lambda: np.array([[slope]]))):
+    for made in (_Aitken(1), Newton(1), Newton(1, lambda: np.array([[slope]]))):
         found = search(made, lambda z: slope * z + 0.1, np.array([0.0]), 50)
         assert abs(found[0]) < 0.11 * 50 * 1e4
         assert scaled_norm(found, slope * found + 0.1, 1e-7, 1e-12) > 1.0
@@ -128,11 +128,11 @@ def test_where_there_is_no_direction_newton_exchanges_plainly() -> None:
 
 @given(numbers, st.floats(0.05, 1.0))
 def test_a_constant_relaxation_multiplies_the_error(gain: float, w: float) -> None:
-    found = search(FixedPoint(1, w), lambda z: gain * z, np.array([1.0]), 3)
+    found = search(_FixedPoint(1, w), lambda z: gain * z, np.array([1.0]), 3)
     assert found[0] == pytest.approx((1.0 - w * (1.0 - gain)) ** 3, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", [Aitken, Newton])
+@pytest.mark.parametrize("kind", [_Aitken, Newton])
 def test_the_same_problem_in_other_units_takes_the_same_way(kind: type[Acceleration]) -> None:
     matrix, offset, units = np.array([[0.4, 0.3], [-0.2, 0.5]]), np.array([1.0, -2.0]), np.array([1e-3, 1e6])
     for rounds in (2, 3, 4):
@@ -148,7 +148,7 @@ def test_the_scaled_norm_counts_tolerances() -> None:
     assert scaled_norm(np.zeros(0), np.zeros(0), 1e-2, 1e-2) == 0.0
 
 
-@pytest.mark.parametrize(("name", "kind"), [("fixed-point", FixedPoint), ("aitken", Aitken), ("newton", Newton)])
+@pytest.mark.parametrize(("name", "kind"), [("fixed-point", _FixedPoint), ("aitken", _Aitken), ("newton", Newton)])
 def test_accelerations_by_name(name: str, kind: type[Acceleration]) -> None:
     made = make_acceleration(name, 2, 0.5)
     assert type(made) is kind
