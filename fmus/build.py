@@ -18,7 +18,7 @@ from fmus.content.generate import Equations, generate_model, trace_equations
 from fmus.content.names import check_names
 from fmus.content.resources import resource_files
 from fmus.content.xml import build_description_xml, model_description_xml
-from fmus.documentation import documentation_files
+from fmus.documentation.page import documentation_files
 from fmus.pack import check_target, pack_fmu
 from fmus.toolchain.compile import header_folder
 from fmus.toolchain.platforms import HOST, Platform, binary_files
@@ -125,7 +125,8 @@ def build_fmu(
     check_names(system)
     check_target(path)
     targets = choose_targets(platforms)
-    return write_fmu(plan_fmu(system, fmi_version, preset, protocol), targets, path, progress)
+    draft = BuildDraft.of(plan_fmu(system, fmi_version, preset, protocol), targets)
+    return draft.pack(draft.compile(progress), path)
 
 
 def fmu_path(system: HybridSystem, target: Path | str) -> Path:
@@ -190,20 +191,6 @@ class BuildDraft:
         content |= binary_files(plan.fmi_version, plan.system.name, libraries)
         content |= documentation_files(plan.system, plan.description, plan.preset, self.targets)
         return pack_fmu(content, path)
-
-
-def write_fmu(plan: BuildPlan, targets: Sequence[Target], path: Path, progress: Progress | None = None) -> Path:
-    """Carry out a plan: generate, compile, pack.
-
-    Args:
-        targets: platforms, each with its compiler. path: of the FMU. progress: called with what is being done.
-
-    Raises:
-        TextRefusedError: a name or a description holds a character that XML forbids.
-        CompilationError: a compiler refused the sources.
-    """
-    draft = BuildDraft.of(plan, targets)
-    return draft.pack(draft.compile(progress), path)
 
 
 @cache

@@ -94,16 +94,6 @@ def description_parts(data: Mapping[str, Any]) -> Parts:
     return [pairs_table("properties", {k: v for k, v in data.items() if k != "variables"}), *tables]
 
 
-def platforms_of(path: Path) -> list[str]:
-    """Names of the folders of an FMU that hold libraries.
-
-    Args:
-        path: of the FMU.
-    """
-    with zipfile.ZipFile(path) as archive:
-        return _platforms(archive)
-
-
 def problems_of(path: Path) -> list[str]:
     """Damaged files, libraries in the wrong folder, and what fmpy's validation finds; empty for a valid FMU.
 

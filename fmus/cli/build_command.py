@@ -18,7 +18,7 @@ from fmus.cli.commands import argument
 from fmus.cli.failures import EXPECTED
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
-from fmus.fmu_report import platforms_of
+from fmus.fmi.archive import open_archive
 from fmus.hosted import build_hosted_fmu
 from fmus.pack import check_target
 from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
@@ -142,7 +142,7 @@ def _hosted(options: argparse.Namespace) -> Iterator[Path]:
 
 
 def _summary(job: _BuildJob, path: Path) -> str:
-    platforms = platforms_of(path)
+    platforms = open_archive(path).platforms
     return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
 
 

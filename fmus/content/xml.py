@@ -1,18 +1,19 @@
 """XML: an fmpy `ModelDescription` is written as modelDescription.xml for FMI 2.0 and 3.0.
 
-A transcription: every name, value reference, start and dependency comes from `fmu_observer.description`. Touches no
+A transcription: every name, value reference, start and dependency comes from `fmu_observer.description`. Writes no
 files.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
 
 from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
-from fmus.content.characters import check_text, number_text
 from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT
 
 _CAPABILITIES_2 = {
@@ -203,7 +204,7 @@ def _annotations(element: Element, variable: ModelVariable, tag: str, key: str) 
         SubElement(SubElement(annotations, tag, {key: name}), mark)
     warning = variable.warning
     if warning is not None:
-        check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")
+        _check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")
         attributes = {
             "shows": " ".join(warning.shows) or None,
             "atEnd": "true" if warning.at_end else None,
@@ -279,7 +280,7 @@ def _set(element: Element, attributes: Mapping[str, object]) -> None:
     for name, value in attributes.items():
         if value is not None:
             text = str(value)
-            check_text(text, f"modelDescription.xml: the {name} of {element.tag} {owner!r}")
+            _check_text(text, f"modelDescription.xml: the {name} of {element.tag} {owner!r}")
             element.set(name, text)
 
 
@@ -287,3 +288,46 @@ def _document(root: Element) -> str:
     indent(root)
     text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+
+
+# -- what a text may hold, and how a number is written ----------------------------------------------------------------
+
+
+_FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""All but `Char` of XML 1.0, section 2.2."""
+
+DIGITS = 12
+"""Significant decimal digits of a number that is taken for meant; a conversion factor such as 3.6 has few."""
+
+
+class TextRefusedError(ValueError):
+    """A text that XML cannot hold; the message says whose it is and which character is the matter."""
+
+
+def _check_text(text: str, whose: str) -> None:
+    """Refuse characters that XML 1.0 forbids: an XML file cannot hold them in any way, not even escaped.
+
+    Args:
+        text: what is to be written. whose: what it is, for the message.
+
+    Raises:
+        TextRefusedError: there is such a character.
+    """
+    found = _FORBIDDEN.search(text)
+    if found:
+        what = f"the character U+{ord(found[0]):04X} at position {found.start() + 1}"
+        raise TextRefusedError(f"{whose} holds {what}, which XML 1.0 forbids; remove it.")
+
+
+def number_text(value: float) -> str:
+    """A number as text: the decimal of few digits that is next to it where there is one (3.6, not 3.5999999999999996),
+    else all.
+
+    A quotient such as ``1 / (1 / 3.6)`` is one rounding away from the number that is meant; so is what is written here
+    at most.
+
+    Args:
+        value: a finite number.
+    """
+    neat = float(f"{value:.{DIGITS}g}")
+    return repr(neat if abs(neat - value) <= math.ulp(value) else float(value))

@@ -11,9 +11,8 @@ from weakref import WeakKeyDictionary
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
-from fmus.documentation.licences import model_terms
+from fmus.documentation.licences import licence_files, model_terms
 from fmus.documentation.prose import blocks, pieces
-from fmus.documentation.rebuild import rebuild_commands
 from fmus.fmi.standard import INTERFACES
 from fmus.templates import environment
 from fmus.toolchain.targets import Target
@@ -23,6 +22,23 @@ from plant_models.installed import installed_version
 CAUSALITIES = ("input", "output", "parameter")
 PAGES = environment("fmus.documentation")
 PAGES.filters["pieces"] = pieces
+
+
+def documentation_files(
+    system: HybridSystem, description: ModelDescription, preset: str | None, targets: Sequence[Target]
+) -> dict[str, bytes]:
+    """The files under ``documentation/``, by name inside the FMU.
+
+    Args:
+        system: the hybrid system. description: its model description. preset: preset of the start values.
+        targets: platforms of the libraries and the compilers that built them.
+    """
+    texts = {
+        "index.html": page(system, description, preset, targets),
+        "staticLinking.txt": _rebuild_text(description),  # the name that FMI 3.0 gives it
+        **licence_files(system),
+    }
+    return {f"documentation/{name}": text.encode() for name, text in texts.items()}
 
 
 def page(system: HybridSystem, description: ModelDescription, preset: str | None, targets: Sequence[Target]) -> str:
@@ -211,3 +227,37 @@ def _certificate(system: Any, preset: str | None) -> _CertificateRow:
 def _limit(limit: float, certificate: Any) -> str:
     reach = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
     return reach if isinf(limit) else f"{limit:.3g} s"
+
+
+# -- how a library is built again from its sources, and linked statically ---------------------------------------------
+
+
+COMMANDS = {
+    "Linux": "cc -std=c11 -O2 -ffp-contract=off -shared -fPIC all.c -o {name}.so -lm",
+    "macOS": "cc -std=c11 -O2 -ffp-contract=off -shared all.c -o {name}.dylib",
+    "Windows": "gcc -std=c11 -O2 -ffp-contract=off -shared -static-libgcc all.c -o {name}.dll",
+}
+
+
+def rebuild_commands(identifier: str) -> dict[str, str]:
+    """One command for each system, to be given in ``sources/``.
+
+    Args:
+        identifier: model identifier.
+
+    Returns:
+        Commands by name of the system.
+    """
+    return {system: command.format(name=identifier) for system, command in COMMANDS.items()}
+
+
+def _rebuild_text(description: ModelDescription) -> str:
+    """The text of ``documentation/staticLinking.txt``.
+
+    Args:
+        description: of the FMU.
+    """
+    interface = description.coSimulation or description.modelExchange
+    name, version = interface.modelIdentifier, str(description.fmiVersion)[0]
+    template = environment("fmus.documentation").get_template("staticLinking.txt.j2")
+    return template.render(name=name, version=version, commands=rebuild_commands(name))

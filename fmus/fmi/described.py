@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from fmpy.model_description import ModelDescription
 
@@ -53,8 +54,11 @@ class EventPort:
 class Described(ABC):
     """An instance before anything of it runs. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``.
 
+    `negated` are variables whose slave holds the value with the other sign (FMI 1.0).
+
     Args:
         name: of the instance.
+        slave: object with fmpy's call surface, which holds the values.
         description: its model description.
     """
 
@@ -63,8 +67,9 @@ class Described(ABC):
     event_needs_step: bool
     """Whether an event that was notified happens in the next step only (FMI 2), or at once (FMI 3)."""
 
-    def __init__(self, name: str, description: ModelDescription) -> None:
-        self.name, self.description = name, description
+    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
+        self.name, self.slave, self.description = name, slave, description
+        self.negated: frozenset[str] = frozenset()
         self.capabilities = read_capabilities(description, self.interface)
         self.tolerance: float | None = _declared_tolerance(description) if self.fmi_version > 1 else None
         """Relative tolerance that it is given at set-up; FMI 1.0 co-simulation has no call for it."""

@@ -16,13 +16,14 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmus.fmi.derivatives import directional_derivative
+from fmus.fmi.described import Described
 from fmus.fmi.elements import layout
 from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import forget
 from fmus.fmi.ports import is_native
 from fmus.fmi.standard import FATAL, MAX_EVENT_ITERATIONS
 from fmus.fmi.types import getter_type
-from fmus.fmi.values import ValueHolder, element_reader, element_writer, exact_reader, exact_writer
+from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer
 
 INSTANTIATING = "instantiate"
 FAILURES = (RuntimeError, ValueError, OSError)
@@ -30,7 +31,7 @@ FAILURES = (RuntimeError, ValueError, OSError)
 NAMES_SHOWN = 6
 
 
-class Instance(ValueHolder):
+class Instance(Described):
     """One instance, from `instantiate` to `free`.
 
     Args:
@@ -193,23 +194,14 @@ class Instance(ValueHolder):
     def directional_derivative(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
     ) -> np.ndarray:
-        """Derivatives of scalars and elements along a direction.
-
-        Args:
-            unknowns: outputs and the like. An array stands for all its elements.
-            knowns: inputs and the like.
-            seed: the direction, shape (len(knowns),).
-
-        Returns:
-            The derivatives, shape (len(unknowns),).
-        """
+        """See `derivative_call`: what that call gives."""
         found: np.ndarray = self.guard("getDirectionalDerivative", self.derivative_call(unknowns, knowns, seed))
         return found
 
     def derivative_call(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
     ) -> Callable[[], np.ndarray]:
-        """The unguarded call of `directional_derivative`.
+        """A call, unguarded, for derivatives of scalars and elements along a direction.
 
         Args:
             unknowns: outputs and the like. An array stands for all its elements.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelVariable
 
 from fmus.fmi.described import Described
 from fmus.fmi.elements import Element, layout
@@ -20,24 +20,7 @@ from fmus.fmi.ports import make_port
 Turn = Callable[[np.ndarray, np.ndarray], None]
 
 
-class ValueHolder(Described):
-    """A described instance with the slave that holds its values.
-
-    `negated` are variables whose slave holds the value with the other sign (FMI 1.0).
-
-    Args:
-        name: of the instance.
-        slave: object with fmpy's call surface.
-        description: its model description.
-    """
-
-    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
-        super().__init__(name, description)
-        self.slave = slave
-        self.negated: frozenset[str] = frozenset()
-
-
-def element_reader(instance: ValueHolder, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+def element_reader(instance: Described, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
     """A call that reads scalars and elements into `values`, shape (len(names),).
 
     Args:
@@ -60,7 +43,7 @@ def element_reader(instance: ValueHolder, names: Sequence[str], values: np.ndarr
 
 
 def element_writer(
-    instance: ValueHolder, names: Sequence[str], values: np.ndarray | None = None
+    instance: Described, names: Sequence[str], values: np.ndarray | None = None
 ) -> tuple[Callable[[], None], np.ndarray]:
     """A call that writes scalars and elements, and the array of shape (len(names),) it writes from.
 
@@ -86,7 +69,7 @@ def element_writer(
     return place_and_write, buffer
 
 
-def exact_reader(instance: ValueHolder, variable: ModelVariable) -> Callable[[], Values]:
+def exact_reader(instance: Described, variable: ModelVariable) -> Callable[[], Values]:
     """A call that returns the values of a whole variable as they are.
 
     Args:
@@ -98,7 +81,7 @@ def exact_reader(instance: ValueHolder, variable: ModelVariable) -> Callable[[],
     return lambda: tuple(negative(variable, value) for value in read())
 
 
-def exact_writer(instance: ValueHolder, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
+def exact_writer(instance: Described, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
     """A call that writes the values of a whole variable as they are.
 
     Args:
@@ -110,7 +93,7 @@ def exact_writer(instance: ValueHolder, variable: ModelVariable) -> Callable[[Se
     return lambda values: write([negative(variable, value) for value in values])
 
 
-def write_start(instance: ValueHolder, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
+def write_start(instance: Described, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
     """Write a whole variable, or one element of it, once.
 
     Args:
@@ -126,7 +109,7 @@ def write_start(instance: ValueHolder, variable: ModelVariable, element: Element
     exact_writer(instance, variable)(values)
 
 
-def signs(instance: ValueHolder, names: Sequence[str]) -> Turn | None:
+def signs(instance: Described, names: Sequence[str]) -> Turn | None:
     """What turns values as the slave holds them into those of the variables and back, or None where nothing is negated.
 
     The call takes source and target, both of shape (len(names),), which may be the same array.

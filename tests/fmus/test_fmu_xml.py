@@ -19,8 +19,7 @@ from hypothesis import strategies as st
 from fmu_observer.description import LOG_CATEGORIES, can_exchange, describe
 from fmus import recipe
 from fmus.build import MAIN_SOURCE
-from fmus.content.characters import TextRefusedError, number_text
-from fmus.content.xml import build_description_xml, model_description_xml
+from fmus.content.xml import TextRefusedError, build_description_xml, model_description_xml, number_text
 from plant_models.hybrid import HybridSystem
 
 EPS = float(np.finfo(float).eps)

@@ -24,7 +24,7 @@ from shipped import shipped
 from fmu_observer.description import can_exchange
 from fmu_observer.event_protocol import EventProtocol
 from fmus import RECIPES, cached_fmu, recipe
-from fmus.build import build_fmu, plan_fmu, write_fmu
+from fmus.build import BuildDraft, build_fmu, plan_fmu
 from fmus.toolchain.targets import choose_targets
 from plant_models.hybrid import CommunicationEvent, HybridSystem, input_signal, memory, output_signal, state
 
@@ -195,7 +195,8 @@ def test_system_of_communication_steps_has_no_model_exchange(version: int, tmp_p
     plan = plan_fmu(system, version)  # type: ignore[arg-type]
     assert plan.description.modelExchange is None
     assert "<ModelExchange" not in plan.description_xml()
-    fmu = write_fmu(plan, choose_targets(), tmp_path / "follower.fmu")
+    draft = BuildDraft.of(plan, choose_targets())
+    fmu = draft.pack(draft.compile(), tmp_path / "follower.fmu")
     description = read_model_description(str(fmu))
     model = (FMU2Model if version == 2 else FMU3Model)(
         guid=description.guid,

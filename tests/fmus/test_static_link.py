@@ -11,7 +11,7 @@ import pytest
 from fmpy import extract, read_model_description
 
 from fmus import build_fmu, cached_fmu, recipe
-from fmus.documentation.rebuild import rebuild_commands
+from fmus.documentation.page import rebuild_commands
 from fmus.toolchain.compile import find_compiler
 
 pytestmark = pytest.mark.compiler
