@@ -200,7 +200,7 @@ def _update(options: argparse.Namespace) -> Output:
 
 def _written(update: Update, path: Path) -> Output:
     if update.texts:
-        write_texts(update.texts, path)
+        write_texts(dict(update.texts), path)
     return change_output(update, path)
 
 
