@@ -136,15 +136,20 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
 
 def _drawn(found: Output, comparison: Comparison, options: argparse.Namespace) -> Output:
     """The same with page and pictures, as they were asked for; what was found is kept where one cannot be written."""
-    from cosim.report.page.comparison import write_page, write_pictures  # noqa: PLC0415 - matplotlib only for those who look
+    from cosim.report.page.comparison import (  # noqa: PLC0415 - matplotlib only for those who look
+        draw_pictures,
+        write_page,
+        write_pictures,
+    )
 
     try:
-        files = {"page": write_page(comparison, options.html)} if options.html else {}
-        drawn = write_pictures(comparison, options.plots) if options.plots else {}
+        pictures = draw_pictures(comparison)
+        files = {"page": write_page(comparison, options.html, pictures)} if options.html else {}
+        drawn = write_pictures(pictures, options.plots) if options.plots else {}
     except OutputError as error:
         return replace(found, error=error)
     none = ["no pictures: nothing that differs can be drawn"] if options.plots and not drawn else []
     if options.quiet:
         return found
-    pictures = {f"picture of {name}": path for name, path in drawn.items()}
-    return replace(found, parts=[*found.parts, *none], files=files | pictures)
+    files |= {f"picture of {name}": path for name, path in drawn.items()}
+    return replace(found, parts=[*found.parts, *none], files=files)

@@ -28,15 +28,11 @@ FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
 
 
-def write_comparison(
-    comparison: Comparison, directory: str | Path, most_pictures: int = _MOST_PICTURES
-) -> dict[str, Path]:
+def write_comparison(comparison: Comparison, directory: str | Path) -> dict[str, Path]:
     """Write a comparison to a folder: page, data, and one picture for each of the worst signals.
 
     Args:
-        comparison: what to write.
-        directory: the folder; created where it does not exist.
-        most_pictures: number of pictures at most, of the worst signals.
+        comparison: what to write. directory: the folder; created where it does not exist.
 
     Returns:
         Paths: ``html``, ``json``, and, where a signal that differs can be drawn, ``png`` (the worst one's picture) and
@@ -46,67 +42,54 @@ def write_comparison(
         OutputError: the folder cannot be written.
     """
     folder = Path(directory)
-    pictures = _draw_pictures(comparison, most_pictures)
+    pictures = draw_pictures(comparison)
     with _explained(folder):
         _remove_pictures(folder / PICTURES)
-        drawn = _write_pictures(pictures, folder / PICTURES)
-        write_file(folder / PAGE, page_bytes(_comparison_page(comparison, pictures)))
-        write_file(folder / DATA, page_bytes(_comparison_json(comparison)))
-    paths = {"html": folder / PAGE, "json": folder / DATA}
+    paths = {"html": write_page(comparison, folder / PAGE, pictures), "json": folder / DATA}
+    with _explained(folder):
+        write_file(folder / DATA, page_bytes(json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"))
+    drawn = write_pictures(pictures, folder / PICTURES)
     return paths | ({"png": next(iter(drawn.values())), "pictures": folder / PICTURES} if drawn else {})
 
 
-def write_page(comparison: Comparison, path: str | Path, most_pictures: int = _MOST_PICTURES) -> Path:
-    """Write the page alone, with the pictures inside.
+def write_page(comparison: Comparison, path: str | Path, pictures: Mapping[str, bytes]) -> Path:
+    """Write the page alone, with the pictures inside, and return its path.
 
     Args:
-        comparison: what to write.
-        path: the file; its folder is created.
-        most_pictures: number of pictures at most, of the worst signals.
-
-    Returns:
-        Path of the page.
+        comparison: what to write. path: the file; its folder is created. pictures: from `draw_pictures`.
 
     Raises:
         OutputError: it cannot be written.
     """
-    file = Path(path)
-    text = _comparison_page(comparison, _draw_pictures(comparison, most_pictures))
-    with _explained(file):
-        write_file(file, page_bytes(text))
-    return file
+    with _explained(Path(path)):
+        write_file(Path(path), page_bytes(_comparison_page(comparison, pictures)))
+    return Path(path)
 
 
-def write_pictures(
-    comparison: Comparison, directory: str | Path, most_pictures: int = _MOST_PICTURES
-) -> dict[str, Path]:
-    """Write the pictures alone.
+def write_pictures(pictures: Mapping[str, bytes], directory: str | Path) -> dict[str, Path]:
+    """Write the pictures alone, and return their paths by signal, the worst first.
 
     Args:
-        comparison: what to draw.
-        directory: the folder; created where it does not exist.
-        most_pictures: number of pictures at most, of the worst signals.
-
-    Returns:
-        Paths by signal, the worst first.
+        pictures: from `draw_pictures`. directory: the folder; created where it does not exist.
 
     Raises:
         OutputError: the folder cannot be written.
     """
-    pictures = _draw_pictures(comparison, most_pictures)
+    paths = dict(zip(pictures, (Path(directory) / name for name in _file_names(list(pictures))), strict=True))
     with _explained(Path(directory)):
-        return _write_pictures(pictures, Path(directory))
+        for signal, path in paths.items():
+            write_file(path, pictures[signal])
+    return paths
 
 
-def _draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[str, bytes]:
-    """Pictures of the worst signals that can be drawn."""
+def draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[str, bytes]:
+    """Pictures of the worst signals that can be drawn, PNG by signal, the worst first.
+
+    Args:
+        comparison: what to draw. most: number of pictures at most.
+    """
     drawable = [s for s in comparison.failed if s.curves is not None]
     return {s.name: png(comparison_picture(s).figure) for s in drawable[:most]}
-
-
-def _comparison_json(comparison: Comparison) -> str:
-    """The comparison as JSON, without curves."""
-    return json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"
 
 
 def _comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
@@ -214,13 +197,6 @@ def _use_of_tolerance(signal: SignalComparison) -> float:
 
 def _explained(place: Path) -> AbstractContextManager[None]:
     return explained(f"The comparison cannot be written to {place}", "Choose another place.")
-
-
-def _write_pictures(pictures: Mapping[str, bytes], folder: Path) -> dict[str, Path]:
-    names = dict(zip(pictures, _file_names(list(pictures)), strict=True))
-    for signal, data in pictures.items():
-        write_file(folder / names[signal], data)
-    return {signal: folder / name for signal, name in names.items()}
 
 
 def _file_names(signals: Sequence[str]) -> list[str]:

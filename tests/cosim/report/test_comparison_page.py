@@ -26,7 +26,7 @@ from cosim.report.figures.comparison_figure import (
     comparison_figure,
     comparison_picture,
 )
-from cosim.report.page.comparison import _comparison_page, _draw_pictures, write_comparison, write_page, write_pictures
+from cosim.report.page.comparison import _comparison_page, draw_pictures, write_comparison, write_page, write_pictures
 from cosim.results.result import Result, SignalInfo
 
 # -- pictures
@@ -163,7 +163,7 @@ def test_it_draws_on_axes_given() -> None:
 
 
 def page_of(comparison: Comparison) -> str:
-    return _comparison_page(comparison, _draw_pictures(comparison))
+    return _comparison_page(comparison, draw_pictures(comparison))
 
 
 def test_the_page_says_what_differs_before_all_else() -> None:
@@ -212,7 +212,7 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
         comparison,
         signals=[replace(s, findings=[replace(s.findings[0], size=sizes[s.name])]) for s in comparison.signals],
     )
-    pictures = _draw_pictures(comparison, 1)
+    pictures = draw_pictures(comparison, 1)
     assert list(pictures) == ["signal_2"]
     text = _comparison_page(comparison, pictures)
     assert text.count("<img") == 1
@@ -261,7 +261,7 @@ def test_pictures_of_an_earlier_comparison_go(tmp_path: Path) -> None:
 
 def test_names_of_signals_become_names_of_files(tmp_path: Path) -> None:
     wild = ["train.x[1]", "train.x(1)", 'é/../../b:"|*?' + "c" * 300]
-    paths = write_pictures(Comparison("x", "y", [differing(name) for name in wild]), tmp_path)
+    paths = write_pictures(draw_pictures(Comparison("x", "y", [differing(name) for name in wild])), tmp_path)
     assert set(paths) == set(wild)
     assert len({p.name.lower() for p in paths.values()}) == len(wild)
     assert all(re.fullmatch(r"[\w.-]{1,100}", p.name, re.ASCII) and p.parent == tmp_path for p in paths.values())
@@ -270,11 +270,11 @@ def test_names_of_signals_become_names_of_files(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="file"):
-        write_pictures(different(), tmp_path / "file")
+        write_pictures(draw_pictures(different()), tmp_path / "file")
     with pytest.raises(OutputError, match="file"):
         write_comparison(equal(), tmp_path / "file")
     with pytest.raises(OutputError, match=r"page\.html"):
-        write_page(equal(), tmp_path / "file" / "page.html")
+        write_page(equal(), tmp_path / "file" / "page.html", {})
 
 
 @pytest.mark.browser
