@@ -9,8 +9,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from cosim.baselines.baseline import Baseline
-from cosim.baselines.draft import resolved, versions_of
-from cosim.baselines.kept_signals import resolve
+from cosim.baselines.draft import resolve, resolved, versions_of
 from cosim.baselines.model_identity import identities, same_models
 from cosim.comparison.compare import compare_results
 from cosim.comparison.tolerance import Tolerance, Tolerances

@@ -12,8 +12,7 @@ import numpy as np
 
 from cosim.comparison.curve import Curve, check_time, looks_held, rows_to_keep
 from cosim.comparison.curve_comparison import Task, compare_signal
-from cosim.comparison.event_comparison import Event, compare_events
-from cosim.comparison.telegram_comparison import compare_telegrams
+from cosim.comparison.event_comparison import Event, compare_events, compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
 from cosim.errors import ComparisonError, nearest

@@ -1,4 +1,4 @@
-"""Events compared: matched, missing, extra, late, or with another content."""
+"""Balise telegrams and packets compared as events: which belong to each other, and how far they differ."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ import scipy
 from cosim.comparison.span import rounding
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.verdict import EventComparison, EventDifference, Record
+from cosim.results.result import BaliseRecord, Result
+
+TIMES = {"stamp": "passed", "delivered_at": "delivered"}
+PAYLOAD = {"position": "m", "true_position": "m", "odometer_reading": "m/s", "location_accuracy": "m"}
+
 
 _LARGEST_GROUP = 1000  # events with one name: more of them are paired in order, not by the best assignment
 _NEAR_STEPS = 0.01  # of the length: how far off an event with another name may be the same
@@ -43,11 +48,11 @@ class Event:
         return self.record.stamp
 
 
-Pair = tuple[Event, Event]
+_Pair = tuple[Event, Event]
 
 
 @dataclass(frozen=True)
-class EventLimits:
+class _EventLimits:
     """What two events may differ by: `time` [s], and `payload` by field in its unit."""
 
     time: float
@@ -62,7 +67,7 @@ def compare_events(
     Args:
         reference, result: the events. tolerance: of times and payload. length: of the reference [s].
     """
-    limits = event_limits(reference, tolerance, length)
+    limits = _event_limits(reference, tolerance, length)
     pairs, missing, extra = _match(reference, result, max(10.0 * limits.time, _NEAR_STEPS * length))
     differences = [d for pair in pairs for d in _differences(*pair, limits)]
     differences += [EventDifference("missing", one.record, None, f"{one.name} is missing") for one in missing]
@@ -72,7 +77,7 @@ def compare_events(
     return EventComparison(len(pairs), differences, shift)
 
 
-def event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float) -> EventLimits:
+def _event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float) -> _EventLimits:
     """What events may differ by from those of a reference of `length` [s].
 
     Args:
@@ -89,14 +94,14 @@ def event_limits(reference: Sequence[Event], tolerance: Tolerance, length: float
         values = [v for v in all_values if isfinite(v)]
         spread = max(values) - min(values) if values else 0.0
         payload[name] = tolerance.value_for(spread or max(map(abs, values), default=0.0))
-    return EventLimits(tolerance.time_for(length), payload)
+    return _EventLimits(tolerance.time_for(length), payload)
 
 
 def _match(
     reference: Sequence[Event], result: Sequence[Event], window: float
-) -> tuple[list[Pair], list[Event], list[Event]]:
+) -> tuple[list[_Pair], list[Event], list[Event]]:
     """Pairs of events: first of the same words, then what is left by nearest stamp."""
-    pairs: list[Pair] = []
+    pairs: list[_Pair] = []
     missing: list[Event] = []
     extra: list[Event] = []
     one, two = _groups(reference), _groups(result)
@@ -120,7 +125,7 @@ def _groups(records: Iterable[Event]) -> dict[tuple[str, ...], list[Event]]:
     return groups
 
 
-def _assign(one: list[Event], two: list[Event]) -> tuple[list[Pair], list[Event], list[Event]]:
+def _assign(one: list[Event], two: list[Event]) -> tuple[list[_Pair], list[Event], list[Event]]:
     """Pairs with the least sum of time differences, and what is left on either side."""
     count = min(len(one), len(two))
     rows = columns = np.arange(count)
@@ -135,7 +140,7 @@ def _assign(one: list[Event], two: list[Event]) -> tuple[list[Pair], list[Event]
     return pairs, left, right
 
 
-def _differences(one: Event, two: Event, limits: EventLimits) -> list[EventDifference]:
+def _differences(one: Event, two: Event, limits: _EventLimits) -> list[EventDifference]:
     times = [text for what in one.times if (text := _time_text(what, one.times[what], two.times[what], limits.time))]
     shared = [name for name in one.payload if name in two.payload]
     contents = [text for name in shared if (text := _payload_text(name, one, two, limits.payload[name]))]
@@ -172,3 +177,50 @@ def _words(one: Event, two: Event) -> list[tuple[str, str, str]]:
     words = [(name, two.words[name], one.words[name]) for name in one.words]
     both = [name for name in one.outcomes if name in two.outcomes]
     return words + [(f"outcome at {name}", two.outcomes[name], one.outcomes[name]) for name in both]
+
+
+def _keeps_telegrams(result: Result) -> bool:
+    """Whether a result would have telegrams if there had been any: a run does, a plain table does not.
+
+    The summary may say so itself: ``events_recorded``.
+
+    Args:
+        result: result or reference.
+    """
+    recorded = result.summary.get("events_recorded")
+    return bool(result.events) or (bool(recorded) if recorded is not None else "components" in result.summary)
+
+
+def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, length: float) -> EventComparison:
+    """Compare two lists of telegrams.
+
+    Args:
+        reference, result: whose telegrams. tolerance: of times and payload. length: of the reference [s].
+    """
+    if not _keeps_telegrams(reference) or not _keeps_telegrams(result):
+        return EventComparison(compared=False)
+    ours, theirs = ([_event(record) for record in side.events] for side in (reference, result))
+    return compare_events(ours, theirs, tolerance, length)
+
+
+def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, length: float) -> _EventLimits:
+    """What telegrams may differ by from those of a reference of `length` [s].
+
+    Args:
+        reference: its telegrams.
+        tolerance: what is allowed.
+        length: of the run [s].
+    """
+    return _event_limits([_event(record) for record in reference], tolerance, length)
+
+
+def _event(record: BaliseRecord) -> Event:
+    return Event(
+        record,
+        f"telegram {record.identity!r} ({record.kind}) of {record.stamp:.9g} s",
+        {"identity": record.identity, "kind": record.kind},
+        {what: getattr(record, name) for name, what in TIMES.items()},
+        {name: getattr(record, name) for name in PAYLOAD},
+        record.outcomes,
+        PAYLOAD,
+    )

@@ -20,11 +20,10 @@ from cosim.run.task import RunTask
 from cosim.scenario.fmu_alone import single_tables
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.origin import Origin
-from cosim.scenario.override import case_values, override
+from cosim.scenario.override import case_values, component_from_script, override, value_from_script
 from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.saving import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
-from cosim.scenario.script_values import given_component, given_value
 from cosim.scenario.shipped import shipped_scenarios
 from cosim.structure.run_structure import Structure
 
@@ -212,7 +211,7 @@ class Scenario:
         """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
-        self._data["components"][name] = given_component(table)
+        self._data["components"][name] = component_from_script(table)
         return self
 
     def connect(self, *lines: str) -> Self:
@@ -268,7 +267,7 @@ class Scenario:
             ScenarioError: there is no such component or table.
         """
         try:
-            override(self._data, name, given_value(name, value))
+            override(self._data, name, value_from_script(name, value))
         except ScenarioError as error:
             raise ScenarioError(f"{self.where}: {error}") from error
         return self

@@ -1,6 +1,6 @@
 """The structure of a run, with its text and its picture.
 
-Made by `cosim.structure.inspect`, described by `structure_text`, drawn by `structure_picture`.
+Made by `cosim.run.scenario_structure`, described by `structure_text`, drawn by `structure_picture`.
 """
 
 from __future__ import annotations

@@ -30,9 +30,10 @@ from cosim.baselines.references.manifest import (
     Experiment,
     Related,
     experiments_text,
+    in_units_of,
     manifest_text,
+    prefix,
 )
-from cosim.baselines.references.reference_tables import in_units_of, prefix
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, OutputError

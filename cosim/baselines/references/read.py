@@ -17,8 +17,16 @@ from cosim.baselines.baseline_files import summary_of
 from cosim.baselines.header_data import VERSION, header_from
 from cosim.baselines.model_identity import Identity
 from cosim.baselines.recipe import Recipe
-from cosim.baselines.references.manifest import FOLDER, MANIFEST, Experiment, Related, read_experiments, read_manifest
-from cosim.baselines.references.reference_tables import as_of_a_run, prefix
+from cosim.baselines.references.manifest import (
+    FOLDER,
+    MANIFEST,
+    Experiment,
+    Related,
+    as_of_a_run,
+    prefix,
+    read_experiments,
+    read_manifest,
+)
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.component import Component
 from cosim.components.description import read_description

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_results import STRICT, made
 
-from cosim.comparison.telegram_comparison import compare_telegrams
+from cosim.comparison.event_comparison import compare_telegrams
 from cosim.comparison.verdict import EventComparison
 from cosim.results.result import BaliseRecord
 

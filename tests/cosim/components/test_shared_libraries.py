@@ -11,7 +11,7 @@ import pytest
 from test_fmus.events import hostile_fmu
 
 from cosim import Scenario
-from cosim.components.shared_libraries import _own_needs, _read_linkage
+from cosim.components.loading import _own_needs, _read_linkage
 from cosim.errors import CosimError
 from fmus.toolchain.compile import find_compiler
 

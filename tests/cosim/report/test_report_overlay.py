@@ -27,11 +27,10 @@ from cosim.report.figures.overlay_figures import (
     _true_speed_figure,
     changing_signals,
 )
-from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.overlaid_runs import MOST_RUNS, OverlayRun, make_runs
 from cosim.report.overlay.overlay_measures import Measured, difference, measured, numbers_table
 from cosim.report.page import overlay
-from cosim.report.page.overlay import _overlay_page, write_overlay
+from cosim.report.page.overlay import _overlay_page, differences, layout_note, write_overlay
 from cosim.results.result import Result
 from fmus.tables.table import Column
 

@@ -311,7 +311,7 @@ def test_page_picture_and_data_say_the_same(benchmark: ObserverBenchmark, tmp_pa
 
 
 def test_the_picture_has_units_and_a_point_for_each_observer(benchmark: ObserverBenchmark) -> None:
-    from cosim.report.figures.observers_figure import _cost_figure, _errors_figure
+    from cosim.report.page.observer_page import _cost_figure, _errors_figure
 
     errors, cost = _errors_figure(benchmark.scores), _cost_figure(benchmark.scores)
     assert errors.get_xlabel() == "Speed error [m/s]"
