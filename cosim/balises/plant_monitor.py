@@ -1,4 +1,6 @@
-"""The watched plant: the planned component whose position and speed outputs find the balises."""
+"""The watched plant: the planned component whose position and speed outputs find the balises, and how far these outputs
+contradict each other.
+"""
 
 from __future__ import annotations
 

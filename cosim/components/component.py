@@ -1,7 +1,7 @@
 """Components: everything the master can step, with one face for slaves of FMI 1, 2 and 3 and Python blocks.
 
 A component wraps an object with the call surface of fmpy's `FMU1Slave`, `FMU2Slave` or `FMU3Slave`; whether that is a
-sealed library or a block makes no difference here. The dialects are in `fmi1`, `fmi2` and `fmi3`.
+sealed library or a block makes no difference here. The dialects are in `loading` and `fmi3`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""What the judges are given of a run: the result, the roles of its signals, and when it was to begin and to end."""
+"""What expectations see of a run: the result, the roles of its signals, the part of its time that counts, and when it
+was to begin and to end.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""From a run that is ready to its outcome: stepped to its end or first failure, judged, summed up."""
+"""From a run that is ready to its outcome: stepped to its end or first failure, evaluated, summed up, with what to
+warn of.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Our annotation: what a scenario says and SSP has no word for. Other tools may ignore it; nothing in it is needed to
-run.
+"""What stands beside a structure: parameter sets and mappings, read, and our annotation, read and written.
 
-One annotation on the structure holds the step, balises, report and master settings, one on a component where its FMU
-came from. The content is JSON, in the words of a scenario file.
+The annotation holds what a scenario says and SSP has no word for. Other tools may ignore it; nothing in it is needed to
+run. One annotation on the structure holds the step, balises, report and master settings, one on a component where its
+FMU came from. The content is JSON, in the words of a scenario file.
 """
 
 from __future__ import annotations

@@ -27,21 +27,10 @@ from cosim.scenario.schema import ScenarioTable
 from cosim.ssp.annotation import DIGEST, digest, write_extras
 from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import VERSIONS, Node
-from cosim.ssp.elements_of_data import (
-    READS_BALISES,
-    TOOL,
-    Definitions,
-    Reader,
-    add_connector,
-    add_parameter,
-    child,
-    is_told_by_counts,
-    make_reader,
-    root_of,
-    text_of,
-)
+from cosim.ssp.elements_of_data import TOOL, Definitions, add_connector, add_parameter, child, root_of, text_of
 from cosim.ssp.interfaces import Interface
 from cosim.ssp.package import DEFAULT_VARIANT
+from cosim.ssp.reader import READS_BALISES, Reader, is_told_by_counts, make_reader
 from fmu_observer.event_protocol import EventProtocol
 from fmus.pack import check_target, pack_fmu
 from plant_models.hybrid.noise import RUN_SEED

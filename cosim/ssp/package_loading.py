@@ -14,12 +14,12 @@ from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
 from cosim.ssp.document import fail
-from cosim.ssp.elements_of_data import READS_BALISES
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.nets import Chain, Nets, Path, flat_names
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.package_data import ComponentElement, SsdStructure
 from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
+from cosim.ssp.reader import READS_BALISES
 from cosim.ssp.system_structure import read_structure
 
 ORIGIN = ("model", "observer", "as", "preset", "options", "late_policy", "replay_horizon")

@@ -1,5 +1,5 @@
-"""MATLAB files as results: ours, trajectories of Modelica tools, vectors of equal length. Only reads the file it is
-given.
+"""MATLAB files as results: ours, trajectories of Modelica tools, vectors of equal length; and results as such a
+trajectory. Touches only the file it is given.
 """
 
 from __future__ import annotations
