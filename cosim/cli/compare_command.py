@@ -136,7 +136,7 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
 
 def _drawn(found: Output, comparison: Comparison, options: argparse.Namespace) -> Output:
     """The same with page and pictures, as they were asked for; what was found is kept where one cannot be written."""
-    from cosim.report.page.comparison import (  # noqa: PLC0415 - matplotlib only for those who look
+    from cosim.report.page.comparison import (  # noqa: PLC0415 - matplotlib only for those who draw
         draw_pictures,
         write_page,
         write_pictures,

@@ -54,7 +54,7 @@ def execute(options: argparse.Namespace) -> Output:
     specs = [spec_of(result, label) for result, label in zip(results, labels, strict=True)]
     for path, result, spec in zip(paths, results, specs, strict=True):
         if is_guessed(result):
-            print(f"{path} does not tell which signals play which role; {_guess(spec)}", file=sys.stderr)
+            print(f"{path} does not say which signals play which role; {_guess(spec)}", file=sys.stderr)
     page = (
         _one(options, paths[0], results[0], specs[0]) if len(paths) == 1 else _several(options, results, specs, labels)
     )
@@ -85,7 +85,7 @@ def _several(
 
 
 def _labels(text: str | None, paths: Sequence[Path]) -> list[str]:
-    """The labels that were given, or the shortest ends of the paths that tell them apart."""
+    """The labels of the user, or the shortest ends of the paths by which they differ."""
     if text is not None:
         labels = [label.strip() for label in text.split(",")]
         if len(labels) != len(paths) or not all(labels):

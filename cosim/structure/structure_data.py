@@ -120,7 +120,7 @@ class Packets:
 
     Args:
         nodes: signals by node. protocol: which node sends. period: between two transmissions [s].
-        delay: kind of delay. told: components that are notified by events, with their event. held: components whose
+        delay: kind of delay. notified: components that are notified by events, with their event. held: components whose
             inputs hold what came last.
     """
 
@@ -128,7 +128,7 @@ class Packets:
     protocol: str
     period: float
     delay: str
-    told: tuple[str, ...] = ()
+    notified: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
 
 

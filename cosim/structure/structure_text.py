@@ -193,6 +193,6 @@ def _network(structure: StructureData) -> dict[str, str]:
         return {}
     return {f"node {name}": ", ".join(signals) for name, signals in network.nodes.items()} | {
         "protocol": f"{network.protocol}, a transmission every {network.period:g} s, delay {network.delay}",
-        "notified": ", ".join(network.told) or "nobody",
+        "notified": ", ".join(network.notified) or "nobody",
         "last value held": ", ".join(network.held) or "nowhere",
     }

@@ -11,7 +11,7 @@ class ProgressBar:
 
     Args:
         unit: what is counted. silent: whether it stays away in any case.
-        shape: how it looks, as tqdm's ``bar_format``; None for the usual look.
+        shape: as tqdm's ``bar_format``; None for the usual one.
     """
 
     def __init__(self, unit: str = "it", *, silent: bool = False, shape: str | None = None) -> None:

@@ -23,7 +23,7 @@ from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Table
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
-_MOST_PICTURES = 12  # on a page: the worst signals tell the story
+_MOST_PICTURES = 12  # on a page: the worst signals show it
 FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
 
