@@ -68,11 +68,14 @@ def laid_out(
         left: indices of the columns that stand on the left. names: how many columns from the first on name a row.
         width: that no line exceeds; None for any.
     """
-    widths = [max(_width(cell) for cell in column) for column in zip(headings, *rows, strict=True)]
+    natural = [max(_width(cell) for cell in column) for column in zip(headings, *rows, strict=True)]
+    widths = natural
     blocks = [list(range(len(headings)))]
-    if width is not None and _total(widths) > width:
-        widths = _with_narrow_headings(headings, rows, widths)
-        if not _narrow_texts(widths, [i for i in blocks[0] if i in left], width):
+    if width is not None:
+        least = _least(headings, rows, widths, left)
+        widths = _narrowed(widths, least, width)
+        if _total(widths) > width:
+            widths = [old if i in left else least[i] for i, old in enumerate(natural)]
             blocks = _folded(widths, min(names, len(headings) - 1), width)
     tables = [_block([headings, *rows], block, widths, left) for block in blocks]
     return [line for i, table in enumerate(tables) for line in ([""] if i else []) + table]
@@ -86,24 +89,21 @@ def _total(widths: Sequence[int]) -> int:
     return sum(widths) + len(GAP) * (len(widths) - 1)
 
 
-def _with_narrow_headings(headings: Sequence[str], rows: Sequence[Sequence[str]], widths: Sequence[int]) -> list[int]:
-    """Widths of the columns whose headings are wrapped at their blanks."""
+def _least(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], widths: Sequence[int], left: Container[int]
+) -> list[int]:
+    """Widths that columns are not made narrower than: of numbers their headings are wrapped at their blanks."""
     cells = [max((_width(row[i]) for row in rows), default=0) for i in range(len(widths))]
     words = [max(map(len, heading.split()), default=0) for heading in headings]
-    return [min(old, max(pair)) for old, *pair in zip(widths, cells, words, strict=True)]
+    return [min(old, LEAST if i in left else max(cells[i], words[i])) for i, old in enumerate(widths)]
 
 
-def _narrow_texts(widths: list[int], texts: Sequence[int], width: int) -> bool:
-    """Make the widest texts narrower until the table fits; whether it does. Where it does not, nothing is changed."""
-    tried = list(widths)
-    while (excess := _total(tried) - width) > 0:
-        widest = max(texts, key=lambda i: tried[i], default=None)
-        if widest is None or tried[widest] <= LEAST:
-            return False
-        second = max([LEAST, *(tried[i] for i in texts if i != widest and tried[i] < tried[widest])])
-        tried[widest] -= max(1, min(excess, tried[widest] - second))
-    widths[:] = tried
-    return True
+def _narrowed(widths: Sequence[int], least: Sequence[int], width: int) -> list[int]:
+    """Widths with which a table fits, or is as narrow as it can be: the columns with most to give become narrower."""
+    found = list(widths)
+    while _total(found) > width and found != list(least):
+        found[max(range(len(found)), key=lambda i: found[i] - least[i])] -= 1
+    return found
 
 
 def _folded(widths: list[int], names: int, width: int) -> list[list[int]]:
