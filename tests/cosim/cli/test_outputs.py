@@ -46,7 +46,7 @@ LINES = {
         "run": "run TRAIN --quiet --out OUT_run --seeds 2",
         "show": "show TRAIN --picture OUT.svg",
         "sweep": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --quiet --out OUT_sweep",
-        "tune": "tune TRAIN --observer takagi_sugeno_cdo --parameters theta=1:2 --iterations 1 --quiet --out OUT_t",
+        "tune": "tune TRAIN --observer multirate_cdo --parameters theta_2=1:3 --iterations 1 --quiet --out OUT_t",
         "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT_by",
     },
     "fmus": {
