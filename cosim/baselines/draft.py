@@ -311,12 +311,7 @@ def value_range(values: np.ndarray) -> float:
 
 
 def _events_text(result: Result, tolerance: Tolerance) -> str:
-    """Telegrams as CSV, one a line.
-
-    Args:
-        result: with the telegrams.
-        tolerance: what is allowed of telegrams; it decides how many digits are written.
-    """
+    """Telegrams as CSV, one a line."""
     allowed = telegram_limits(result.events, tolerance, float(result.time[-1] - result.time[0]))
     room = {**dict.fromkeys(TIMES, allowed.time), **allowed.payload}
     lines = io.StringIO()

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from cosim.baselines.baseline import Baseline
 from cosim.baselines.recipe import Recipe
-from cosim.components.recording_data import Chosen
 from cosim.errors import BaselineError, ScenarioError
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
+from cosim.scenario.fmu_alone import FmuAlone
 from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[float, float], None]
@@ -48,16 +48,7 @@ def _run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable
             "here; give the result to be checked: --against DIR."
         )
     if recipe.kind == "fmu":
-        scenario = Scenario.fmu(
-            recipe.source,
-            start=recipe.start,
-            stop=recipe.stop,
-            step=recipe.step,
-            inputs=recipe.inputs,
-            parameters=recipe.parameters,
-            record=recipe.record,
-            interpolation=recipe.interpolation,
-        )
+        scenario = Scenario.fmu(recipe.source, **{f.name: getattr(recipe, f.name) for f in fields(FmuAlone)})
         outcome = scenario.run(progress=progress, warn=_about_inputs(recipe, warn))
     else:
         outcome = Scenario.load(recipe.source).run(progress=progress, overrides=recipe.overrides, warn=warn)
@@ -94,37 +85,28 @@ def make_subject(
     what: Any,
     folder: Path,
     *,
-    start: float | None = None,
-    stop: float | None = None,
-    step: float | None = None,
-    inputs: Mapping[str, Any] | str | Path | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    record: Sequence[str] = (),
     overrides: Mapping[str, Any] | None = None,
-    interpolation: Chosen = None,
     progress: Progress | None = None,
     warn: Callable[[str], None] | None = None,
+    **run: Any,
 ) -> Subject:
     """Run what a user named.
 
     Args:
         what: path of an FMU; name or path of a scenario; a `Scenario`; an `Outcome` or `Result` of a run made already.
         folder: where relative paths start.
-        start, stop, step: of the run [s].
-        inputs: of an FMU alone: constants by name, or a table with a column for each.
-        parameters: start values of an FMU alone, by name.
-        record: variables of an FMU alone to record besides its outputs.
         overrides: of a scenario, as for `Scenario.set`.
-        interpolation: of the columns of a table of inputs, as for `Scenario.fmu`.
         progress, warn: as for `Scenario.run`.
+        run: start, stop and step of the run [s]; of an FMU alone all that `FmuAlone` holds.
 
     Raises:
         BaselineError: what was given does not go together.
         CosimError: it cannot be set up.
     """
-    times = {key: value for key, value in (("start", start), ("stop", stop), ("step", step)) if value is not None}
-    of_fmu = _given(inputs=inputs, parameters=parameters, record=record, interpolation=interpolation)
-    changed = _given(overrides=overrides)
+    stated = asdict(FmuAlone(**run))
+    times = {key: stated.pop(key) for key in ("start", "stop", "step") if stated[key] is not None}
+    of_fmu = {key: value for key, value in stated.items() if value}
+    changed = {"overrides": overrides} if overrides else {}
     if isinstance(what, Outcome | Result):
         _refuse("a result of a run made already", times | of_fmu | changed)
         return Subject(Recipe(), what, None) if isinstance(what, Result) else Subject(Recipe(), what.result, what)
@@ -188,14 +170,10 @@ def _scenario_source(what: str | Path, folder: Path) -> str:
     return str(what)
 
 
-def _given(**arguments: Any) -> dict[str, Any]:
-    return {name: value for name, value in arguments.items() if value}
-
-
-def _refuse(what: str, given: Mapping[str, Any]) -> None:
-    if given:
+def _refuse(what: str, settings: Mapping[str, Any]) -> None:
+    if settings:
         hint = "set values with overrides={'component.parameter': value}" if what == "a scenario" else "leave them out"
-        raise BaselineError(f"{what} takes no {', '.join(given)}; {hint}.")
+        raise BaselineError(f"{what} takes no {', '.join(settings)}; {hint}.")
 
 
 def _about_inputs(recipe: Recipe, warn: Callable[[str], None] | None) -> Callable[[str], None]:

@@ -215,11 +215,7 @@ def compare_signal(task: Task) -> SignalComparison:
 
 
 def _allowed_for(task: Task) -> Allowed:
-    """What the tolerance means for this reference.
-
-    Args:
-        task: the signal with its reference and what is allowed.
-    """
+    """What the tolerance means for this reference."""
     scale = task.reference.scale
     time = task.tolerance.time_for(task.length)
     step = max(task.reference.step, task.result.step)

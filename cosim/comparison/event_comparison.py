@@ -183,9 +183,6 @@ def _keeps_telegrams(result: Result) -> bool:
     """Whether a result would have telegrams if there had been any: a run does, a plain table does not.
 
     The summary may say so itself: ``events_recorded``.
-
-    Args:
-        result: result or reference.
     """
     recorded = result.summary.get("events_recorded")
     return bool(result.events) or (bool(recorded) if recorded is not None else "components" in result.summary)

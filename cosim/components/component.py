@@ -67,11 +67,6 @@ class _DifferentiableComponent(DescribedComponent, Slave):
     ) -> Callable[[], np.ndarray]:
         """As for `Instance`.
 
-        Args:
-            unknowns: outputs and the like.
-            knowns: inputs and the like.
-            seed: the direction, shape (len(knowns),).
-
         Raises:
             CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
         """
@@ -179,10 +174,6 @@ class Component(_DifferentiableComponent):
     def set_start(self, name: str, value: StartValue) -> None:
         """Set a parameter, a start state or an unconnected input before initialisation.
 
-        Args:
-            name: variable, or element of an array.
-            value: of the variable's type, from `start_values`; of an array all values, row by row.
-
         Raises:
             CouplingError: the variable does not exist.
             RunError: the slave refuses the value.
@@ -235,9 +226,6 @@ class Component(_DifferentiableComponent):
     def _count_reader(self, kind: str, names: Mapping[str, str]) -> Callable[[], Mapping[str, int] | None]:
         """A call that reads variables that count, prepared for the slave as it is instantiated; it gives None where
         there are none.
-
-        Args:
-            kind: of counts, under which the call is kept. names: what a count is called, by variable.
         """
         counted = [name for name in names if name in self.variables]  # an older export knows fewer
         called, values = [names[name] for name in counted], np.zeros(len(counted))
@@ -269,20 +257,11 @@ class Component(_DifferentiableComponent):
         self.messages.silent = choice == "none"
 
     def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
-        """Keep a message of the slave's own log; what it said of something wrong is part of a failure.
-
-        Args:
-            status: of FMI, by number or name.
-            category: as the slave names it.
-        """
+        """Keep a message of the slave's own log; what it said of something wrong is part of a failure."""
         self.messages.add(self.time if self.clock is None else self.clock(), message, status, category)
 
     def failure(self, reason: str, t: float | None = None) -> RunError:
-        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last.
-
-        Args:
-            reason: what happened.
-        """
+        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last."""
         if self.messages:
             reason = f"{reason.rstrip('.')}. The FMU says: {self.messages.reason}"
         when = self.time if t is None else t

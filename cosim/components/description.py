@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 
 from cosim.components.unpacking import read_archive
 from cosim.errors import FmuLoadError
@@ -23,6 +25,27 @@ def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
         FmuLoadError: the file is missing, broken or dangerous, or of an FMI version that is not supported.
     """
     return open_fmu(Path(path), name).description
+
+
+def description_of_outputs(
+    name: str, token: str, text: str, outputs: Sequence[ModelVariable], **abilities: Any
+) -> ModelDescription:
+    """The description of what has outputs alone, and is made here.
+
+    Args:
+        name: of the model. token: by which another one is recognised. text: what it is. outputs: its variables.
+        abilities: of its co-simulation, `modelIdentifier` among them, in the words of FMI.
+    """
+    return ModelDescription(
+        fmiVersion="3.0",
+        modelName=name,
+        instantiationToken=token,
+        description=text,
+        generationTool=abilities["modelIdentifier"],
+        coSimulation=CoSimulation(**abilities),
+        modelVariables=list(outputs),
+        outputs=[Unknown(variable=variable, dependencies=[]) for variable in outputs],
+    )
 
 
 def runs_here(path: Path) -> str:

@@ -144,11 +144,7 @@ class _PythonSlave:
         """The event happens in `updateDiscreteStates`."""
 
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
-        """A telegram comes; it is told in `updateDiscreteStates`.
-
-        Args:
-            vr: the one clock. values: whether it ticks.
-        """
+        """A telegram comes; it is told in `updateDiscreteStates`."""
         self._notified = any(values)
         self._values[self._ends[3] :] = NO_TIME
 
@@ -175,21 +171,13 @@ class _PythonSlave:
         return self.model.save(self._made), self._values.copy(), self._time, self.counters
 
     def setFMUState(self, state: Any) -> None:
-        """Go back to a copy.
-
-        Args:
-            state: from `getFMUState`.
-        """
+        """Go back to a copy."""
         held, values, self._time, self.counters = state
         self._made = self.model.restore(self._made, held)
         self._values[:] = values
 
     def freeFMUState(self, state: Any) -> None:
-        """Nothing to do.
-
-        Args:
-            state: from `getFMUState`.
-        """
+        """Nothing to do."""
 
     def _take(self, given: Any, call: str) -> None:
         """The outputs after a call; those that a telegram's dict leaves out stay as they are."""
@@ -200,27 +188,15 @@ class _PythonSlave:
     # -- values -----------------------------------------------------------------------------------------------------
 
     def getFloat64(self, vr: Sequence[int], nValues: int | None = None) -> list[float]:
-        """Values of variables.
-
-        Args:
-            vr: value references. nValues: how many.
-        """
+        """Values of variables."""
         return [float(self._values[reference - 1]) for reference in vr]
 
     def getBoolean(self, vr: Sequence[int], nValues: int | None = None) -> list[bool]:
-        """Truth values of parameters.
-
-        Args:
-            vr: value references. nValues: how many.
-        """
+        """Truth values of parameters."""
         return [bool(self._values[reference - 1]) for reference in vr]
 
     def setFloat64(self, vr: Sequence[int], values: Sequence[Any]) -> None:
-        """Set inputs, parameters and fields of a telegram.
-
-        Args:
-            vr: value references. values: in their order.
-        """
+        """Set inputs, parameters and fields of a telegram."""
         self._values[np.array(vr, dtype=np.intp) - 1] = values
         if any(self._ends[2] < reference <= self._ends[3] for reference in vr):
             self._given = {
@@ -256,11 +232,7 @@ class PythonComponent(FMI3Component):
         super().__init__(name, slave, slave.model_description, source=source, kind="block")
 
     def declare_missing(self, names: Sequence[str], where: str) -> None:
-        """As for `Described`; the object may give NaN for these outputs.
-
-        Args:
-            names: of variables. where: place for messages.
-        """
+        """As for `Described`; the object may give NaN for these outputs."""
         super().declare_missing(names, where)
         self._model.declare_missing(names)
 

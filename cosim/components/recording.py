@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
+from fmpy.model_description import ModelDescription, ModelVariable
 
+from cosim.components.description import description_of_outputs
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.recording_data import Chosen, Recording, make_recording, whole_number_columns
 from cosim.errors import CosimError, CouplingError, ScenarioError
@@ -236,12 +237,7 @@ class RecordingComponent(FMI3Component):
         return ColumnCourse(self.recording, places)
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
-        """As for `Described`; a column that was left out is refused with the reason.
-
-        Args:
-            name: of a column.
-            causalities: those that it may have; none for any.
-        """
+        """As for `Described`; a column that was left out is refused with the reason."""
         if name in self.recording.left_out:
             raise CouplingError(f"{self.name}.{name} cannot be played back: {self.recording.left_out[name]}.")
         return super().variable(name, *causalities)
@@ -264,21 +260,15 @@ def describe(recording: Recording) -> ModelDescription:
         )
         for i, (signal, is_whole, held) in enumerate(zip(recording.signals, whole, recording.held, strict=True), 1)
     ]
-    abilities = CoSimulation(
+    return description_of_outputs(
+        Path(recording.source).name,
+        recording.digest,
+        "A recording",
+        outputs,
         modelIdentifier=KIND,
         canHandleVariableCommunicationStepSize=True,
         canGetAndSetFMUstate=True,
         hasEventMode=bool(len(recording.events)),
-    )
-    return ModelDescription(
-        fmiVersion="3.0",
-        modelName=Path(recording.source).name,
-        instantiationToken=recording.digest,
-        description="A recording",
-        generationTool=KIND,
-        coSimulation=abilities,
-        modelVariables=outputs,
-        outputs=[Unknown(variable=variable, dependencies=[]) for variable in outputs],
     )
 
 

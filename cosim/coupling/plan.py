@@ -175,11 +175,7 @@ def make_plan(
 def _layout(
     read: Sequence[tuple[Component, Sequence[str]]],
 ) -> tuple[list[SignalInfo], dict[tuple[str, str], int], dict[str, slice]]:
-    """All signals in a row, the column of each (component, signal), and the columns of each component.
-
-    Args:
-        read: the components with the names of what is read of each, in order.
-    """
+    """All signals in a row, the column of each (component, signal), and the columns of each component."""
     signals, columns, spans = list[SignalInfo](), dict[tuple[str, str], int](), dict[str, slice]()
     for component, names in read:
         first = len(signals)

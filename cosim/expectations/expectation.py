@@ -71,11 +71,7 @@ class WindowExpectation(Expectation):
         return self
 
     def prepare(self, before: Before) -> Self:
-        """The window lies within the run, and holds at least one point that is recorded.
-
-        Args:
-            before: what is known before the run.
-        """
+        """The window lies within the run, and holds at least one point that is recorded."""
         before.demand_window(self.start, self.end, self.first_judged(before))
         return self
 

@@ -99,15 +99,7 @@ class _QuickPoints:
         self._instance.note_initialised()
 
     def batch(self, names: Sequence[str], *, step: bool) -> _Batch:
-        """Restarts at many points, a step from each where one is asked for, and what is read there.
-
-        Args:
-            names: what is read. step: whether a step is made.
-
-        Returns:
-            The call. A point whose step is discarded, ends early or meets an event is given to who knows what to make
-            of it. It raises what the instance makes of a failure.
-        """
+        """Restarts at many points, a step from each where one is asked for, and what is read there."""
         kept: dict[int, _Prepared] = {}
         instance, text = self._instance, shown(names)
 
@@ -209,9 +201,6 @@ class CoSimulationModel(SealedModel):
 
     def advance(self, t: float, h: float) -> None:
         """Go on by one communication step, inputs held.
-
-        Args:
-            t: instant [s]. h: how far [s].
 
         Raises:
             FmuModelError: the FMU refuses the step.

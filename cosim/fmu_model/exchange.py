@@ -240,9 +240,6 @@ class ExchangeModel(_ContinuousModel):
     def advance(self, t: float, h: float) -> None:
         """Integrate from where the instance stands by LSODA, for stiff equations too, inputs held, events handled.
 
-        Args:
-            t: instant [s]. h: how far [s].
-
         Raises:
             FmuModelError: the FMU refuses, asks for the end, or has more events than can be.
         """

@@ -165,14 +165,7 @@ def _sampled(model: SealedModel, t: float, step: float) -> Function:
 
 
 def _held_between_events(model: SealedModel) -> list[str]:
-    """What the matrices leave out of an FMU with samples of its own: values and clocks that only an event changes.
-
-    Args:
-        model: the FMU; one of model exchange stands at a restart, where it has announced its next event.
-
-    Returns:
-        One sentence or none.
-    """
+    """What the matrices leave out of an FMU with samples of its own: values and clocks that only an event changes."""
     variables = model.instance.description.modelVariables
     held = [
         v.name

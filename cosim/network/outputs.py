@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from math import floor, inf
 from typing import Any
 
-from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.component import Component
+from cosim.components.description import description_of_outputs
 from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.connection import split_name
 from cosim.errors import ScenarioError
@@ -109,16 +110,8 @@ def _description(
     readers: Sequence[PacketReader],
 ) -> ModelDescription:
     variables = _outputs(settings, sources, components, readers)
-    abilities = CoSimulation(modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True)
-    return ModelDescription(
-        fmiVersion="3.0",
-        modelName=KIND,
-        instantiationToken=KIND,
-        description="A network",
-        generationTool=KIND,
-        coSimulation=abilities,
-        modelVariables=variables,
-        outputs=[Unknown(variable=variable, dependencies=[]) for variable in variables],
+    return description_of_outputs(
+        KIND, KIND, "A network", variables, modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True
     )
 
 

@@ -5,6 +5,7 @@ coupling.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection, split_name
@@ -155,25 +156,20 @@ def _check_signal(name: str, unit: str, components: Mapping[str, Component], wha
 
 
 def report_spec(table: ScenarioTable) -> ReportSpec:
-    """What the report is told of a run.
+    """What the report knows of a run.
 
     Args:
         table: of the scenario, with its roles.
     """
     report, components = table.report, table.components
     observers = [n for n, c in components.items() if c.observer is not None or c.filter is not None]
+    as_written = {f.name: getattr(report, f.name) for f in fields(ReportSpec) if hasattr(report, f.name)}
     return ReportSpec(
-        title=table.title,
-        **{role: getattr(report, role) for role in ROLES},
-        observers=observers if report.observers is None else report.observers,
-        other_trains=report.other_trains,
-        labels={n: c.label for n, c in components.items() if c.label is not None},
-        phases=[Phase(p.name, p.start, p.end) for p in report.phases],
-        zones=report.zones,
-        evaluate_after=report.evaluate_after,
-        detection=report.detection,
-        delay_limit=report.delay_limit,
-        published=report.published,
-        independent=report.independent,
-        notes=report.notes,
+        **as_written
+        | {
+            "title": table.title,
+            "observers": observers if report.observers is None else report.observers,
+            "labels": {n: c.label for n, c in components.items() if c.label is not None},
+            "phases": [Phase(p.name, p.start, p.end) for p in report.phases],
+        }
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from fmpy.model_description import DefaultExperiment, ModelDescription
 
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
+from cosim.components.recording_data import Chosen
 from cosim.errors import ScenarioError, nearest
 from cosim.results.load_result import load_result
 from cosim.scenario.schema import step_count
@@ -20,49 +22,55 @@ SOURCE = "inputs"
 """Name of the component that plays back the inputs."""
 
 
-def single_tables(
-    path: Path,
-    name: str,
-    start: float | None,
-    stop: float | None,
-    step: float | None,
-    inputs: Mapping[str, Any] | str | Path | None,
-    parameters: Mapping[str, Any],
-    record: Sequence[str],
-    interpolation: Any = None,
-) -> tuple[dict[str, Any], list[str]]:
-    """The tables of a scenario of one FMU, and what is doubtful about it; arguments as for `Scenario.fmu`.
+@dataclass(frozen=True)
+class FmuAlone:
+    """How an FMU alone is run.
 
     Args:
-        path: of the file. name: of the component.
-        start: begin of the run [s]; None for that of the FMU's default experiment.
-        stop: end of the run [s]; None for that of the FMU's default experiment.
-        step: communication step [s]; None for the FMU's own. inputs: constants by name, or a table, or its path.
-        parameters: start values by name. record: signals to record; none for all.
+        start, stop: of the run [s]; None for those of the FMU's default experiment. step: communication step [s]; None
+            for the FMU's own, or a thousandth of the run. inputs: constants by name, or the path of a table.
+        parameters: start values by name. record: signals to record besides the outputs.
         interpolation: of the columns of the table, as for a recording.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    step: float | None = None
+    inputs: Mapping[str, Any] | str | Path | None = None
+    parameters: Mapping[str, Any] | None = None
+    record: Sequence[str] = ()
+    interpolation: Chosen = None
+
+
+def single_tables(path: Path, name: str, run: FmuAlone) -> tuple[dict[str, Any], list[str]]:
+    """The tables of a scenario of one FMU, and what is doubtful about it.
+
+    Args:
+        path: of the file. name: of the component. run: how it is run.
 
     Raises:
         FmuLoadError: the FMU cannot be read.
         ScenarioError: no end is known, or an input does not exist.
     """
-    where = path.name
+    where, inputs = path.name, run.inputs
     component = describe_fmu(path, name)
-    begin, end, length = run_times(component.description, start, stop, step, where)
+    begin, end, length = run_times(component.description, run.start, run.stop, run.step, where)
     table: dict[str, Any] = {"fmu": str(path.resolve())}
     tables: dict[str, Any] = {"title": where, "start": begin, "stop": end, "step": length, "components": {name: table}}
-    values = dict(parameters)
+    values = dict(run.parameters or {})
     warnings: list[str] = []
     if isinstance(inputs, Mapping):
         _check_inputs(inputs, component, where)
         values |= inputs
     elif inputs is not None:
-        source, said = Path(inputs).resolve(), {} if interpolation is None else {"interpolation": interpolation}
+        source = Path(inputs).resolve()
+        courses = {} if run.interpolation is None else {"interpolation": run.interpolation}
         tables["connections"], warnings = _matches(source, component, where)
-        tables["components"] = {SOURCE: {"recording": str(source)} | said, **tables["components"]}
+        tables["components"] = {SOURCE: {"recording": str(source)} | courses, **tables["components"]}
     if values:
         table["parameters"] = values
-    if record:
-        table["record"] = list(record)
+    if run.record:
+        table["record"] = list(run.record)
     return tables, warnings
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -144,23 +145,17 @@ def network_settings(table: NetworkTable, folder: Path, where: str) -> NetworkSe
     elif table.protocol == "quadratic":
         weights = np.array([(table.weights or {})[name] for name in names])
     file = None if table.delay_file is None else (folder / table.delay_file).resolve()
+    as_written = {f.name: getattr(table, f.name) for f in fields(NetworkSettings) if hasattr(table, f.name)}
     return NetworkSettings(
-        nodes=tuple(Node(name, tuple(signals)) for name, signals in table.nodes.items()),
-        protocol=table.protocol,
-        order=tuple(names.index(name) for name in table.order or ()),
-        weights=weights,
-        period=table.slot,
-        offset=table.offset,
-        jitter=table.jitter,
-        delay_correlation=table.delay_correlation,
-        delays=() if file is None else _read_delays(file, f"{where}: network.delay_file"),
-        equalise=table.equalise,
-        loss_fraction=table.loss_fraction,
-        loss_burst=table.loss_burst,
-        duplicate_fraction=table.duplicate_fraction,
-        sequence=table.sequence,
-        seed=table.seed,
-        **delays,  # type: ignore[arg-type] # checked by the table
+        **as_written
+        | delays
+        | {
+            "nodes": tuple(Node(name, tuple(signals)) for name, signals in table.nodes.items()),
+            "order": tuple(names.index(name) for name in table.order or ()),
+            "weights": weights,
+            "period": table.slot,
+            "delays": () if file is None else _read_delays(file, f"{where}: network.delay_file"),
+        }
     )
 
 

@@ -80,14 +80,7 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
 
 
 def _first_departure(plan: Plan, table: Any) -> Departure | None:
-    """The signal that left its declared or plausible range first and did not come back; None where none did.
-
-    Args:
-        plan: components with their outputs. table: rows by ``component.signal``, in the components' own units.
-
-    Returns:
-        Of several that left in the same row, the one whose component is executed first.
-    """
+    """The signal that left its declared or plausible range first and did not come back; None where none did."""
     found = (_departure(step, signal, table) for step in plan.steps for signal in _signals(step, plan))
     return min((d for d in found if d is not None), key=lambda d: d.row, default=None)
 

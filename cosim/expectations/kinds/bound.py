@@ -31,11 +31,7 @@ class BoundExpectation(WindowExpectation):
     bound: str
 
     def prepare(self, before: Before) -> Self:
-        """The three signals exist, and have one dimension.
-
-        Args:
-            before: what is known before the run.
-        """
+        """The three signals exist, and have one dimension."""
         super().prepare(before)
         before.demand_same_dimension(self.signal, self.reference)
         before.demand_same_dimension(self.signal, self.bound)

@@ -26,11 +26,7 @@ class CertificateExpectation(Expectation):
     of: Name | list[Name] | None = None
 
     def prepare(self, before: Before) -> Self:
-        """There are balises, and certificates are asked for.
-
-        Args:
-            before: what is known before the run.
-        """
+        """There are balises, and certificates are asked for."""
         if before.receivers is None:
             raise ScenarioError("this scenario has no balises, so there are no gaps to be certified for")
         if before.certificates == "ignore":

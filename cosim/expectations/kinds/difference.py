@@ -21,11 +21,7 @@ class DifferenceExpectation(LimitedExpectation):
     reference: str
 
     def prepare(self, before: Before) -> Self:
-        """Both signals exist, and have one dimension.
-
-        Args:
-            before: what is known before the run.
-        """
+        """Both signals exist, and have one dimension."""
         super().prepare(before)
         before.demand_same_dimension(self.signal, self.reference)
         return self

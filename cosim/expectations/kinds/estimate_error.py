@@ -30,19 +30,11 @@ class ErrorExpectation(LimitedExpectation):
     of: Name | list[Name] | None = None
 
     def first_judged(self, before: Before) -> float:
-        """The start of the evaluation [s].
-
-        Args:
-            before: what is known before the run.
-        """
+        """The start of the evaluation [s]."""
         return max(before.start, before.report.evaluate_after)
 
     def prepare(self, before: Before) -> Self:
-        """The true value is known, and each observer estimates.
-
-        Args:
-            before: what is known before the run.
-        """
+        """The true value is known, and each observer estimates."""
         super().prepare(before)
         role, output, _ = ERRORS[self.check]
         if getattr(before.report, role) is None:

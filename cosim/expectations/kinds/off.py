@@ -23,11 +23,7 @@ class OffExpectation(WindowExpectation):
     threshold: float | None = None
 
     def prepare(self, before: Before) -> Self:
-        """The signal exists, and its threshold is known.
-
-        Args:
-            before: what is known before the run.
-        """
+        """The signal exists, and its threshold is known."""
         super().prepare(before)
         before.unit(self.signal)
         if self.threshold is not None:

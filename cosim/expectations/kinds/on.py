@@ -33,11 +33,7 @@ class OnExpectation(Expectation):
         return self
 
     def prepare(self, before: Before) -> Self:
-        """The signal exists, and its threshold is known.
-
-        Args:
-            before: what is known before the run.
-        """
+        """The signal exists, and its threshold is known."""
         before.demand_within("from", self.start)
         before.demand_within("before", self.before)
         before.unit(self.signal)

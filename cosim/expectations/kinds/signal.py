@@ -38,11 +38,7 @@ class SignalExpectation(WindowExpectation):
         return self
 
     def prepare(self, before: Before) -> Self:
-        """The signal exists.
-
-        Args:
-            before: what is known before the run.
-        """
+        """The signal exists."""
         super().prepare(before)
         before.unit(self.signal)
         return self

@@ -54,11 +54,7 @@ class TelegramsExpectation(WindowExpectation):
         return self
 
     def prepare(self, before: Before) -> Self:
-        """There are balises, and the receiver is told of them.
-
-        Args:
-            before: what is known before the run.
-        """
+        """There are balises, and the receiver is told of them."""
         super().prepare(before)
         if before.receivers is None:
             raise ScenarioError("this scenario has no balises; give it a table [balises]")

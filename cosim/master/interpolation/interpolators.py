@@ -105,50 +105,46 @@ class MeanInterpolator(InputInterpolator):
             self._inputs.send()
 
 
-class _DerivativeInterpolator(InputInterpolator):
-    """Sets value and first derivative at the start of the step (setRealInputDerivatives).
+class _BeginningInterpolator(InputInterpolator):
+    """Sets the values at the start of the step; `moving` are the inputs that do not stay there."""
 
-    Args:
-        hold: of the inputs. inputs: the connected inputs of the component. component: that receives them.
-    """
+    def __init__(self, hold: FirstOrderHold, inputs: Inputs) -> None:
+        super().__init__(hold, inputs)
+        self.moving = np.flatnonzero(hold.continuous)
+        self.names = [inputs.names[i] for i in self.moving]
+
+    def send(self, t: float, until: float) -> None:
+        self._inputs.buffer[:] = self.hold.at(t, begins=True)
+        self._inputs.send()
+
+
+class _DerivativeInterpolator(_BeginningInterpolator):
+    """Sets value and first derivative at the start of the step (setRealInputDerivatives)."""
 
     name = "derivatives"
 
     def __init__(self, hold: FirstOrderHold, inputs: Inputs, component: Component) -> None:
         super().__init__(hold, inputs)
-        self._moving = np.flatnonzero(hold.continuous)
-        names = [inputs.names[i] for i in self._moving]
-        self._write_slopes, self._slopes = component.make_derivative_writer(names)
+        self._write_slopes, self._slopes = component.make_derivative_writer(self.names)
 
     def send(self, t: float, until: float) -> None:
-        self._inputs.buffer[:] = self.hold.at(t, begins=True)
-        self._inputs.send()
-        self._slopes[:] = self.hold.slopes(t, until)[self._moving]
+        super().send(t, until)
+        self._slopes[:] = self.hold.slopes(t, until)[self.moving]
         self._write_slopes()
 
 
-class _IntermediateInterpolator(InputInterpolator):
-    """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate).
-
-    Args:
-        hold: of the inputs. inputs: the connected inputs of the component. component: that receives them.
-    """
+class _IntermediateInterpolator(_BeginningInterpolator):
+    """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate)."""
 
     name = "intermediate"
 
     def __init__(self, hold: FirstOrderHold, inputs: Inputs, component: FMI3Component) -> None:
         super().__init__(hold, inputs)
-        self._moving = np.flatnonzero(hold.continuous)
-        names = [inputs.names[i] for i in self._moving]
-        self._set_moving, self._now = component.writer(names)
-        self.taken = component.follow_within_step(names, self._set)
-
-    def send(self, t: float, until: float) -> None:
-        self._inputs.buffer[:] = self.hold.at(t, begins=True)
-        self._inputs.send()
+        self._set_moving, self._now = component.writer(self.names)
+        self.taken = component.follow_within_step(self.names, self._set)
 
     def _set(self, time: float) -> None:
-        self._now[:] = self.hold.at(time)[self._moving]
+        self._now[:] = self.hold.at(time)[self.moving]
         self._set_moving()
 
 

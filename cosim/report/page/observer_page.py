@@ -155,15 +155,7 @@ def write_benchmark(benchmark: BenchmarkScores, directory: str | Path) -> dict[s
 
 
 def _benchmark_page(benchmark: BenchmarkScores, picture: bytes) -> str:
-    """The page as text.
-
-    Args:
-        benchmark: scores of the observers.
-        picture: PNG of `_observers_picture`.
-
-    Returns:
-        The page.
-    """
+    """The page as text."""
     return render(
         "observers.html.j2",
         f"Observers on one run: {benchmark.spec.title}",
@@ -206,11 +198,7 @@ def _over_time(benchmark: BenchmarkScores) -> bytes | None:
 
 
 def _merged_result(benchmark: BenchmarkScores) -> Result | None:
-    """One result with the columns of all observers whose rows are at the same times as those of the first one.
-
-    Returns:
-        The result, or None where no run has rows.
-    """
+    """One result with the columns of all observers whose rows are at the same times as those of the first one."""
     columns: dict[str, np.ndarray] = {}
     first: Result | None = None
     signals = []

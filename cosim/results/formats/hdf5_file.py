@@ -66,11 +66,7 @@ class _GuardedFile:
         return len(view)
 
     def readinto(self, buffer: Any) -> int:
-        """Fill the buffer; what the disk did not take reads as zeros.
-
-        Args:
-            buffer: to be filled.
-        """
+        """Fill the buffer; what the disk did not take reads as zeros."""
         view = memoryview(buffer).cast("B")
         done = self._file.readinto(view) or 0
         while done < len(view) and (more := self._file.readinto(view[done:])):
