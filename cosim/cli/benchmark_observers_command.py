@@ -57,7 +57,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Compare, and write where that is asked for."""
+    """Compare, and write where the options ask for it."""
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)

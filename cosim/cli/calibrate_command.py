@@ -108,7 +108,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """The calibration, with picture and parameters written where they are asked for.
+    """The calibration, with picture and parameters written where the options ask for them.
 
     Raises:
         CosimError: nothing can be calibrated from this recording.

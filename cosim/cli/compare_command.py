@@ -74,7 +74,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Compare, and write what was asked for."""
+    """Compare, and write what the options ask for."""
     asked = asked_tolerances(options)  # before anything is read: a mistake in them is named at once
     comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
     parts = comparison_parts(comparison, verbose=options.verbose)

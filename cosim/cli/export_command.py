@@ -51,7 +51,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Read, choose, write; what was written and what the format does not keep."""
+    """Read, choose, write, as the options ask; what was written and what the format does not keep."""
     if is_package(str(options.target)):
         _refuse(options, "a scenario", "signals", "no_units", "trajectory")
         path = load_scenario(options).export_ssp(options.target, options.ssp_version or "2.0")

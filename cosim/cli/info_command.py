@@ -35,7 +35,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """The description."""
+    """The description of what the options name."""
     if is_package(options.what):
         package = ssp.describe_package(options.what)
         return Output([ssp.text_of_package(package)], package)

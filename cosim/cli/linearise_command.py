@@ -69,7 +69,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """The linearisation, written where that is asked for.
+    """The linearisation, written where the options ask for it.
 
     Raises:
         CosimError: the model cannot be linearised, or the file cannot be written.

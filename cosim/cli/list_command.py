@@ -32,7 +32,7 @@ ARGUMENTS = (argument("what", nargs="?", type=_what, default="all", help=f"{', '
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """The lists."""
+    """The lists that the options ask for."""
     if is_package(options.what):
         variants = ssp.list_variants(options.what)
         return Output(["variants:", pairs_table("variants", variants)], {"variants": variants})

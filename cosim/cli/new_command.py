@@ -33,7 +33,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Write the file; what was guessed."""
+    """Write the file that the options name; what was guessed."""
     target = options.out if options.out is not None else Path(f"{options.fmu.stem}.toml")
     made = write_starter(options.fmu, target, options.observer, force=options.force)
     next_step = f"written: {target}. Read the comments, then: cosim run {shlex.quote(str(target))}"

@@ -47,7 +47,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Read, draw and write; nothing in the results is changed."""
+    """Read, draw and write, as the options ask; nothing in the results is changed."""
     paths = [Path(text) for text in options.results]
     labels = _labels(options.labels, paths)
     results = [load_result(path) for path in paths]

@@ -49,7 +49,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Run again and compare."""
+    """Run again and compare, as the options ask."""
     settings = dict(parse_setting(setting) for setting in options.settings)
     bar = simulated_time_bar(silent=options.quiet or options.json)
     out = None if options.out is None else Path(options.out).absolute()

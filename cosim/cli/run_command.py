@@ -87,7 +87,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Run and write; everything computed is written also when the run fails."""
+    """Run and write, as the options ask; everything computed is written also when the run fails."""
     scenario = load_scenario(options)
     directory = (Path(options.out) if options.out is not None else Path("results") / scenario.name).absolute()
     check_writable(directory, scenario.table().report.tables)

@@ -20,7 +20,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """The structure, drawn where that is asked for."""
+    """The structure, drawn where the options ask for it."""
     structure = load_scenario(options).structure()
     files = {} if options.picture is None else {"picture": structure.draw(options.picture)}
     return Output(structure.tables(), structure.to_dict(), files)

@@ -57,7 +57,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Run, and write each run as soon as it is done."""
+    """Run, and write each run as soon as it is done, as the options ask."""
     scenario = load_scenario(options)
     sweep = _sweep(scenario, options)
     directory = check_writable(

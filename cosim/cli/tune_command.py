@@ -85,7 +85,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Search, and write."""
+    """Search and write, as the options ask."""
     scenario = load_scenario(options)
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"

@@ -46,7 +46,7 @@ FINDINGS_SHOWN, EVENTS_SHOWN, _FAILED_SHOWN = 4, 10, 40
 
 
 def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
-    """A comparison for people; see `comparison_parts`."""
+    """See `comparison_parts`; as one text."""
     return joined(comparison_parts(comparison, verbose))
 
 

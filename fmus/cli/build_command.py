@@ -82,7 +82,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Build what was asked for; the paths go to standard output, everything else to standard error.
+    """Build what the options ask for; the paths go to standard output, everything else to standard error.
 
     Raises:
         ValueError, LookupError, OSError, RuntimeError, TypeError: a mistake of the user.

@@ -42,7 +42,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Check a file.
+    """Check a file, as the options ask.
 
     Raises:
         ValueError, OSError: the file cannot be checked, or a mistake of the user; the program ends with 2 then.

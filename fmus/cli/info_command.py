@@ -19,7 +19,7 @@ ARGUMENTS = (argument("file", type=Path, metavar="FILE"),)
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """What the file says, and its problems.
+    """What the file of the options says, and its problems.
 
     Raises:
         FileNotFoundError: there is no such file.

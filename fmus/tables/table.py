@@ -67,17 +67,17 @@ class Column:
 
 
 def name_column(key: str, heading: str = "", meaning: str = "", **more: Any) -> Column:
-    """A column that says what its rows are about; see `Column`."""
+    """See `Column`; one that says what its rows are about."""
     return Column(key, heading, "", meaning, "name", **more)
 
 
 def text_column(key: str, heading: str = "", meaning: str = "", **more: Any) -> Column:
-    """A column of texts; see `Column`."""
+    """See `Column`; one of texts."""
     return Column(key, heading, "", meaning, "text", **more)
 
 
 def error_column(key: str, heading: str, unit: str, meaning: str = "", **more: Any) -> Column:
-    """A column of sizes of errors, of which an infinite one reads ``diverged``; see `Column`."""
+    """See `Column`; one of sizes of errors, of which an infinite one reads ``diverged``."""
     return Column(key, heading, unit, meaning, write=error_number, **more)
 
 
