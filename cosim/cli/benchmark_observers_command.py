@@ -31,7 +31,7 @@ PARSER = {
         " slip detection, certificates and cost."
     ),
     "epilog": (
-        "Exit codes: 0 done, 1 an observer failed or could not be coupled, 2 error or interrupted; what was judged"
+        "Exit codes: 0 done, 1 an observer failed or could not be coupled, 2 error or interrupted; what was evaluated"
         " is printed."
     ),
 }

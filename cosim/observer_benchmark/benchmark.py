@@ -1,27 +1,27 @@
-"""Comparison of observers: one recorded run of the plant side, played back to each observer in turn."""
+"""Comparison of observers: one recorded run of the plant side, played back to all of them."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from cosim.balises.recorded import read_layout
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
 from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
+from cosim.observer_benchmark.observer_runs import ObserverRun, ObserverRuns
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
-from cosim.observer_benchmark.playback import ScenarioParts, find_parts, playback_scenario, recording_scenario
+from cosim.observer_benchmark.playback import ScenarioParts, find_parts, recording_scenario
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import write_results
 from cosim.run.certificates import check_certificates
-from cosim.run.expected_gaps import expected_gap
+from cosim.run.expected_gaps import ExpectedGap, expected_gap
 from cosim.run.layouts import make_layout
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.run.run_seeds import with_seeds
@@ -62,7 +62,7 @@ def benchmark_observers(
     progress: Progress | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> ObserverBenchmark:
-    """Run the plant side of a scenario once and play it back to several observers, each alone.
+    """Run the plant side of a scenario once and play it back to several observers, all of them beside one recording.
 
     Args:
         scenario: with or without observers of its own.
@@ -71,7 +71,8 @@ def benchmark_observers(
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
         recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
             run.
-        repeat: runs of each observer; the cost per step is the median of them.
+        repeat: runs of each observer; the cost per step is the median of them. In each run it is the time in the calls
+            of the observer, also where others are in the same run.
         progress: called with what is done now, the number done and the number in all.
         warn: receives what is doubtful about the recorded run.
 
@@ -90,21 +91,54 @@ def benchmark_observers(
         raise ScenarioError(f"{scenario.where}: no observer fits this scenario. " + " ".join(notes))
     report = progress or (lambda _what, _done, _all: None)
     total = len(candidates) * repeat + 1
-    with ExitStack() as stack:
+    with tempfile.TemporaryDirectory() as scratch:
         report("recording", 0, total)
-        folder = Path(recorded) if recorded is not None else None
-        if folder is None:
-            folder = Path(record) if record is not None else Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        folder = Path(recorded or record or scratch)
+        if recorded is None:
             _record(recording_scenario(scenario, parts), folder, warn, keep=record is not None)
-        notes = [*_loop_notes(parts, load_result(folder)), *notes]
-        judge = _Judge(scenario, parts, folder, repeat, lambda what, done: report(what, done + 1, total))
-        scores = judge.scores(candidates)
-        interrupted = len(scores) < len(candidates)
-        if interrupted:
-            notes.append(f"Interrupted; not judged: {', '.join(c.name for c in candidates[len(scores) :])}.")
+        runs = ObserverRuns(
+            scenario, parts, folder, repeat, lambda what, done: report(what, min(done + 1, total), total)
+        )
+        interrupted = _run(runs, candidates)
+        result = load_result(folder)
         report("done", total, total)
-    spec = _spec_of_all(parts.table.title, judge.outcomes.values())
-    return ObserverBenchmark(scenario.name, spec, tuple(scores), tuple(notes), judge.steps, judge.outcomes, interrupted)
+    evaluation = _Evaluation.of(scenario, parts, result)
+    scores = _scores(evaluation, candidates, runs.found)
+    notes = [*_loop_notes(parts, result), *notes, *(_left_out(candidates, scores) if interrupted else ())]
+    outcomes = {name: run.outcome for name, run in runs.found.items() if run.outcome is not None}
+    spec, steps = _spec_of_all(parts.table.title, outcomes.values()), _steps(parts)
+    return ObserverBenchmark(scenario.name, spec, scores, tuple(notes), steps, outcomes, interrupted)
+
+
+def _left_out(candidates: Sequence[BenchmarkCandidate], scores: Sequence[ObserverScore]) -> list[str]:
+    """What is missing after an interruption, in words."""
+    known = {score.name for score in scores}
+    missing = ", ".join(c.name for c in candidates if c.name not in known)
+    return [f"Interrupted; not evaluated: {missing}." if missing else "Interrupted; the cost is that of fewer runs."]
+
+
+def _run(runs: ObserverRuns, candidates: Sequence[BenchmarkCandidate]) -> bool:
+    """Run all that fit; whether somebody interrupted.
+
+    Raises:
+        KeyboardInterrupt: somebody did before the first run was done.
+    """
+    try:
+        runs.run([candidate for candidate in candidates if not candidate.misfit])
+    except KeyboardInterrupt:
+        if not runs.found:
+            raise
+        return True
+    return False
+
+
+def _scores(
+    evaluation: _Evaluation, candidates: Sequence[BenchmarkCandidate], runs: Mapping[str, ObserverRun]
+) -> tuple[ObserverScore, ...]:
+    """Scores of the observers that were run, and of those that cannot be, in the order of the candidates."""
+    misfits = {c.name: ObserverRun(refusal=c.misfit) for c in candidates if c.misfit}
+    known = {**runs, **misfits}
+    return tuple(evaluation.score(c, known[c.name]) for c in candidates if c.name in known)
 
 
 def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
@@ -115,7 +149,7 @@ def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
 
 def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None, *, keep: bool) -> None:
     """Run the plant side and write it; where the folder is kept, also what a run left that did not end."""
-    outcome = scenario.run(warn=warn or _ignore)
+    outcome = scenario.run(warn=warn or (lambda _text: None))
     if keep or outcome.failure is None:
         write_results(outcome.result, folder, ("csv", "npy") if keep else ("npy",))
     if outcome.failure == INTERRUPTED:
@@ -131,9 +165,9 @@ def _loop_notes(parts: ScenarioParts, recording: Result) -> list[str]:
         names = ", ".join(parts.acting)
         notes.append(
             f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer "
-            "only listens to that run. What the train would do with another one in the loop is not told."
+            "only listens to that run. What the train would do with another one in the loop is not known."
         )
-    steps = step_count(parts.table.start, parts.table.stop, parts.table.step)
+    steps = _steps(parts)
     if len(recording.time) < steps + 1:
         notes.append(
             f"The recording has {len(recording.time)} rows for {steps} steps; inputs between them are interpolated, "
@@ -142,89 +176,62 @@ def _loop_notes(parts: ScenarioParts, recording: Result) -> list[str]:
     return notes
 
 
-# -- judging ----------------------------------------------------------------------------------------------------------
+def _steps(parts: ScenarioParts) -> int:
+    return step_count(parts.table.start, parts.table.stop, parts.table.step)
 
 
-class _Judge:
-    """Runs observers one by one beside a recording."""
+# -- scores -----------------------------------------------------------------------------------------------------------
 
-    def __init__(
-        self, scenario: Scenario, parts: ScenarioParts, folder: Path, repeat: int, report: Callable[[str, int], None]
-    ) -> None:
-        self.scenario, self.parts, self.folder, self.repeat, self.report = scenario, parts, folder, repeat, report
-        table = parts.table
-        self.steps = step_count(table.start, table.stop, table.step)
-        self.outcomes: dict[str, Outcome] = {}
-        self._expected, self._seen = self._gaps()
 
-    def scores(self, candidates: Sequence[BenchmarkCandidate]) -> list[ObserverScore]:
-        """The scores of all, or, where somebody interrupts, of those that are judged by then.
+@dataclass(frozen=True)
+class _Evaluation:
+    """Makes scores of what the runs left.
 
-        Raises:
-            KeyboardInterrupt: none is.
-        """
-        found: list[ObserverScore] = []
-        try:
-            for candidate in candidates:
-                found.append(self.score(candidate, len(found) * self.repeat))
-        except KeyboardInterrupt:
-            if not found:
-                raise
-        return found
+    Args:
+        scenario: that was recorded. parts: of it. expected: gap to expect [s]; None without balises.
+        seen: longest gap in the recording [s], or None.
+    """
 
-    def score(self, candidate: BenchmarkCandidate, done: int) -> ObserverScore:
+    scenario: Scenario
+    parts: ScenarioParts
+    expected: ExpectedGap | None
+    seen: float | None
+
+    @classmethod
+    def of(cls, scenario: Scenario, parts: ScenarioParts, recorded: Result) -> Self:
+        """The gaps to expect from a scenario, and the longest one in the recording."""
+        table = with_seeds(parts.table)
+        if table.balises is None:
+            return cls(scenario, parts, None, None)
+        layout = make_layout(table.balises, table.start, table.stop, scenario.folder, scenario.where)
+        events = [e for e in recorded.events if table.start < e.stamp <= table.stop]
+        return cls(scenario, parts, expected_gap(layout, table.balises, table.start), longest_gap(events, table.start))
+
+    def score(self, candidate: BenchmarkCandidate, run: ObserverRun) -> ObserverScore:
         """The score of one observer; one that fails has the reason in it."""
-        labelled = {
-            "label": candidate.table.label or candidate.name,
+        name, outcome = candidate.name, run.outcome
+        known: dict[str, Any] = {
+            "label": candidate.table.label or name,
             "model": candidate.model,
             "origin": candidate.origin,
-        }
-        known: dict[str, Any] = labelled | {
             "settings": candidate.settings,
-            "in_loop": candidate.name in self.parts.acting,
+            "in_loop": name in self.parts.acting,
             "certificate": self._certificate(candidate),
         }
-        if candidate.misfit:
-            return ObserverScore(candidate.name, failure=f"cannot be coupled: {candidate.misfit}", **known)
-        try:
-            return self._run(candidate, done, known)
-        except CosimError as error:
-            return ObserverScore(candidate.name, failure=f"cannot be coupled: {error}", **known)
-
-    def _run(self, candidate: BenchmarkCandidate, done: int, known: dict[str, Any]) -> ObserverScore:
-        name = candidate.name
-        scenario = playback_scenario(self.scenario, self.parts, self.folder, name, candidate.table, candidate.sources)
-        costs = []
-        for again in range(self.repeat):
-            self.report(candidate.table.label or name, done + again)
-            outcome = scenario.run(warn=_ignore)
-            if outcome.failure == INTERRUPTED:
-                raise KeyboardInterrupt
-            reached = max(
-                round((outcome.result.summary["reached"] - self.parts.table.start) / self.parts.table.step), 1
-            )
-            costs.append(_MICROSECONDS * outcome.result.summary["seconds"][name] / reached)
-        self.outcomes[name] = outcome
+        if outcome is None:
+            return ObserverScore(name, failure=f"cannot be coupled: {run.refusal}", **known)
         kind = next(c["kind"] for c in outcome.result.summary["components"] if c["name"] == name)
         scores = measured(outcome.result, outcome.spec, name)
         failure = outcome.failure or divergence(scores.get("whole"), largest_tolerable(outcome.result, outcome.spec))
-        return ObserverScore(name, failure=failure, costs=tuple(costs), kind=kind, **known, **scores)
-
-    def _gaps(self) -> tuple[Any, float | None]:
-        """Gap to expect from the scenario, and the longest one told in the recording."""
-        table = with_seeds(self.parts.table)
-        if table.balises is None:
-            return None, None
-        layout = make_layout(table.balises, table.start, table.stop, self.scenario.folder, self.scenario.where)
-        events = [e for e in read_layout(self.folder).records if table.start < e.stamp <= table.stop]
-        return expected_gap(layout, table.balises, table.start), longest_gap(events, table.start)
+        costs = tuple(_MICROSECONDS * cost for cost in run.costs)
+        return ObserverScore(name, failure=failure, costs=costs, kind=kind, **known, **scores)
 
     def _certificate(self, candidate: BenchmarkCandidate) -> CertifiedGap | None:
-        if self._expected is None or candidate.table.observer is None:
+        if self.expected is None or candidate.table.observer is None:
             return None
         try:
             found, _ = check_certificates(
-                {candidate.name: candidate.table}, {candidate.name: self._expected}, "warn", self.scenario.where
+                {candidate.name: candidate.table}, {candidate.name: self.expected}, "warn", self.scenario.where
             )
         except (CosimError, ValueError, ArithmeticError):
             return None  # parameters that cannot be: the run of this observer says so
@@ -232,8 +239,4 @@ class _Judge:
             return None
         limit = found[candidate.name]["certified_up_to"]
         # plain data have None for an infinite limit
-        return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
-
-
-def _ignore(_text: str) -> None:
-    """What is doubtful about an observer stands in its score."""
+        return CertifiedGap(inf if limit is None else limit, self.expected.seconds, self.seen)

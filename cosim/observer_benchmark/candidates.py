@@ -1,5 +1,5 @@
-"""Who takes part in a comparison of observers: those of the scenario, shipped ones, those of a script; and what each is
-told of the train. Runs nothing.
+"""Who takes part in a comparison of observers: those of the scenario, shipped ones, those of a script; and what each
+knows of the train. Runs nothing.
 """
 
 from __future__ import annotations
@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import fmu_observer
-from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError, nearest
 from cosim.observer_benchmark.playback import (
     SHARED_PARAMETERS,
+    Listener,
     ScenarioParts,
     settable,
-    shared_parameters,
     train_observers,
 )
 from cosim.run.balise_service import BALISE_EVENT
@@ -31,8 +30,8 @@ OPTIONAL = {"odometer_fault"}
 
 
 @dataclass(frozen=True)
-class BenchmarkCandidate:
-    """An observer to be judged.
+class BenchmarkCandidate(Listener):
+    """An observer to be evaluated.
 
     Args:
         name: in the benchmark. table: how it is made. sources: where its inputs come from.
@@ -40,9 +39,6 @@ class BenchmarkCandidate:
             empty.
     """
 
-    name: str
-    table: ComponentTable
-    sources: Mapping[str, Link]
     origin: str
     settings: tuple[str, ...] = ()
     misfit: str = ""
@@ -56,7 +52,7 @@ class BenchmarkCandidate:
 def find_candidates(
     scenario: Scenario, parts: ScenarioParts, names: Sequence[Any] | None
 ) -> tuple[list[BenchmarkCandidate], list[str]]:
-    """The observers to be judged, and notes on what was assumed and left out.
+    """The observers to be evaluated, and notes on what was assumed and left out.
 
     Args:
         scenario: for messages. parts: of it. names: those asked for; None for all that fit.
@@ -66,7 +62,7 @@ def find_candidates(
     """
     if names is not None:
         asked = {name if isinstance(name, str) else id(name): name for name in names}
-        found = _told_apart([_named(scenario, parts, name) for name in asked.values()])
+        found = _distinct([_named(scenario, parts, name) for name in asked.values()])
         return found, [f"{c.name}: {text}" for c in found for text in c.settings]
     own = [_own(parts, name) for name in parts.observers]
     used = {parts.table.components[name].observer for name in parts.observers}
@@ -77,7 +73,7 @@ def find_candidates(
     return found, [*(f"{c.name}: {text}" for c in found for text in c.settings), *left_out]
 
 
-def _told_apart(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandidate]:
+def _distinct(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandidate]:
     """Candidates of which no two have one name: two instances of a class, say."""
     names = [candidate.name for candidate in candidates]
     earlier = [names[:place].count(name) for place, name in enumerate(names)]
@@ -106,17 +102,16 @@ def _own(parts: ScenarioParts, name: str) -> BenchmarkCandidate:
 
 def _shipped(parts: ScenarioParts, model: str) -> BenchmarkCandidate:
     """An observer with its own defaults and what the scenario says of the train."""
-    said = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
-    table = ComponentTable.model_validate({"observer": model, **said})
+    own = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
+    table = ComponentTable.model_validate({"observer": model, **own})
     system = make_declared(table, model)
     name = model.rpartition(":")[2].replace(".", "_")
     parameters = {s.name for s in settable(system)}
-    untold = parameters - table.parameters.keys()
-    shared = {name: known for name, known in shared_parameters(parts).items() if name in untold}
+    unset = parameters - table.parameters.keys()
+    shared = {name: known for name, known in parts.shared_parameters.items() if name in unset}
     values = {name: value for name, (value, _) in shared.items()}
     table = table.model_copy(update={"parameters": {**table.parameters, **values}})
-    template = parts.template()
-    sources = {s.name: template[s.name] for s in system.inputs if s.name in template}
+    sources = {s.name: parts.template[s.name] for s in system.inputs if s.name in parts.template}
     unique = name if name not in parts.table.components else f"{name}_with_defaults"
     settings = (_assumed(system, shared),) if parameters & set(SHARED_PARAMETERS) else ()
     return BenchmarkCandidate(unique, table, sources, "defaults", settings, _misfit(parts, system, sources))
@@ -131,8 +126,8 @@ def _assumed(system: Any, shared: Mapping[str, tuple[float, str]]) -> str:
         if f in units and f not in shared
     )
     return (
-        f"not set in the scenario, gains at their defaults; told {given or 'nothing of the train'}; assumed "
-        f"{rest or 'nothing'}."
+        f"not set in the scenario, gains at their defaults; from the scenario: {given or 'nothing of the train'}; "
+        f"assumed: {rest or 'nothing'}."
     )
 
 

@@ -44,7 +44,7 @@ class CertifiedGap:
     """What the gains are certified for, beside the gaps of the run.
 
     Args:
-        limit: gaps that vary are certified up to here [s], or were found stable as far as was looked; infinite where
+        limit: gaps that vary are certified up to here [s], or were found stable up to there; infinite where
             every gap is; None where that is not known.
         expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
             [s].
@@ -218,7 +218,7 @@ def telegram_outcomes(events: Sequence[BaliseRecord], name: str) -> dict[str, in
 
 
 def longest_gap(events: Sequence[BaliseRecord], start: float) -> float | None:
-    """Longest time between two balises that were told, or from the start to the first one [s]; None without any.
+    """Longest time between two balises that were read, or from the start to the first one [s]; None without any.
 
     Args:
         events: the telegrams.

@@ -1,5 +1,4 @@
-"""A scenario in two halves: the plant side, to be recorded once, and observers that listen to the recording. Runs
-nothing.
+"""A scenario in two halves: the plant side, to be recorded once, and observers beside the recording. Runs nothing.
 
 Plant side is every component that is no observer, what observers listen to, and whatever acts on those: an observer in
 the loop belongs to it too.
@@ -7,8 +6,9 @@ the loop belongs to it too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,32 @@ from plant_models.hybrid import Signal
 _ESTIMATES = ("position", "speed")
 _PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
 """Keys of the master table that matter to an observer that only listens: when its inputs reach it, and how."""
+SHARED_PARAMETERS = (
+    "mass",
+    "davis_a",
+    "davis_b",
+    "davis_c",
+    "wheel_radius",
+    "wheel_inertia",
+    "n_axles",
+    "estimated_position",
+    "estimated_speed",
+)
+"""What every train observer knows of the train, and where it believes it to start."""
+
+
+@dataclass(frozen=True)
+class Listener:
+    """An observer beside a recording.
+
+    Args:
+        name: of it; not that of a component of the plant side it listens to. table: how it is made.
+        sources: where its inputs come from.
+    """
+
+    name: str
+    table: ComponentTable
+    sources: Mapping[str, Link]
 
 
 @dataclass(frozen=True)
@@ -62,6 +88,32 @@ class ScenarioParts:
         before = _ancestors([train], self.links, self.table.components)
         return tuple(name for name in self.in_loop if name in before)
 
+    @cached_property
+    def shared_parameters(self) -> Mapping[str, tuple[float, str]]:
+        """What the scenario says of the train that an observer should know too: value, and who says so.
+
+        What its own observers, as far as they want to know it, agree on comes first; then parameters and
+        preset of the plant.
+        """
+        found: dict[str, tuple[float, str]] = {}
+        tables = [self.table.components[name] for name in self.observers]
+        settables = [
+            set(SHARED_PARAMETERS) if t.observer is None else {s.name for s in settable(make_declared(t, ""))}
+            for t in tables
+        ]
+        for parameter in SHARED_PARAMETERS:
+            wanting = [table for table, known in zip(tables, settables, strict=True) if parameter in known]
+            stated = [table.parameters.get(parameter) for table in wanting]
+            values = {value for value in stated if isinstance(value, int | float) and not isinstance(value, bool)}
+            if len(values) == 1 and None not in stated:
+                found[parameter] = float(values.pop()), "as for the observers of the scenario"
+        plant = "" if self.table.balises is None else (self.table.balises.position or "").partition(".")[0]
+        plant = plant or (self.table.report.true_speed or "").partition(".")[0]
+        if plant in self.table.components:
+            for parameter, value in _plant_values(self.table.components[plant]).items():
+                found.setdefault(parameter, (value, f"as for {plant}"))
+        return found
+
     def sources(self, name: str) -> dict[str, Link]:
         """Where the inputs of a component come from.
 
@@ -70,7 +122,8 @@ class ScenarioParts:
         """
         return {target.partition(".")[2]: link for link in self.links if (target := link[1]).partition(".")[0] == name}
 
-    def template(self) -> dict[str, Link]:
+    @cached_property
+    def template(self) -> Mapping[str, Link]:
         """Where an input of this name comes from in this scenario: as for its observers, else as for the plant side."""
         found: dict[str, Link] = {}
         odometer = self.table.report.odometer or (
@@ -155,51 +208,74 @@ def recording_scenario(scenario: Scenario, parts: ScenarioParts) -> Scenario:
 
 
 def playback_scenario(
-    scenario: Scenario,
-    parts: ScenarioParts,
-    folder: Path,
-    name: str,
-    observer: ComponentTable,
-    sources: Mapping[str, Link],
+    scenario: Scenario, parts: ScenarioParts, folder: Path, listeners: Sequence[Listener]
 ) -> Scenario:
-    """One observer beside the recording.
+    """Observers beside the recording.
 
     Args:
         scenario: that was recorded. parts: of it. folder: with the results of the plant side.
-        name: of the observer; not that of a component of the plant side it listens to. observer: its table.
-        sources: where its inputs come from.
+        listeners: the observers; none has the name of a component that another one needs, see `needed_components`.
+
+    Raises:
+        ScenarioError: an observer listens to itself.
     """
-    table = parts.table
-    report, balises = _roles(table, [name]), table.balises
-    used = [link[0] for link in sources.values()] + [value for value in report.values() if isinstance(value, str)]
-    watched = {} if balises is None else {k: v for k in ("position", "speed") if (v := getattr(balises, k)) is not None}
-    network = table.network
-    if network is not None and network.receivers is not None and name not in network.receivers:
-        network = None
-    used += [*watched.values(), *(network.signals if network is not None else ())]
-    components = _recordings(parts, folder, name, used)
+    table, names = parts.table, [listener.name for listener in listeners]
+    balises, network = table.balises, _network_of(parts, names)
     data: dict[str, Any] = {
-        "title": f"{table.title}: {observer.label or name}",
+        "title": ": ".join([table.title, *(one.table.label or one.name for one in listeners if len(names) == 1)]),
         **{key: getattr(table, key) for key in ("start", "stop", "step", "seed")},
         "certificates": "ignore",
-        "components": components | {name: _table(observer)},
-        "connections": [connection(link, f"{name}.{signal}") for signal, link in sources.items()],
+        "components": _recordings(parts, folder, listeners) | {one.name: _table(one.table) for one in listeners},
+        "connections": [
+            connection(link, f"{one.name}.{signal}") for one in listeners for signal, link in one.sources.items()
+        ],
         "master": _played_master(table),
-        "report": report,
+        "report": _roles(table, names),
     }
     if balises is not None:
+        watched = {key: value for key in _ESTIMATES if (value := getattr(balises, key)) is not None}
         data["balises"] = watched | {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
-    if network is not None:
-        data["network"] = {**_table(network), "receivers": [name]}
+    if network:
+        data["network"] = network
     return _scenario(scenario, data)
 
 
-def _recordings(parts: ScenarioParts, folder: Path, name: str, used: Iterable[str]) -> dict[str, Any]:
-    """A recording in place of each component whose signals are used, but for the observer itself."""
-    wanted = dict.fromkeys(signal.partition(".")[0] for signal in used)
-    if name in wanted and name in parts.in_loop:
-        raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
-    return {n: {"recording": str(folder.resolve()), "component": n} for n in wanted if n != name}
+def needed_components(parts: ScenarioParts, listener: Listener) -> list[str]:
+    """Names of the recorded components that an observer needs beside it.
+
+    Args:
+        parts: of the scenario.
+
+    Raises:
+        ScenarioError: it listens to itself.
+    """
+    table = parts.table
+    used = [link[0] for link in listener.sources.values()]
+    used += [value for value in _roles(table, [listener.name]).values() if isinstance(value, str)]
+    used += [v for key in _ESTIMATES if table.balises is not None and (v := getattr(table.balises, key)) is not None]
+    used += _network_of(parts, [listener.name]).get("signals", [])
+    wanted = list(dict.fromkeys(signal.partition(".")[0] for signal in used))
+    if listener.name in wanted and listener.name in parts.in_loop:
+        raise ScenarioError(f"{listener.name}: listens to itself; a recording cannot take its place.")
+    return [name for name in wanted if name != listener.name]
+
+
+def is_over_network(parts: ScenarioParts, name: str) -> bool:
+    """Whether measurements reach an observer of this name over the network of the scenario."""
+    network = parts.table.network
+    return network is not None and (network.receivers is None or name in network.receivers)
+
+
+def _network_of(parts: ScenarioParts, names: Iterable[str]) -> dict[str, Any]:
+    """The network table for these observers; empty where it reaches none of them."""
+    reached = [name for name in names if is_over_network(parts, name)]
+    return {**_table(parts.table.network), "receivers": reached} if reached else {}
+
+
+def _recordings(parts: ScenarioParts, folder: Path, listeners: Iterable[Listener]) -> dict[str, Any]:
+    """A recording in place of each component whose signals are used."""
+    wanted = [name for listener in listeners for name in needed_components(parts, listener)]
+    return {name: {"recording": str(folder.resolve()), "component": name} for name in wanted}
 
 
 def _played_master(table: ScenarioTable) -> dict[str, Any]:
@@ -264,19 +340,6 @@ def _table(table: Any) -> dict[str, Any]:
 
 # -- observers --------------------------------------------------------------------------------------------------------
 
-SHARED_PARAMETERS = (
-    "mass",
-    "davis_a",
-    "davis_b",
-    "davis_c",
-    "wheel_radius",
-    "wheel_inertia",
-    "n_axles",
-    "estimated_position",
-    "estimated_speed",
-)
-"""What every train observer knows of the train, and where it believes it to start."""
-
 
 def train_observers() -> dict[str, type[GatedObserver]]:
     """The shipped train observers by name: they receive balises and say position and speed."""
@@ -287,37 +350,6 @@ def train_observers() -> dict[str, type[GatedObserver]]:
         and issubclass(kind, GatedObserver)
         and {signal.name for signal in kind.outputs}.issuperset(_ESTIMATES)
     }
-
-
-def shared_parameters(parts: ScenarioParts) -> dict[str, tuple[float, str]]:
-    """What the scenario says of the train that an observer should know too: value, and who says so.
-
-    What its own observers, as far as they want to know it, agree on comes first; then parameters and
-    preset of the plant.
-
-    Args:
-        parts: the plant side and the observers, from `find_parts`.
-    """
-    found: dict[str, tuple[float, str]] = {}
-    for parameter in SHARED_PARAMETERS:
-        wanting = [parts.table.components[n] for n in parts.observers if _wants(parts.table.components[n], parameter)]
-        stated = [table.parameters.get(parameter) for table in wanting]
-        values = {value for value in stated if isinstance(value, int | float) and not isinstance(value, bool)}
-        if len(values) == 1 and None not in stated:
-            found[parameter] = float(values.pop()), "as for the observers of the scenario"
-    plant = "" if parts.table.balises is None else (parts.table.balises.position or "").partition(".")[0]
-    plant = plant or (parts.table.report.true_speed or "").partition(".")[0]
-    if plant in parts.table.components:
-        for parameter, value in _plant_values(parts.table.components[plant]).items():
-            found.setdefault(parameter, (value, f"as for {plant}"))
-    return found
-
-
-def _wants(table: ComponentTable, parameter: str) -> bool:
-    """Whether an observer has a parameter or start value of this name; of one that does not say: yes."""
-    if table.observer is None:
-        return True
-    return parameter in {signal.name for signal in settable(make_declared(table, ""))}
 
 
 def settable(system: Any) -> tuple[Signal, ...]:

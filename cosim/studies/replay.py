@@ -1,4 +1,4 @@
-"""Replay: one observer of a run again over what it heard, many members with parameters of their own at once.
+"""Replay: one observer of a run again over its inputs, many members with parameters of their own at once.
 
 The plant does not run: the recorded signals are the inputs. Tuning needs this, hundreds of candidates on one recording.
 """
@@ -37,7 +37,7 @@ class Replay:
 
     Each input has at each communication point the value that the master gave it: of the end of the step where its
     signal is fresh, of the start where it is held (see `cosim show`). A member with the parameters of the run computes
-    what the observer computed in it, bit for bit; that is looked at first.
+    what the observer computed in it, bit for bit; that is checked first.
 
     Args:
         outcome: of a run of a scenario, every communication point recorded.
@@ -95,7 +95,7 @@ class Replay:
         batch.start(float(self.instants[0]))
         return batch.run(self.instants[1:], results, self._moved(late or {}), progress)
 
-    def heard(self) -> np.ndarray:
+    def inputs(self) -> np.ndarray:
         """Inputs as the observer had them at each communication point, in the order of its scalar inputs; those that
         nothing is connected to have their start values.
 

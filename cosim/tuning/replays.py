@@ -1,4 +1,4 @@
-"""Candidates as members of one batch over what the observer heard: no master steps, the numbers are those of a run."""
+"""Candidates as members of one batch over the inputs of an observer: the numbers of runs, without a master."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Replays:
     def outcomes(self, candidates: Sequence[Mapping[str, Any]]) -> Iterator[Outcome | str]:
         """What the run would have been with each candidate, or why it would have failed.
 
-        A result shares its table with the next one, so it is looked at before the next is asked for.
+        A result shares its table with the next one, so it is read before the next is asked for.
 
         Args:
             candidates: settings by name, of parameters of the observer.

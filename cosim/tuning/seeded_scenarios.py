@@ -47,8 +47,7 @@ class Seeded:
         """
         if self.parts is None or self.candidate is None:
             return self.whole
-        name = self.candidate.name
-        played = playback_scenario(self.whole, self.parts, folder, name, self.candidate.table, self.candidate.sources)
+        played = playback_scenario(self.whole, self.parts, folder, [self.candidate])
         there = played.table().components
         for other in dict.fromkeys(signal.partition(".")[0] for signal in cost.signals):
             if other not in there and other in self.parts.plant:

@@ -1,4 +1,4 @@
-"""Exact gradients of the likelihood cost: by the traced equations of the filter over what it heard, where that is
+"""Exact gradients of the likelihood cost: by the traced equations of the filter over its inputs, where that is
 possible; else the reason why differences take their place.
 """
 
@@ -91,11 +91,11 @@ def _samples(replay: Replay, values: Mapping[str, float]) -> Array:
     if len(periodic) != 1 or periodic[0].noises:
         raise NoSlopesError(f"{replay.system.name} is not sampled by one periodic event without random numbers")
     (event,) = periodic
-    instants, heard = replay.instants, replay.heard()
+    instants, inputs = replay.instants, replay.inputs()
     first = instants[0] + (values[event.offset] if event.offset else 0.0)
     count = int(np.floor((instants[-1] - first) / values[event.period] + INSTANT)) + 1
     wanted = first + values[event.period] * np.arange(count)
     places = np.clip(np.searchsorted(instants, wanted - INSTANT), 0, len(instants) - 1)
     if np.abs(instants[places] - wanted).max() > INSTANT:
         raise NoSlopesError(f"{replay.system.name} is sampled between communication points")
-    return np.asarray(heard[places])
+    return np.asarray(inputs[places])

@@ -114,7 +114,7 @@ def searches(drive: Drive, method: Method, seeds: Sequence[int]) -> list[Search]
 
 def likelihood(drive: Drive) -> AccumulatedOutput:
     """Log-likelihood of the innovations over the record, with its gradient by the six variances."""
-    return AccumulatedOutput(drive.replay.system, drive.replay.heard(), NAMES)
+    return AccumulatedOutput(drive.replay.system, drive.replay.inputs(), NAMES)
 
 
 def gradient_searches(drive: Drive, seeds: Sequence[int]) -> list[Search]:

@@ -44,7 +44,7 @@ def main() -> None:
         took = seconds(lambda optimiser=optimiser: minimise(optimiser, cost, 20))  # type: ignore[misc]
         each = 1e3 * took / optimiser.evaluations
         print(f"{name}: {optimiser.evaluations} candidates over {len(true)} samples {took:.2f} s, {each:.1f} ms each")
-    told = AccumulatedOutput(replay.system, replay.heard(), NAMES)
+    told = AccumulatedOutput(replay.system, replay.inputs(), NAMES)
     print(
         f"likelihood and its gradient over {len(true)} samples: {seconds(lambda: told([1e-3] * 4 + [0.1] * 2)):.3f} s"
     )

@@ -164,7 +164,8 @@ def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, leve
 
 def _is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = _POINTWISE) -> np.ndarray:
     """Which samples lie inside the band of one, shape (rows,)."""
-    low, high = (quantile(degrees, share) for share in _tails(level))
+    few, place = np.unique(degrees, return_inverse=True)  # of mostly equal ones, each of which takes microseconds
+    low, high = (quantile(few, share)[place] for share in _tails(level))
     return np.asarray((squares >= low) & (squares <= high))
 
 

@@ -6,12 +6,15 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from small_scenarios import small
 
 from cosim import Scenario
@@ -31,7 +34,7 @@ from cosim.observer_benchmark.observer_scores import (
     telegram_outcomes,
 )
 from cosim.observer_benchmark.observer_table import observer_table
-from cosim.observer_benchmark.playback import find_parts, shared_parameters, train_observers
+from cosim.observer_benchmark.playback import find_parts, train_observers
 from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
@@ -75,8 +78,7 @@ def test_an_instance_takes_part_as_it_is() -> None:
     given.hidden = 0.5
     found = benchmark_observers(two(), [given, Constant])
     assert found.failed == []
-    first, second = found.outcomes.values()
-    assert (first.result.table[-1][-1], second.result.table[-1][-1]) == (3.5, 0.0)
+    assert [outcome[f"{name}.speed"][-1] for name, outcome in found.outcomes.items()] == [3.5, 0.0]
 
 
 # -- the numbers of the run
@@ -208,11 +210,11 @@ def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
 
 def test_facts_come_from_the_observers_where_they_agree_else_from_the_plant() -> None:
     scenario = two().set("observer.mass", 80e3).set("locomotive.davis_b", 30.0).set("locomotive.mass", 95e3)
-    facts = shared_parameters(find_parts(scenario))
+    facts = find_parts(scenario).shared_parameters
     assert facts["mass"] == (80e3, "as for the observers of the scenario")
     assert facts["davis_b"] == (30.0, "as for locomotive")
     assert "wheel_radius" not in facts
-    assert shared_parameters(find_parts(scenario.set("uio.mass", 70e3)))["mass"] == (95e3, "as for locomotive")
+    assert find_parts(scenario.set("uio.mass", 70e3)).shared_parameters["mass"] == (95e3, "as for locomotive")
 
 
 def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
@@ -220,10 +222,10 @@ def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
     scenario.set("uio.estimated_position", 7.0).add("plain", observer="odometer_reset").connect(
         "odometer.reading -> plain.odometer"
     )
-    facts = shared_parameters(find_parts(scenario.set("plain.estimated_position", 7.0)))
+    facts = find_parts(scenario.set("plain.estimated_position", 7.0)).shared_parameters
     assert facts["mass"][0] == 80e3  # the plain odometer has no mass
     assert facts["estimated_position"] == (7.0, "as for the observers of the scenario")
-    assert "estimated_position" not in shared_parameters(find_parts(scenario.set("plain.estimated_position", 0.0)))
+    assert "estimated_position" not in find_parts(scenario.set("plain.estimated_position", 0.0)).shared_parameters
 
 
 def test_no_limit_is_told_as_any_gap() -> None:
@@ -237,7 +239,7 @@ def test_a_scenario_without_observers_serves_shipped_ones() -> None:
     del data["components"]["observer"]
     data["connections"] = ["driver.effort -> locomotive.effort", "locomotive.wheel_speed -> odometer.wheel_speed"]
     parts = find_parts(Scenario(**data))
-    assert {signal: link[0] for signal, link in parts.template().items()} == {
+    assert {signal: link[0] for signal, link in parts.template.items()} == {
         "effort": "driver.effort",
         "wheel_speed": "locomotive.wheel_speed",
         "odometer": "odometer.reading",
@@ -277,6 +279,51 @@ def test_an_estimate_that_is_worse_than_none_has_diverged() -> None:
 def test_a_plant_that_fails_is_said() -> None:
     with pytest.raises(RunError, match="run of the plant side failed"):
         benchmark_observers(two().set("locomotive.train_speed", 1e308).balises(method="interpolate"), ["uio"])
+
+
+class Breaks(Constant):
+    """Gives up in the middle of the run."""
+
+    def step(self, t: float, inputs: Any, dt: float) -> None:
+        if t > 0.2:
+            raise ValueError("enough of it")
+
+
+class Lost(Constant):
+    """Says NaN from some time on."""
+
+    def step(self, t: float, inputs: Any, dt: float) -> None:
+        self.hidden = math.nan if t > 0.3 else 0.0
+
+
+def test_one_that_fails_takes_nobody_along() -> None:
+    """Two that end early in different ways and one that cannot be set up, among two that are well: each as alone."""
+    refused = two().set("uio.parameters", {"sample_period": -1.0})
+    alone = benchmark_observers(two(), ["observer"]).scores[0]
+    observers = [Constant(believed=9.0), Breaks(), "observer", Lost(believed=9.0), "uio"]
+    found = {score.name: score for score in benchmark_observers(refused, observers).scores}
+    assert list(found) == ["Constant", "Breaks", "observer", "Lost", "uio"]
+    assert found["Constant"].failure is None
+    assert replace(found["observer"], costs=()) == replace(alone, costs=())
+    assert "enough of it" in str(found["Breaks"].failure)
+    assert "is nan" in str(found["Lost"].failure)
+    assert str(found["uio"].failure).startswith("cannot be coupled: ")
+    for score in (found["Breaks"], found["Lost"]):
+        assert score.whole is not None
+        assert 0.0 < score.costs[0] < 1e6
+
+
+TOGETHER = ("observer", "uio", "odometer_reset", "luenberger", "multirate_cdo", "stopping_uio")
+
+
+@settings(max_examples=3)
+@given(st.lists(st.sampled_from(TOGETHER), min_size=2, unique=True))
+def test_scores_do_not_depend_on_who_else_takes_part(names: list[str]) -> None:
+    def score_of(name: str) -> ObserverScore:
+        return replace(benchmark_observers(two(), [name]).scores[0], costs=())
+
+    together = benchmark_observers(two(), names).scores
+    assert [replace(score, costs=()) for score in together] == [score_of(name) for name in names]
 
 
 # -- what is written
@@ -330,8 +377,32 @@ def test_the_picture_has_units_and_a_point_for_each_observer(benchmark: Observer
 def test_what_was_computed_before_an_interruption_is_kept(
     at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The first run is the plant's, the others one observer each."""
-    step, begun = Master.run, []
+    """The first run is the plant's, the others one observer each, as telegrams reach them in different ways."""
+    begun = interrupted_at(at, monkeypatch)
+    scenario = two().set("uio.as", "block2")
+    if at < 3:
+        with pytest.raises(KeyboardInterrupt):
+            benchmark_observers(scenario, ["observer", "uio"], record=tmp_path)
+    else:
+        found = benchmark_observers(scenario, ["observer", "uio"], record=tmp_path)
+        assert found.interrupted
+        assert [score.name for score in found.scores] == ["observer"]
+        assert "Interrupted; not evaluated: uio." in found.notes
+    assert len(begun) == at
+    assert len(load_result(tmp_path).time) > 50
+
+
+def test_of_repeated_runs_those_before_an_interruption_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    interrupted_at(4, monkeypatch)
+    found = benchmark_observers(two(), ["observer", "uio"], repeat=5)
+    assert [len(score.costs) for score in found.scores] == [2, 2]
+    assert found.interrupted
+    assert "Interrupted; the cost is that of fewer runs." in found.notes
+
+
+def interrupted_at(at: int, monkeypatch: pytest.MonkeyPatch) -> list[Master]:
+    """Somebody interrupts when so many runs have ended; the runs."""
+    step, begun = Master.run, list[Master]()
 
     def interrupted(master: Master) -> None:
         step(master)
@@ -340,13 +411,4 @@ def test_what_was_computed_before_an_interruption_is_kept(
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Master, "run", interrupted)
-    if at < 3:
-        with pytest.raises(KeyboardInterrupt):
-            benchmark_observers(two(), ["observer", "uio"], record=tmp_path)
-    else:
-        found = benchmark_observers(two(), ["observer", "uio"], record=tmp_path)
-        assert found.interrupted
-        assert [score.name for score in found.scores] == ["observer"]
-        assert "Interrupted; not judged: uio." in found.notes
-    assert len(begun) == at
-    assert len(load_result(tmp_path).time) > 50
+    return begun
