@@ -92,9 +92,10 @@ def execute(options: argparse.Namespace) -> Output:
     )
     found = _tuned(scenario, options, directory)
     return Output(
-        [*found.parts(), f"Tuned scenario: {directory / 'tuned.toml'}"],
-        found.to_data() | {"tuned": directory / "tuned.toml"},
-        code=_NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE,
+        found.parts(),
+        found.to_data(),
+        {"tuned": directory / "tuned.toml"},
+        _NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE,
         error=KeyboardInterrupt() if found.interrupted else None,
     )
 

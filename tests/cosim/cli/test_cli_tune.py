@@ -49,7 +49,7 @@ def test_two_workers_find_what_one_does(file: Path, capsys: pytest.CaptureFixtur
     for workers in ("1", "2"):
         assert main([*words, "--workers", workers, "--out", str(file.parent / workers)]) == 0
         found.append(json.loads(capsys.readouterr().out))
-    assert found[1] == found[0]
+    assert found[1] | {"files": {}} == found[0] | {"files": {}}  # which are in folders of their own
     assert len(set(found[0]["searches"][0]["costs"])) > 1
 
 

@@ -41,7 +41,7 @@ def test_a_report_is_made_again(runs: Path, capsys: pytest.CaptureFixture[str]) 
     assert main(["report", str(runs / "one")]) == 0
     # the summary's keys are sorted in its file
     assert sorted(page.read_bytes().splitlines()) == sorted(before.splitlines())
-    assert capsys.readouterr().out == f"report: {page}\n"
+    assert capsys.readouterr().out.strip() == f"report: {page}"
 
 
 def test_several_over_each_other(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
