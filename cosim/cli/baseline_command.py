@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.baselines import check, read_baseline
 from cosim.baselines.baseline_files import baseline_path, write_texts
+from cosim.baselines.call import Call
+from cosim.baselines.draft import value_range
 from cosim.baselines.header_data import header_data
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.references import embed_baseline, find_references, read_reference
@@ -17,7 +19,6 @@ from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
 from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
-from cosim.cli.baseline_text import change_output, header_parts
 from cosim.cli.output import print_warning
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
@@ -29,6 +30,7 @@ from cosim.results.load_result import load_result
 from fmus.cli.commands import Action, Actions, Argument, ArgumentGroup, Execute, argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
+from fmus.tables.table import Parts, Table, name_column, text_column
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline, Regression
@@ -83,6 +85,14 @@ _EXTRACT = (
     FILE,
     argument("--reference", metavar="NAME", help="which one, where there are several"),
     FORCE,
+)
+
+
+_COLUMNS = (
+    name_column("signal"),
+    text_column("allowed", meaning="How far a value may differ", write="+- {:.3g}".format),
+    text_column("unit"),
+    text_column("description"),
 )
 
 
@@ -178,7 +188,7 @@ def _drawn(output: Output, found: Sequence[Regression], folder: Path) -> Output:
 def _show(options: argparse.Namespace) -> Output:
     baseline = read_baseline(options.file)
     data = header_data(baseline.header, baseline.path.parent) | {"notes": list(baseline.notes)}
-    return Output(header_parts(baseline), data)
+    return Output(_header(baseline), data)
 
 
 def _update(options: argparse.Namespace) -> Output:
@@ -201,7 +211,7 @@ def _update(options: argparse.Namespace) -> Output:
 def _written(update: Update, path: Path) -> Output:
     if update.texts:
         write_texts(dict(update.texts), path)
-    return change_output(update, path)
+    return _change(update, path)
 
 
 def _embed(options: argparse.Namespace) -> Output:
@@ -213,6 +223,42 @@ def _extract(options: argparse.Namespace) -> Output:
     path = _free(baseline_path(options.file), options.force)
     extract_reference(options.fmu, path, options.reference)
     return Output([f"{path} written."], {"file": str(path)})
+
+
+def _change(update: Update, path: Path) -> Output:
+    """What was written."""
+    notes = [*update.notes, *(Call.worst(update.before) if update.before is not None else [])]
+    rows = update.after.baseline.header.rows if update.after.baseline is not None else 0
+    line = f"{path}: {update.change}, {len(update.after.signals)} signals, {rows} rows."
+    data = {"file": str(path), "change": update.change, "notes": notes}
+    return Output(["\n".join([line, *(f"  {note}" for note in notes)])], data)
+
+
+def _header(baseline: Baseline) -> Parts:
+    """What a baseline is of."""
+    header = baseline.header
+    span = header.span
+    telegrams = "" if header.events is None else f", {header.events} telegrams"
+    lines = [
+        f"{baseline.path}: {header.title}",
+        f"  {span['start']:g} to {span['stop']:g} s at {span['step']:g} s steps; {header.rows} rows{telegrams}",
+        f"  run again from: {header.recipe.source or 'nothing (made from a result)'}",
+    ]
+    for entry in header.components:
+        file = f", {entry.file}" if entry.file else ""
+        lines.append(f"  {entry.name}: model {entry.model}, FMI {entry.fmi_version}, GUID {entry.guid}{file}")
+        lines += [f"    {name} = {value}" for name, value in entry.parameters.items()]
+    versions = ", ".join(f"{name} {value}" for name, value in header.versions.items()) or "not known"
+    remarks = [f"ignored: {pattern}" for pattern in header.tolerances.ignore]
+    remarks += [f"note: {note}" for note in baseline.notes]
+    rows = [[info.name, _allowed(baseline, info.name), info.unit, info.description] for info in header.signals]
+    text = "\n".join([*lines, f"  made with: {versions}"])
+    return [text, Table("allowed", _COLUMNS, rows), "\n".join(f"  {remark}" for remark in remarks)]
+
+
+def _allowed(baseline: Baseline, name: str) -> float:
+    """Largest error of a signal that is allowed, in its unit."""
+    return baseline.tolerances.for_signal(name).value_for(value_range(baseline.result.table[name]))
 
 
 def _free(path: Path, force: bool) -> Path:

@@ -14,15 +14,21 @@ from pathlib import Path
 from typing import Any
 
 from fmus.check.findings import Class, Verdict
-from fmus.check.findings_table import as_data, check_parts
 from fmus.check.run import CheckReport, check_count, check_fmu
 from fmus.cli.commands import argument, one_of
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
+from fmus.fmi.standard import INTERFACES
+from fmus.tables.table import Parts, Table, name_column, text_column
 
 CLEAN, PROBLEMS, _UNCHECKED = 0, 1, 2
 _TRUTH = {"true": 1.0, "false": 0.0}
+
+_BULLET = "  - "
+
+
+_COLUMNS = (name_column("check"), name_column("verdict"), text_column("detail"))
 
 GROUP = "FMUs"
 HELP = "how far an FMU can be trusted: validity and behaviour"
@@ -48,13 +54,13 @@ def execute(options: argparse.Namespace) -> Output:
         ValueError, OSError: the file cannot be checked, or a mistake of the user; the program ends with 2 then.
     """
     report = _checked(options)
-    data, failure = as_data(report), None
+    data, failure = _data(report), None
     try:
         if options.output is not None:
             options.output.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:  # the report is shown all the same
         failure = error
-    return Output(check_parts(report), data, code=_exit_code(report, options.strict), error=failure)
+    return Output(_parts(report), data, code=_exit_code(report, options.strict), error=failure)
 
 
 def _exit_code(report: CheckReport, strict: bool) -> int:
@@ -91,3 +97,52 @@ def _starts(words: Sequence[str]) -> dict[str, float]:
         except ValueError:
             raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.") from None
     return starts
+
+
+def _parts(report: CheckReport) -> Parts:
+    """The report for people: what was checked, one row a finding, the verdict with its limits, what to trust."""
+    rows = [[finding.check, str(finding.verdict), finding.detail] for finding in report.findings]
+    verdict = [f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"]
+    verdict += [f"{_BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
+    trust = ["What to trust:", *(f"{_BULLET}{sentence}" for sentence in report.trust)]
+    return [_heading(report), Table("findings", _COLUMNS, rows), "\n".join(verdict), "\n".join(trust)]
+
+
+def _data(report: CheckReport) -> dict[str, Any]:
+    """The report as plain data, ready for JSON."""
+    return {
+        "file": str(report.archive.path),
+        "model": report.archive.description.modelName,
+        "fmiVersion": report.archive.description.fmiVersion,
+        "generationTool": report.archive.description.generationTool,
+        "interfaces": report.archive.interfaces,
+        "platforms": list(report.archive.platforms),
+        "communicationStepSize": report.step,
+        "starts": dict(report.starts),
+        "steps": report.steps,
+        "verdict": str(report.verdict),
+        "limits": [{"check": finding.check, "advice": finding.advice} for finding in report.limits],
+        "findings": [finding.to_dict() for finding in report.findings],
+        "trust": list(report.trust),
+        "seconds": round(report.seconds, 3),
+    }
+
+
+def _heading(report: CheckReport) -> str:
+    description = report.archive.description
+    interfaces = ", ".join(INTERFACES[name] for name in report.archive.interfaces)
+    return f"{description.modelName}: FMI {description.fmiVersion}, {interfaces}; communication step {report.step:g} s"
+
+
+def _reasons(report: CheckReport) -> dict[str, list[str]]:
+    """The checks behind the verdict, by the advice that comes of them."""
+    reasons: dict[str, list[str]] = {}
+    for finding in report.findings:
+        if finding.advice:
+            reasons.setdefault(finding.advice, []).append(finding.check)
+    return reasons
+
+
+def _counts(report: CheckReport) -> str:
+    numbers = {verdict: sum(f.verdict is verdict for f in report.findings) for verdict in Verdict}
+    return ", ".join(f"{number} {verdict}" for verdict, number in numbers.items() if number)
