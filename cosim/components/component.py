@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,8 @@ from cosim.components.described import DescribedComponent
 from cosim.components.start_values import StartValue
 from cosim.components.surroundings import Surroundings
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
-from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
-from cosim.errors import CouplingError, RunError
+from cosim.errors import CouplingError, RunError, nearest
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.fmi.capabilities import tool_warning
@@ -34,6 +34,51 @@ from plant_models.hybrid.missing import MISSED_SAMPLES
 
 _OUTCOMES, _MISSED = "outcomes", "missed samples"
 _WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
+
+
+_STATUS_CATEGORIES = frozenset({"logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"})
+"""Standard names of the categories for what is wrong."""
+
+
+@dataclass(frozen=True)
+class _LogSwitch:
+    """Arguments of setDebugLogging.
+
+    Args:
+        on: whether to log. categories: which ones; none means all.
+    """
+
+    on: bool
+    categories: tuple[str, ...] = ()
+
+
+def _log_switch(name: str, description: ModelDescription, choice: LogChoice | None) -> _LogSwitch | None:
+    """How to switch a component's log; None where it is left as it is."""
+    if choice is None or choice == "none":
+        return None if choice is None else _LogSwitch(False)
+    declared = [category.name for category in description.logCategories]
+    if choice == "all":
+        return _LogSwitch(True)
+    if choice == "errors":
+        wrong = tuple(c for c in declared if c in _STATUS_CATEGORIES)
+        return _LogSwitch(True, wrong) if wrong else None
+    for category in choice:
+        if category not in declared:
+            known = nearest(category, declared) if declared else "it declares none; use log = 'all'."
+            raise CouplingError(f"{name}: log: there is no log category {category!r}; {known}")
+    return _LogSwitch(True, tuple(choice)) if choice else _LogSwitch(False)
+
+
+def _switch_log(slave: Any, fmi_version: int, switch: _LogSwitch) -> str | None:
+    """Call setDebugLogging; what the slave answers if it refuses, since a refused log is no reason not to run."""
+    try:
+        if fmi_version == 1:
+            slave.setDebugLogging(switch.on)  # FMI 1.0 knows no categories
+        else:
+            slave.setDebugLogging(switch.on, list(switch.categories))
+    except Exception as error:
+        return f"setDebugLogging({switch.on}, {list(switch.categories)}) was refused: {error}"
+    return None
 
 
 class _DifferentiableComponent(DescribedComponent, Slave):
@@ -139,7 +184,7 @@ class Component(_DifferentiableComponent):
         self.line_outputs: frozenset[str] = frozenset()
         # says where it stands [s] while somebody else than Python steps it
         self.clock: Callable[[], float] | None = None
-        self.log: LogSwitch | None = None
+        self.log: _LogSwitch | None = None
         self.call_statistics = new_call_statistics()
         self.trespasses: dict[str, str] = {}
         self._numbers, self._call_numbers = LAST_CALL.numbers(name), dict[str, int]()
@@ -252,7 +297,7 @@ class Component(_DifferentiableComponent):
         Raises:
             CouplingError: a category that the slave does not declare.
         """
-        self.log = log_switch(self.name, self.description, choice)
+        self.log = _log_switch(self.name, self.description, choice)
         self.logging = self.log is not None and self.log.on
         self.messages.silent = choice == "none"
 
@@ -280,7 +325,7 @@ class Component(_DifferentiableComponent):
         count_methods(cls)
 
     def _switch_log(self) -> None:
-        refused = None if self.log is None else switch_log(self.slave, self.fmi_version, self.log)
+        refused = None if self.log is None else _switch_log(self.slave, self.fmi_version, self.log)
         if refused is not None:
             self.note(refused, "warning")
 

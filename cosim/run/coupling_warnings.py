@@ -9,7 +9,7 @@ from cosim.components.recording import RecordingComponent
 from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
 from cosim.coupling.graph import undeclared
 from cosim.run.component_models import make_system, values_in_use
-from cosim.run.starts import names_with_starts
+from cosim.run.loaded_components import names_with_starts
 from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from cosim.scenario.schema import ScenarioTable
 

@@ -16,18 +16,36 @@ from cosim.components.component import Component
 from cosim.components.description import read_description
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.logged_slave import log_calls
-from cosim.components.start_values import StartValue
+from cosim.components.start_values import StartValue, start_values
 from cosim.coupling.instants import followed
 from cosim.diagnostics.call_log import CallLog
 from cosim.errors import CouplingError
-from cosim.run.component_models import component_factories
+from cosim.run.component_models import component_factories, protocol_parameters
 from cosim.run.coupled import Coupled
 from cosim.run.remarks import Remarks
-from cosim.run.starts import component_starts
+from cosim.run.run_seeds import component_seed
 from cosim.run.task import RunTask
+from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from fmus.fmi.capabilities import read_capabilities, tool_warning
 from fmus.fmi.sense import doubled_names
+
+
+def names_with_starts(table: ScenarioTable) -> dict[str, list[str]]:
+    """Names of the variables that have a start value in the scenario, by component.
+
+    Args:
+        table: of the scenario.
+    """
+    return {name: list(component.parameters) for name, component in table.components.items()}
+
+
+def _component_starts(table: ComponentTable, component: Component, run_seed: int) -> dict[str, StartValue]:
+    """Start values of a component in a run, by name; its arrays get their shapes."""
+    if table.filter is not None:
+        return {}  # they are those of its FMU, which has taken them
+    late = protocol_parameters(table, component, f"components.{component.name}")
+    return start_values(component, late | table.parameters | component_seed(component, table.parameters, run_seed))
 
 
 def _check_instances(files: Mapping[str, Path], where: str) -> None:
@@ -93,7 +111,7 @@ def load_components(
     resources.callback(_free, components)
     for name, factory in factories.items():
         components[name] = factory()
-        starts[name] = component_starts(table.components[name], components[name], table.seed)
+        starts[name] = _component_starts(table.components[name], components[name], table.seed)
         _remark(components[name], remarks)
     return LoadedComponents(components, starts, factories)
 

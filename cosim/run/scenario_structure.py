@@ -28,8 +28,8 @@ from cosim.run.balise_service import BaliseRoles, balise_roles
 from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled, couple
 from cosim.run.described_components import describe_component
+from cosim.run.loaded_components import names_with_starts
 from cosim.run.network import Network
-from cosim.run.starts import names_with_starts
 from cosim.run.step_schedule import stepping_groups
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
