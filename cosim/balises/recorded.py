@@ -5,7 +5,8 @@ reads.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,86 @@ from cosim.balises.localiser import Localiser, Method
 from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import NO_OUTCOMES, Channel, Crossing
 from cosim.components.recording import RecordingComponent
-from cosim.errors import OutputError, ScenarioError
-from cosim.results.formats.telegram_csv import holds_telegrams, read_telegrams
+from cosim.errors import OutputError, ScenarioError, nearest
+from cosim.results.formats.csv_dialect import csv_dialect
+from cosim.results.formats.headings import split_unit
 from cosim.results.load_result import load_result
-from cosim.results.record_rows import TELEGRAM_ROWS, require_accuracy
+from cosim.results.record_rows import TELEGRAM_ROWS, TELEGRAM_UNITS, parse_outcomes, require_accuracy
 from cosim.results.result import BaliseRecord
 from cosim.results.results_folder import EVENTS
 from fmus.fmi.standard import TIME_TOLERANCE
+from plant_models.hybrid.units import UnitError, conversion, parse_unit
+
+_NEEDED = ("stamp", "position")
+_DEFAULTS = {f.name: f.default for f in fields(BaliseRecord) if f.default is not MISSING} | {"true_position": nan}
+_KINDS = ("true", "missed", "false")
+
+
+def _holds_telegrams(path: Path) -> bool:
+    """Whether a file is a CSV with a column ``stamp``."""
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    return "stamp" in [split_unit(heading)[0] for heading in csv_dialect(path).headings]
+
+
+def _read_telegrams(path: Path) -> list[BaliseRecord]:
+    """Read a table of telegrams, one a line.
+
+    What is not given: ``delivered_at`` is the stamp, ``identity`` is ``T1``, ``T2``, ... in the order of the file,
+    ``kind`` is ``true``, the location accuracy is zero, the odometer reading and the true position are unknown. Units
+    in brackets behind the names are converted; without one it is the SI unit.
+    """
+    dialect = csv_dialect(path)
+    factors = _columns(path, dialect.headings)
+    events: list[BaliseRecord] = []
+    for line, text in dialect.numbered_rows():
+        row = dict(zip(factors, dialect.cells(text), strict=False))
+        try:
+            events.append(_record(row, factors, f"T{len(events) + 1}"))
+        except ValueError as error:
+            raise ValueError(f"{path}, line {line}: {error}") from error
+    return events
+
+
+def _columns(path: Path, headings: tuple[str, ...]) -> dict[str, float]:
+    """Factors to the SI unit, by name of the column."""
+    factors: dict[str, float] = {}
+    for heading in headings:
+        name, unit = split_unit(heading)
+        if name not in TELEGRAM_ROWS.columns:
+            raise OutputError(f"{path}: unknown column {heading!r}; {nearest(name, TELEGRAM_ROWS.columns)}")
+        try:
+            factors[name] = (
+                1.0 if unit is None else conversion(parse_unit(unit), parse_unit(TELEGRAM_UNITS.get(name, "1")))[0]
+            )
+        except UnitError as error:
+            raise OutputError(f"{path}: column {heading!r}: {error}.") from error
+    lacking = [name for name in _NEEDED if name not in factors]
+    if lacking:
+        raise OutputError(f"{path}: telegrams need the columns 'stamp' and 'position'; missing: {', '.join(lacking)}.")
+    return factors
+
+
+def _record(row: dict[str, str], factors: dict[str, float], identity: str) -> BaliseRecord:
+    values: dict[str, Any] = {**_DEFAULTS, "identity": identity, "outcomes": {}}
+    for name, text in row.items():
+        if text == "":
+            continue
+        if name in TELEGRAM_ROWS.numbers:
+            try:
+                values[name] = float(text) * factors[name]
+            except ValueError:
+                raise ValueError(f"{name}: expected a number, got {text!r}.") from None
+        else:
+            values[name] = parse_outcomes(text) if name == "outcomes" else text
+    for name in _NEEDED:
+        if name not in values:
+            raise ValueError(f"{name} is empty.")
+    require_accuracy(values["location_accuracy"])
+    if values["kind"] not in _KINDS:
+        raise ValueError(f"kind {values['kind']!r}: expected one of {', '.join(_KINDS)}.")
+    values.setdefault("delivered_at", nan if values["kind"] == "missed" else values["stamp"])
+    return BaliseRecord(**values)
 
 
 @dataclass(frozen=True)
@@ -178,8 +252,8 @@ def _read(path: Path) -> Sequence[BaliseRecord]:
         return TELEGRAM_ROWS.read(path / EVENTS)
     if path.name.endswith(EVENTS) and not path.is_file():
         raise OutputError("there is no such file.")
-    if holds_telegrams(path):
-        return read_telegrams(path)
+    if _holds_telegrams(path):
+        return _read_telegrams(path)
     result = load_result(path)
     # a run keeps its telegrams, also where there were none
     if not result.events and "components" not in result.summary:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.baselines.baseline_files import read_baseline
-from cosim.baselines.regression import Regression, check, regression, tolerances_of
+from cosim.baselines.regression import Regression, check, regression
 from cosim.baselines.subject import Subject, make_subject
 from cosim.baselines.update import Update, plan_update
-from cosim.comparison.tolerance import Tolerances
+from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError
 
@@ -67,7 +67,7 @@ class Call:
         ignored = tuple(ignore)
         given = tolerance is not None or tolerances or ignored
         # before the run: it may be long
-        wanted = tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None
+        wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None
         chosen = None if signals is None else tuple(signals)
         return cls(make_subject(what, folder, **arguments), path, wanted, chosen, every)
 
@@ -122,3 +122,16 @@ def _line(signal: Any) -> str:
         return str(signal.findings[0].text)
     near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
     return f"{signal.name}: {signal.status}{near}"
+
+
+def _tolerances_of(
+    base: Tolerances, tolerance: Any = None, by_signal: Mapping[str, Any] | None = None, ignore: Iterable[str] = ()
+) -> Tolerances:
+    """Tolerances as a test gives them, on top of others."""
+    default = Tolerances.of(tolerance).default if tolerance is not None else base.default
+    given = Tolerances.of(default, by_signal, ignore)
+    merged: dict[str, Tolerance] = {
+        **given.by_signal,
+        **{k: v for k, v in base.by_signal.items() if k not in given.by_signal},
+    }
+    return Tolerances(default, merged, (*base.ignore, *(name for name in given.ignore if name not in base.ignore)))

@@ -5,7 +5,7 @@ them.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -79,14 +79,3 @@ def file_digest(path: Path) -> str:
     """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def same_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[tuple[Identity, Identity]]:
-    """Components that both runs have, with what they were in each.
-
-    Args:
-        before: of the baseline.
-        now: of the new run.
-    """
-    by_name = {identity.name: identity for identity in now}
-    return [(identity, by_name[identity.name]) for identity in before if identity.name in by_name]

@@ -4,15 +4,15 @@ different.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from cosim.baselines.baseline import Baseline
 from cosim.baselines.draft import resolve, resolved, versions_of
-from cosim.baselines.model_identity import identities, same_models
+from cosim.baselines.model_identity import Identity, identities
 from cosim.comparison.compare import compare_results
-from cosim.comparison.tolerance import Tolerance, Tolerances
+from cosim.comparison.tolerance import Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import Result
@@ -87,7 +87,7 @@ def _demand_same_models(result: Result, baseline: Baseline) -> None:
     Raises:
         BaselineError: a component is of another model; says both.
     """
-    for before, now in same_models(baseline.header.components, identities(result)):
+    for before, now in _same_models(baseline.header.components, identities(result)):
         if before.kind in MODELS and now.kind in MODELS and before.model and now.model and before.model != now.model:
             raise BaselineError(
                 f"{baseline.label} is a baseline of another FMU: {before.name} was the model '{before.model}' "
@@ -120,7 +120,7 @@ def _told(result: Result) -> Result:
 
 def _notes(result: Result, baseline: Baseline) -> Iterable[str]:
     """What the comparison of two results does not say itself."""
-    for before, now in same_models(baseline.header.components, identities(result)):
+    for before, now in _same_models(baseline.header.components, identities(result)):
         if before.guid == now.guid and before.sha256 and now.sha256 and before.sha256 != now.sha256:
             yield f"{before.name}: the file {now.file} is not the one of the baseline, though it has the same GUID."
         elif before.guid != now.guid and now.kind == "FMU" and before.fmi_version == now.fmi_version:
@@ -131,22 +131,7 @@ def _notes(result: Result, baseline: Baseline) -> Iterable[str]:
                 yield f"{before.name}: option {name} is {new} instead of {old}."
 
 
-def tolerances_of(
-    base: Tolerances, tolerance: Any = None, by_signal: Mapping[str, Any] | None = None, ignore: Iterable[str] = ()
-) -> Tolerances:
-    """Tolerances as a test gives them, on top of others.
-
-    Args:
-        base: used where nothing is given. tolerance: default, as for `cosim.comparison.tolerance.tolerance`.
-        by_signal: by name or pattern. ignore: names or patterns.
-
-    Raises:
-        ComparisonError: they cannot be.
-    """
-    default = Tolerances.of(tolerance).default if tolerance is not None else base.default
-    given = Tolerances.of(default, by_signal, ignore)
-    merged: dict[str, Tolerance] = {
-        **given.by_signal,
-        **{k: v for k, v in base.by_signal.items() if k not in given.by_signal},
-    }
-    return Tolerances(default, merged, (*base.ignore, *(name for name in given.ignore if name not in base.ignore)))
+def _same_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[tuple[Identity, Identity]]:
+    """Components that both runs have, with what they were in each."""
+    by_name = {identity.name: identity for identity in now}
+    return [(identity, by_name[identity.name]) for identity in before if identity.name in by_name]

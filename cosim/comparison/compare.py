@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cosim.comparison.curve import Curve, check_time, looks_held, rows_to_keep
+from cosim.comparison.curve import Curve, check_time, looks_held
 from cosim.comparison.curve_comparison import Task, compare_signal
 from cosim.comparison.event_comparison import Event, compare_events, compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
@@ -266,7 +266,7 @@ class _Pair:
         self.results = (reference, result)
         self.tolerances, self.curves, self.extra = tolerances, curves, extra
         self.length = float(reference.time[-1] - reference.time[0])
-        self.rows = [rows_to_keep(side.time) for side in self.results]
+        self.rows = [_rows_to_keep(side.time) for side in self.results]
         self.times = [np.asarray(s.time[k], dtype=float) for s, k in zip(self.results, self.rows, strict=True)]
         self.infos = [{info.name: info for info in side.signals} for side in self.results]
         self.has = set(_names(result))
@@ -307,3 +307,16 @@ class _Pair:
         begin, end, nan = float(self.times[0][0]), float(self.times[0][-1]), float("nan")
         finding = ComparisonFinding("unit", begin, end, nan, nan, float("inf"), 0.0, text)
         return SignalComparison(name, one, "differs", self.tolerances.for_signal(name), findings=[finding])
+
+
+def _rows_to_keep(time: np.ndarray) -> np.ndarray:
+    """Which rows count: of several with one time the first and the last, before and after all events of that
+    instant.
+
+    Args:
+        time: [s], shape (rows,), never falling.
+    """
+    keep = np.ones(len(time), dtype=bool)
+    if len(time) > 2:
+        keep[1:-1] = (time[1:-1] > time[:-2]) | (time[2:] > time[1:-1])
+    return keep

@@ -68,19 +68,6 @@ class Curve:
         return float(np.median(steps)) if len(steps) else 0.0
 
 
-def rows_to_keep(time: np.ndarray) -> np.ndarray:
-    """Which rows count: of several with one time the first and the last, before and after all events of that
-    instant.
-
-    Args:
-        time: [s], shape (rows,), never falling.
-    """
-    keep = np.ones(len(time), dtype=bool)
-    if len(time) > 2:
-        keep[1:-1] = (time[1:-1] > time[:-2]) | (time[2:] > time[1:-1])
-    return keep
-
-
 def check_time(time: np.ndarray, label: str) -> None:
     """That there are rows, and that time never falls.
 

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.comparison.curve import Curve
 from cosim.comparison.jumps import Jumps
 from cosim.comparison.points import Allowed, MatchedJumps, Points, compare_points, outside_between
-from cosim.comparison.span import gap_findings, rounding, span_findings
+from cosim.comparison.span import rounding
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Curves, Kind, SignalComparison
@@ -252,11 +252,11 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
 
 
 def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
-    found = span_findings(task.name, task.reference, task.result, allowed.time)
+    found = _span_findings(task.name, task.reference, task.result, allowed.time)
     found += _number_findings(task.name, points)
     found += _jump_findings(task.name, task.unit, points, jumps, allowed)
     found += _value_findings(task.name, task.unit, points, allowed)
-    found += gap_findings(task.name, task.reference, task.result, allowed.value, allowed.time)
+    found += _gap_findings(task.name, task.reference, task.result, allowed.value, allowed.time)
     return sorted(found, key=lambda f: (-f.size / f.allowed if f.allowed > 0.0 else -np.inf, f.time))
 
 
@@ -325,3 +325,65 @@ def _is_whole(reference: Curve, jumps: MatchedJumps) -> bool:
     return not len(rows) or (
         int(rows[-1]) + 1 < len(reference.time) and np.array_equal(reference.time[rows], jumps.reference.begin)
     )
+
+
+def _span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
+    """Starts and ends that are further apart than the allowed time [s]."""
+    found = []
+    ends: tuple[tuple[float, float, Kind, Kind, str], ...] = (
+        (float(reference.time[0]), float(result.time[0]), "starts_early", "starts_late", "starts"),
+        (float(reference.time[-1]), float(result.time[-1]), "ends_early", "ends_late", "ends"),
+    )
+    for one, two, early, late, verb in ends:
+        size = abs(two - one)
+        if size > allowed + rounding(one, two):
+            text = (
+                f"{name}: {verb} at {two:.9g} s instead of {one:.9g} s, {size:.4g} s "
+                f"{'later' if two > one else 'earlier'}"
+            )
+            found.append(
+                ComparisonFinding(
+                    late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text
+                )
+            )
+    return found
+
+
+_GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
+
+
+def _gap_findings(
+    name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float
+) -> list[ComparisonFinding]:
+    """Intervals in which one side has no rows where the other has many that are not on the straight line over the
+    gap.
+
+    Args:
+        name: name of the signal.
+        reference: curve of the reference.
+        result: curve of the result.
+        allowed: error that is allowed.
+        allowed_time: shift that is allowed [s].
+    """
+    found = []
+    for lacking, full, who in ((reference, result, "reference"), (result, reference, "result")):
+        for row in _gaps(lacking, full):
+            begin, end = float(lacking.time[row]), float(lacking.time[row + 1])
+            a, b = np.searchsorted(full.time, begin, side="right"), np.searchsorted(full.time, end)
+            band = band_of(lacking, full.time[a:b], allowed_time)
+            values = full.filled[a:b]
+            off = float(np.max(np.maximum(values - band.high, band.low - values)))
+            if off > allowed:
+                text = f"{name}: the {who} has no rows from {begin:.9g} to {end:.9g} s, the other has {b - a} there"
+                found.append(
+                    ComparisonFinding("gap", begin, end, np.nan, np.nan, end - begin, _GAP_STEPS * lacking.step, text)
+                )
+    return found
+
+
+def _gaps(lacking: Curve, full: Curve) -> np.ndarray:
+    rows = np.flatnonzero(np.diff(lacking.time) > _GAP_STEPS * lacking.step)
+    if not len(rows):
+        return rows
+    begin = np.searchsorted(full.time, lacking.time[rows], side="right")
+    return np.asarray(rows[np.searchsorted(full.time, lacking.time[rows + 1]) - begin >= _GAP_STEPS])

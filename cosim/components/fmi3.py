@@ -8,10 +8,12 @@ from typing import Any
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
-from cosim.components.start_values import STRUCTURAL, StartValue, resize
+from cosim.components.start_values import STRUCTURAL, StartValue
+from cosim.errors import CouplingError
 from fmus.fmi.exact_ports import make_exact_writer
 from fmus.fmi.fmi3 import FMI3Slave
 from fmus.fmi.ports import is_native
+from fmus.fmi.sense import shape_fault
 
 
 class FMI3Component(Component, FMI3Slave):
@@ -65,7 +67,7 @@ class FMI3Component(Component, FMI3Slave):
 
     def configure(self, structure: Mapping[str, Any]) -> None:  # noqa: D102 - see DescribedComponent
         self._structure |= structure
-        resize(self.description, self._structure)
+        _resize(self.description, self._structure)
 
     def set_start(self, name: str, value: StartValue) -> None:  # noqa: D102 - see Component
         if self.variable(name).causality != STRUCTURAL:
@@ -96,3 +98,31 @@ class FMI3Component(Component, FMI3Slave):
         for name, value in self._structure.items():
             make_exact_writer(self.slave, self.fmi_version, self.variables[name])([value])
         self.slave.exitConfigurationMode()
+
+
+def _resize(description: ModelDescription, structure: Mapping[str, int]) -> None:
+    """Shapes of all arrays for these values of the structural parameters; the others have their start values.
+
+    Args:
+        description: whose arrays get their shapes.
+        structure: values of structural parameters by name.
+
+    Raises:
+        CouplingError: an array would become too large.
+    """
+    by_reference = {v.valueReference: structure[v.name] for v in description.modelVariables if v.name in structure}
+    for variable in description.modelVariables:
+        if variable.dimensions:
+            variable.shape = tuple(_extent(dimension, by_reference) for dimension in variable.dimensions)
+            fault = shape_fault(variable)
+            if fault is not None:
+                given = ", ".join(f"{name} = {value}" for name, value in structure.items())
+                raise CouplingError(f"With {given or 'its start values'}: {fault}")
+
+
+def _extent(dimension: Any, given: Mapping[int, int]) -> int:
+    if dimension.start is not None:
+        return int(dimension.start)
+    if dimension.valueReference in given:
+        return given[dimension.valueReference]
+    return int(dimension.variable.start)

@@ -17,7 +17,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.description import description_of_outputs
 from cosim.components.fmi3 import FMI3Component
-from cosim.components.recording_data import Chosen, Recording, make_recording, whole_number_columns
+from cosim.components.recording_data import Chosen, Recording, make_recording
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.load_result import load_result
 from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
@@ -245,7 +245,7 @@ class RecordingComponent(FMI3Component):
 
 def describe(recording: Recording) -> ModelDescription:
     """The model description of a recording: one output for each column, nothing else."""
-    whole = whole_number_columns(recording)
+    whole = _whole_number_columns(recording)
     outputs = [
         AnnotatedVariable(
             marks=[CAN_BE_MISSING] if signal.can_be_missing else [],
@@ -297,3 +297,16 @@ def load_recording(
         raise ScenarioError(f"{where}: {error}") from error
     except CosimError as error:
         raise ScenarioError(f"{where}: recording {path} cannot be read: {error}") from error
+
+
+def _whole_number_columns(recording: Recording) -> Sequence[bool]:
+    """For each column whether it is a discrete pure number that was whole throughout: a mode, a count, a truth
+    value.
+    """
+    largest = 2.0**31 - 1.0
+    return [
+        s.variability == "discrete"
+        and s.unit == "1"
+        and bool(np.all((column == np.rint(column)) & (np.abs(column) <= largest)))
+        for s, column in zip(recording.signals, recording.values.T, strict=True)
+    ]

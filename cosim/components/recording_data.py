@@ -357,19 +357,3 @@ def _without_gaps(values: np.ndarray, time: np.ndarray, interpolation: Interpola
         "gaps, and whoever samples takes it for a new one",
     }
     return values, f"{fault}; {hint[interpolation]}"
-
-
-def whole_number_columns(recording: Recording) -> Sequence[bool]:
-    """For each column whether it is a discrete pure number that was whole throughout: a mode, a count, a truth
-    value.
-
-    Args:
-        recording: what is played back.
-    """
-    largest = 2.0**31 - 1.0
-    return [
-        s.variability == "discrete"
-        and s.unit == "1"
-        and bool(np.all((column == np.rint(column)) & (np.abs(column) <= largest)))
-        for s, column in zip(recording.signals, recording.values.T, strict=True)
-    ]

@@ -10,12 +10,11 @@ from math import inf, isfinite
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelVariable
 
 from cosim.components.described import DescribedComponent
 from cosim.errors import CouplingError, nearest
 from fmus.fmi.elements import described
-from fmus.fmi.sense import shape_fault
 from fmus.fmi.types import CTYPES, FLOATING_TYPES, NUMERIC_TYPES, enumeration_items, size
 
 Scalar = float | int | bool | str | bytes
@@ -26,34 +25,6 @@ _EXPECTED = {"Boolean": "true or false for a Boolean", "String": "a text for a S
 
 
 STRUCTURAL = "structuralParameter"
-
-
-def resize(description: ModelDescription, structure: Mapping[str, int]) -> None:
-    """Shapes of all arrays for these values of the structural parameters; the others have their start values.
-
-    Args:
-        description: whose arrays get their shapes.
-        structure: values of structural parameters by name.
-
-    Raises:
-        CouplingError: an array would become too large.
-    """
-    by_reference = {v.valueReference: structure[v.name] for v in description.modelVariables if v.name in structure}
-    for variable in description.modelVariables:
-        if variable.dimensions:
-            variable.shape = tuple(_extent(dimension, by_reference) for dimension in variable.dimensions)
-            fault = shape_fault(variable)
-            if fault is not None:
-                given = ", ".join(f"{name} = {value}" for name, value in structure.items())
-                raise CouplingError(f"With {given or 'its start values'}: {fault}")
-
-
-def _extent(dimension: Any, given: Mapping[int, int]) -> int:
-    if dimension.start is not None:
-        return int(dimension.start)
-    if dimension.valueReference in given:
-        return given[dimension.valueReference]
-    return int(dimension.variable.start)
 
 
 def start_values(component: DescribedComponent, parameters: Mapping[str, Any]) -> dict[str, StartValue]:

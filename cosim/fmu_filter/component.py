@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.components.description import open_fmu
 from cosim.components.loading import load_fmu
 from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
@@ -21,7 +22,7 @@ from cosim.fmu_filter.journal import SAME, FilterJournal
 from cosim.fmu_filter.many import EnsembleFilter, FmuParticleFilter
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.exchange import ExchangeModel
-from cosim.fmu_model.opening import open_model, start_value
+from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states, usual_step
 from fmus.check.probe import probe
@@ -249,7 +250,7 @@ def _opened(path: str | Path, table: FilterTable, parameters: Mapping[str, float
     """The FMU with its states, or without where they are only saved."""
     if table.kind != "particle":
         return open_model(path, table.interface, states=table.states, outputs=table.outputs, parameters=parameters)
-    starts = {name: start_value(path, name) for name in table.start_deviation if name not in parameters}
+    starts = {name: _start_value(path, name) for name in table.start_deviation if name not in parameters}
     return open_model(path, table.interface, states=(), outputs=table.outputs, parameters={**parameters, **starts})
 
 
@@ -307,3 +308,12 @@ def _signal(model: SealedModel, source: str, causality: str, name: str) -> Signa
         start = model.start_inputs[model.inputs.index(source)] if name == source else 0.0
         return input_signal(name, unit, float(start), text)
     return output_signal(name, unit, text)
+
+
+def _start_value(path: str | Path, name: str) -> float:
+    """The declared start of a variable, 0 where it declares none."""
+    description = open_fmu(Path(path), Path(path).name).description
+    by_name = {variable.name: variable for variable in description.modelVariables}
+    if name not in by_name:
+        raise FmuModelError(f"{path}: no start value {name!r}; {nearest(name, by_name)}")
+    return float(by_name[name].start or 0.0)

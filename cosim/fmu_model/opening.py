@@ -12,7 +12,7 @@ from fmpy.model_description import ModelDescription
 
 from cosim.components.description import open_fmu
 from cosim.components.unpacking import unpack
-from cosim.errors import FmuLoadError, nearest
+from cosim.errors import FmuLoadError
 from cosim.fmu_model.co_simulation import CoSimulationModel
 from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
@@ -86,19 +86,3 @@ def _interface_of(description: ModelDescription, path: Path, interface: Interfac
         instead = ", ".join(offered) or "scheduled execution only, in which no time passes by itself"
         raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {instead}.")
     return chosen
-
-
-def start_value(path: str | Path, name: str) -> float:
-    """The declared start of a variable, 0 where it declares none.
-
-    Args:
-        path: the ``.fmu`` file. name: of the variable.
-
-    Raises:
-        FmuLoadError: the FMU cannot be read. FmuModelError: there is no such variable.
-    """
-    description = open_fmu(Path(path), Path(path).name).description
-    by_name = {variable.name: variable for variable in description.modelVariables}
-    if name not in by_name:
-        raise FmuModelError(f"{path}: no start value {name!r}; {nearest(name, by_name)}")
-    return float(by_name[name].start or 0.0)

@@ -16,12 +16,13 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages, write_messages
 from cosim.errors import OutputError
+from cosim.results.block_file import BLOCK_FILE, read_block
+from cosim.results.formats.growing_npy import read_grown
 from cosim.results.formats.known_formats import FORMATS, check_formats, fastest_first, table_files, usual_file
 from cosim.results.optional import is_installed
-from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS
+from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS, Record, RecordRows
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
-from cosim.results.unfinished import read_unfinished
 
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 PACKETS = "packets.csv"  # of runs with a network
@@ -141,7 +142,7 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapp
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     if not content.get("ended", True):  # it was streamed here, and its program died
         rows, events, logged, sent = (folder / name for name in (usual_file("npy"), EVENTS, MESSAGES, PACKETS))
-        return read_unfinished(rows, events, logged, sent, content), content
+        return _read_unfinished(rows, events, logged, sent, content), content
     table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
     packets = PACKET_ROWS.read(folder / PACKETS) if (folder / PACKETS).exists() else []
@@ -171,3 +172,41 @@ def read_results(directory: str | Path, table: str | None = None) -> ResultData:
         raise OutputError(f"No complete result in {folder}: {_reason(error)}. Run the scenario again.") from error
     except (KeyError, TypeError, ValueError) as error:
         raise OutputError(f"The result in {folder} cannot be read: {error}. Run the scenario again.") from error
+
+
+def _read_unfinished(table: Path, events: Path, messages: Path, packets: Path, content: dict[str, Any]) -> ResultData:
+    """Everything that was whole when the program died."""
+    rows = _all_rows(table)
+    reached = float(rows["time"][-1]) if len(rows) else None
+    content["summary"] |= {"reached": reached, "rows": len(rows)}
+    content["failure"] = f"{content['failure']} They " + (
+        "are none." if reached is None else f"end at t = {reached:g} s."
+    )
+    signals = [SignalInfo(**signal) for signal in content["signals"]]
+    logged = read_messages(messages) if messages.exists() else []
+    sent = _whole_lines(packets, PACKET_ROWS) if packets.exists() else []
+    return ResultData(rows, signals, _whole_lines(events, TELEGRAM_ROWS), messages=logged, packets=sent)
+
+
+def _all_rows(table: Path) -> np.ndarray:
+    """The rows of the table and those of the block, which may be on their way from one to the other while this is
+    read.
+    """
+    path = table.with_name(BLOCK_FILE)
+    block = read_block(path) if path.exists() else None
+    rows = read_grown(table)
+    if block is None:
+        return rows
+    new = block.after(len(rows), rows.dtype)
+    return np.concatenate([rows, new]) if len(new) else rows
+
+
+def _whole_lines(path: Path, rows: RecordRows[Record]) -> list[Record]:
+    """The telegrams or packets but for a last line that was not written to its end."""
+    content = path.read_bytes()
+    if content.endswith(b"\n") or b"\n" not in content:
+        return rows.read(path)
+    with tempfile.TemporaryDirectory() as scratch:
+        whole = Path(scratch) / path.name
+        whole.write_bytes(content[: content.rindex(b"\n") + 1])
+        return rows.read(whole)

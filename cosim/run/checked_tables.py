@@ -17,9 +17,10 @@ from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled
 from cosim.run.layouts import Layout, make_layout
 from cosim.run.remarks import Remarks
-from cosim.run.signal_roles import check_roles, inferred_roles, with_roles
-from cosim.run.step_schedule import idle_settings
+from cosim.run.signal_roles import check_roles, inferred_roles
 from cosim.run.task import RunTask
+from cosim.scenario.scenario_tables import MasterTable
+from cosim.scenario.schema import ScenarioTable
 from plant_models.explained_error import explained
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def parse_tables(task: RunTask, remarks: Remarks) -> Stated:
         ScenarioError: a layout or a connection that cannot be.
     """
     table = task.table
-    remarks.warn(*idle_settings(table.master))
+    remarks.warn(*_idle_settings(table.master))
     layout = None
     if table.balises is not None:
         layout = make_layout(table.balises, table.start, table.stop, task.folder, task.where)
@@ -115,5 +116,24 @@ def complete_tables(task: RunTask, coupled: Coupled, balises: BaliseRoles, remar
     roles = inferred_roles(table, coupled.components, coupled.connections, balises.plant)
     if roles:
         remarks.note(f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}.")
-    table = _check_expectations(with_roles(table, roles), coupled.sources, balises.receivers, task.where)
+    table = _check_expectations(_with_roles(table, roles), coupled.sources, balises.receivers, task.where)
     return task.with_table(table)
+
+
+def _with_roles(table: ScenarioTable, roles: Mapping[str, str]) -> ScenarioTable:
+    """The scenario whose report has these roles too."""
+    return table.model_copy(update={"report": table.report.model_copy(update=dict(roles))}) if roles else table
+
+
+def _idle_settings(table: MasterTable) -> list[str]:
+    """What the user set that has no effect beside the other settings, in words."""
+    needs = {
+        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
+        "tolerance": ("control", "doubling", table.control == "doubling"),
+        "smallest_step": ("control", "doubling", table.control == "doubling"),
+    }
+    return [
+        f"master.{key} has no effect without master.{other} = '{value}'."
+        for key, (other, value, works) in needs.items()
+        if key in table.model_fields_set and not works
+    ]

@@ -255,25 +255,6 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     return lasting
 
 
-def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
-    """What the table says about late events, as parameters of an FMU; a block was made with them.
-
-    Args:
-        where: name of the scenario, for messages.
-
-    Raises:
-        ScenarioError: the component has no such parameter.
-    """
-    given: dict[str, float | str] = {
-        name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)
-    }
-    for name in given:
-        if name not in component.variables:
-            why = "what it does with late events is its own choice" if component.events else "it is told of no events"
-            raise ScenarioError(f"{where}: this {component.kind} has no parameter {name}; {why}.")
-    return given if component.kind == "FMU" else {}
-
-
 def native_fmu(
     system: HybridSystem, version: Any, preset: str | None, where: str, protocol: EventProtocol | None = None
 ) -> Path:

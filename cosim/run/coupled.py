@@ -13,7 +13,7 @@ from cosim.coupling.plan import Plan, make_plan
 from cosim.network.outputs import NAME as NETWORK
 from cosim.run.network import Network, make_network
 from cosim.run.network_connections import connect_over
-from cosim.run.signal_roles import signals_to_record
+from cosim.run.signal_roles import ROLES
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from plant_models.hybrid.units import Unit
@@ -82,9 +82,22 @@ def plan_run(table: ScenarioTable, coupled: Coupled, order: Sequence[str]) -> Pl
     Raises:
         CouplingError: a variable to record does not exist or is not a number.
     """
-    recorded, network = signals_to_record(table), coupled.network
+    recorded, network = _signals_to_record(table), coupled.network
     if network is not None:
         for name, signals in network.hidden(coupled.components).items():
             recorded[name] += [signal for signal in signals if signal not in recorded[name]]
     outputs = None if network is None else network.outputs
     return make_plan(coupled.sources, coupled.routed, order, recorded, coupled.clocks, outputs)
+
+
+def _signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
+    """What is recorded besides the outputs, by component: what its table, balises, report and expectations name."""
+    record = {name: list(component.record) for name, component in table.components.items()}
+    used = [getattr(table.report, role) for role in ROLES]
+    used += [] if table.balises is None else [table.balises.position, table.balises.speed, table.balises.odometer]
+    used += [getattr(item, key, None) for item in table.expect for key in ("signal", "reference")]
+    for name in filter(None, used):
+        component, _, signal = name.partition(".")
+        if component in record and signal not in record[component]:
+            record[component].append(signal)
+    return record

@@ -19,8 +19,8 @@ from cosim.components.logged_slave import log_calls
 from cosim.components.start_values import StartValue, start_values
 from cosim.coupling.instants import followed
 from cosim.diagnostics.call_log import CallLog
-from cosim.errors import CouplingError
-from cosim.run.component_models import component_factories, protocol_parameters
+from cosim.errors import CouplingError, ScenarioError
+from cosim.run.component_models import LATE_PARAMETERS, component_factories
 from cosim.run.coupled import Coupled
 from cosim.run.remarks import Remarks
 from cosim.run.run_seeds import component_seed
@@ -44,7 +44,7 @@ def _component_starts(table: ComponentTable, component: Component, run_seed: int
     """Start values of a component in a run, by name; its arrays get their shapes."""
     if table.filter is not None:
         return {}  # they are those of its FMU, which has taken them
-    late = protocol_parameters(table, component, f"components.{component.name}")
+    late = _protocol_parameters(table, component, f"components.{component.name}")
     return start_values(component, late | table.parameters | component_seed(component, table.parameters, run_seed))
 
 
@@ -156,3 +156,15 @@ def _free(components: Mapping[str, Component]) -> None:
     for component in components.values():
         component.terminate()
         component.free()
+
+
+def _protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
+    """What the table says about late events, as parameters of an FMU; a block was made with them."""
+    given: dict[str, float | str] = {
+        name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)
+    }
+    for name in given:
+        if name not in component.variables:
+            why = "what it does with late events is its own choice" if component.events else "it is told of no events"
+            raise ScenarioError(f"{where}: this {component.kind} has no parameter {name}; {why}.")
+    return given if component.kind == "FMU" else {}

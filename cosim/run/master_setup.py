@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from cosim.compiled.choice import choose_stepper
@@ -24,7 +24,7 @@ from cosim.results.recorder import Recorder
 from cosim.results.result_data import SignalInfo
 from cosim.results.stream import Stream
 from cosim.run.services import Services
-from cosim.run.signal_roles import switching_signals
+from cosim.run.signal_roles import report_spec
 from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
@@ -66,22 +66,6 @@ def make_master(
     return master
 
 
-def master_notes(master: Master) -> list[str]:
-    """What the choice of the stepper and of what is done at events explains.
-
-    Args:
-        master: of the run.
-    """
-    events, network = master.system.events, master.system.network
-    notes = [*([] if events is None else events.notes), *master.stepper.notes]
-    if network is not None and master.stepper.compiled is not None:
-        notes.append(
-            "Packets are sent and delivered by Python: the compiled stepper halts at points with one, "
-            "and leaves steps with one inside to it."
-        )
-    return notes
-
-
 def make_recorder(
     table: ScenarioTable, signals: Sequence[SignalInfo], expected_rows: int, stream: Stream | None = None
 ) -> Recorder:
@@ -96,7 +80,7 @@ def make_recorder(
         expected_rows,
         memory=1e6 * table.master.record_memory,
         every=table.master.record_every,
-        switching=switching_signals(table, [signal.name for signal in signals]),
+        switching=_switching_signals(table, [signal.name for signal in signals]),
         stream=stream,
     )
 
@@ -146,3 +130,13 @@ def _control(table: MasterTable) -> Callable[[System], StepControl]:
         return FixedStep
     second_order = table.inputs == "extrapolate" or (table.inputs == "interpolate" and table.algorithm == "iterate")
     return lambda system: DoublingStep(system, table.tolerance, 3 if second_order else 2, table.smallest_step)
+
+
+def _switching_signals(table: ScenarioTable, recorded: Iterable[str]) -> list[int]:
+    """Which signals are judged by when they turn from zero to another number, or back: true fault, detection, and what
+    expectations look at.
+    """
+    spec = report_spec(table)
+    judged = {spec.true_fault, *(f"{observer}.{spec.detection}" for observer in spec.observers)}
+    judged |= {getattr(item, "signal", None) for item in table.expect}
+    return [place for place, name in enumerate(recorded) if name in judged]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,10 @@ from cosim.coupling.plan import Plan
 from cosim.errors import ScenarioError, nearest
 from cosim.network.outputs import NAME, NetworkOutputs
 from cosim.network.service import NetworkService, PacketListener
-from cosim.network.settings import NetworkSettings
-from cosim.scenario.network_table import network_settings
+from cosim.network.settings import PRESETS, NetworkSettings, Node
+from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.schema import ScenarioTable
+from plant_models.railway.network.protocols import try_once_discard
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +136,7 @@ def make_network(table: ScenarioTable, components: Mapping[str, Component], fold
     for name in table.network.receivers or ():
         if name not in components:
             raise ScenarioError(f"{where}: network.receivers: no component {name!r}; {nearest(name, components)}")
-    settings = network_settings(table.network, folder, where)
+    settings = _network_settings(table.network, folder, where)
     return Network(settings, NetworkOutputs(settings, components))
 
 
@@ -145,3 +147,56 @@ def is_wired(pairs: Sequence[Link], component: str, event: str) -> bool:
         pairs: connections of the scenario. component: whose event. event: its name.
     """
     return any(pair[1] in (f"{component}.{event}", f"{component}.{event}_count") for pair in pairs)
+
+
+def _network_settings(table: NetworkTable, folder: Path, where: str) -> NetworkSettings:
+    """The settings of a network; what the table does not say is that of its preset."""
+    names, preset = list(table.nodes), {} if table.preset is None else dict(PRESETS[table.preset])
+    keys = ("delay_model", "delay", "delay_spread")
+    delays = {k: preset[k] if k in preset and k not in table.model_fields_set else getattr(table, k) for k in keys}
+    sizes = [len(signals) for signals in table.nodes.values()]
+    weights = None
+    if table.protocol == "try-once-discard":
+        weights = try_once_discard(sizes, [table.scales.get(signal, 1.0) for signal in table.signals])
+    elif table.protocol == "quadratic":
+        weights = np.array([(table.weights or {})[name] for name in names])
+    file = None if table.delay_file is None else (folder / table.delay_file).resolve()
+    as_written = {f.name: getattr(table, f.name) for f in fields(NetworkSettings) if hasattr(table, f.name)}
+    return NetworkSettings(
+        **as_written
+        | delays
+        | {
+            "nodes": tuple(Node(name, tuple(signals)) for name, signals in table.nodes.items()),
+            "order": tuple(names.index(name) for name in table.order or ()),
+            "weights": weights,
+            "period": table.slot,
+            "delays": () if file is None else _read_delays(file, f"{where}: network.delay_file"),
+        }
+    )
+
+
+def _read_delays(path: Path, where: str) -> list[float]:
+    """Recorded delays [s] from a CSV file with the column ``delay``."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            reader = csv.DictReader(stream, skipinitialspace=True)
+            if "delay" not in (reader.fieldnames or []):
+                raise ScenarioError(f"{where}: {path} has no column 'delay' in the header {reader.fieldnames}.")
+            rows = [(reader.line_num, row["delay"]) for row in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ScenarioError(f"{where}: {path} cannot be read: {error}.") from error
+    delays = []
+    for line, text in rows:
+        try:
+            delay = float(text)
+        except (TypeError, ValueError):
+            raise ScenarioError(f"{where}: {path}, line {line}: {text!r} is no number.") from None
+        if not 0.0 <= delay < float("inf"):
+            raise ScenarioError(
+                f"{where}: {path}, line {line}: delay {delay:g} s; a packet does not arrive before it is sent, "
+                f"and a lost one is left to 'loss_fraction'."
+            )
+        delays.append(delay)
+    if not delays:
+        raise ScenarioError(f"{where}: {path} holds no delays.")
+    return delays

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 
+from cosim.components.component import Component
+from cosim.components.recording import RecordingComponent
 from cosim.coupling.plan import Plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.master.interpolation.attach import attach_interpolators
@@ -13,13 +15,14 @@ from cosim.master.master import Master, close
 from cosim.results.stream import Stream
 from cosim.run.checked import Checked
 from cosim.run.coupled import Coupled, plan_run
-from cosim.run.coupling_warnings import coupling_warnings, interpolation_note, recording_notes
+from cosim.run.coupling_warnings import coupling_warnings
 from cosim.run.loaded_components import instantiate_components
-from cosim.run.master_setup import make_master, master_notes
+from cosim.run.master_setup import make_master
 from cosim.run.remarks import Remarks
 from cosim.run.services import Services, make_services
 from cosim.run.streaming import Streaming, begin_stream
 from cosim.run.task import RunTask
+from cosim.scenario.scenario_tables import ComponentTable
 
 Progress = Callable[[float, float], None]
 
@@ -74,7 +77,7 @@ def make_ready(
     _remark_coupling(checked, plan, remarks)
     services = make_services(checked, plan, remarks)
     master = make_master(checked.task, plan, services, checked.schedule.algorithm, progress)
-    remarks.note(*master_notes(master))
+    remarks.note(*_master_notes(master))
     stream = None if streaming is None else begin_stream(streaming, checked, services, master, remarks)
     return Ready(checked, services, master, stream)
 
@@ -86,6 +89,51 @@ def _remark_coupling(checked: Checked, plan: Plan, remarks: Remarks) -> None:
     remarks.warn(*warnings)
     remarks.note(*notes, *checked.schedule.algorithm.notes)
     interpolators = attach_interpolators(plan, table.master.inputs)
-    remarks.note(*recording_notes(coupled.components, table.components))
+    remarks.note(*_recording_notes(coupled.components, table.components))
     if table.master.inputs != "hold":
-        remarks.note(interpolation_note(interpolators, table.master.inputs))
+        remarks.note(_interpolation_note(interpolators, table.master.inputs))
+
+
+def _master_notes(master: Master) -> list[str]:
+    """What the choice of the stepper and of what is done at events explains."""
+    events, network = master.system.events, master.system.network
+    notes = [*([] if events is None else events.notes), *master.stepper.notes]
+    if network is not None and master.stepper.compiled is not None:
+        notes.append(
+            "Packets are sent and delivered by Python: the compiled stepper halts at points with one, "
+            "and leaves steps with one inside to it."
+        )
+    return notes
+
+
+_CARRIED = {
+    "derivatives": "value and slope to",
+    "intermediate": "set within the step of",
+    "mean": "mean over the step to",
+    "held": "held, because discrete, for",
+}
+
+
+def _interpolation_note(interpolators: Mapping[str, str], inputs: str) -> str:
+    """How components are told of inputs that follow a line."""
+    by_interpolator: dict[str, list[str]] = {}
+    for name, interpolator in interpolators.items():
+        by_interpolator.setdefault(interpolator, []).append(name)
+    said = "; ".join(f"{_CARRIED[interpolator]}: {', '.join(names)}" for interpolator, names in by_interpolator.items())
+    return f"Inputs between communication points ({inputs}): {said or 'none are connected'}."
+
+
+def _recording_notes(components: Mapping[str, Component], tables: Mapping[str, ComponentTable]) -> list[str]:
+    """Which columns of tables are held and which are lines, where the scenario leaves that to the targets."""
+    notes = []
+    for name, component in components.items():
+        if not isinstance(component, RecordingComponent) or component.recording.of_run:
+            continue
+        if tables[name].interpolation is not None:
+            continue
+        held, lines = sorted(component.held_outputs), sorted(component.line_outputs)
+        said = [f"held from row to row: {', '.join(held)}"] if held else []
+        said += [f"on lines between rows: {', '.join(lines)}"] if lines else []
+        if said:
+            notes.append(f"{name}: {'; '.join(said)}. Where that is wrong say so by 'interpolation'.")
+    return notes

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cosim.balises.service import BaliseService
+from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.network.service import NetworkService
 from cosim.run.balise_service import Choice, choose_method, make_service
 from cosim.run.checked import Checked
-from cosim.run.coupling_warnings import late_telegram_warnings
 from cosim.run.remarks import Remarks
 from cosim.scenario.scenario_tables import BalisesTable
 
@@ -53,5 +54,20 @@ def _choose(table: BalisesTable, checked: Checked, remarks: Remarks) -> Choice:
     choice = choose_method(table, loaded.components[plant], make, starts, axis.start, axis.step)
     remarks.warn(*choice.warnings)
     remarks.note(f"Balises localised by '{choice.method}': {choice.reason}.")
-    remarks.warn(*late_telegram_warnings(table, loaded.components, checked.balises.receivers))
+    remarks.warn(*_late_telegram_warnings(table, loaded.components, checked.balises.receivers))
     return choice
+
+
+def _late_telegram_warnings(
+    table: BalisesTable, components: Mapping[str, Component], receivers: Sequence[str]
+) -> list[str]:
+    """A block replays what arrives late, and so does an FMU with the parameter `late_policy`; another one may not."""
+    delay = table.latency + table.latency_jitter
+    sealed = [n for n in receivers if components[n].kind == "FMU" and "late_policy" not in components[n].variables]
+    if not sealed or delay <= 0.0:
+        return []
+    return [
+        f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: a sealed FMU without a parameter late_policy "
+        f"does not "
+        "say what it does with late stamps."
+    ]

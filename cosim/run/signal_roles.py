@@ -63,15 +63,6 @@ def inferred_roles(
     return {role: name for role, name in free.items() if _fits(name, role, components)}
 
 
-def with_roles(table: ScenarioTable, roles: Mapping[str, str]) -> ScenarioTable:
-    """The scenario whose report has these roles too.
-
-    Args:
-        table: of the scenario.
-    """
-    return table.model_copy(update={"report": table.report.model_copy(update=dict(roles))}) if roles else table
-
-
 def _only(names: Iterable[str]) -> str | None:
     """The name, where there is but one."""
     found = list(names)
@@ -85,35 +76,6 @@ def _fits(name: str, role: str, components: Mapping[str, Component]) -> bool:
         return False
     component, _, signal = name.partition(".")
     return len(components[component].elements(signal)) == 1
-
-
-def signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
-    """What is recorded besides the outputs, by component: what its table, balises, report and expectations name."""
-    record = {name: list(component.record) for name, component in table.components.items()}
-    used = [getattr(table.report, role) for role in ROLES]
-    used += [] if table.balises is None else [table.balises.position, table.balises.speed, table.balises.odometer]
-    used += [getattr(item, key, None) for item in table.expect for key in ("signal", "reference")]
-    for name in filter(None, used):
-        component, _, signal = name.partition(".")
-        if component in record and signal not in record[component]:
-            record[component].append(signal)
-    return record
-
-
-def switching_signals(table: ScenarioTable, recorded: Iterable[str]) -> list[int]:
-    """Which signals are judged by when they turn from zero to another number, or back: true fault, detection, and what
-    expectations look at.
-
-    Args:
-        table: of the scenario, with its roles. recorded: names of the recorded signals.
-
-    Returns:
-        Their places among the recorded ones.
-    """
-    spec = report_spec(table)
-    judged = {spec.true_fault, *(f"{observer}.{spec.detection}" for observer in spec.observers)}
-    judged |= {getattr(item, "signal", None) for item in table.expect}
-    return [place for place, name in enumerate(recorded) if name in judged]
 
 
 def check_roles(table: ScenarioTable, components: Mapping[str, Component], where: str) -> None:

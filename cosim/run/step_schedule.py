@@ -11,7 +11,6 @@ from cosim.coupling.strong import topological
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.run.balise_service import BaliseRoles
 from cosim.run.coupled import Coupled
-from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
 
 
@@ -66,21 +65,3 @@ def stepping_groups(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles
     train = [name for name in (balises.plant or truth,) if name in components]
     slow = [name for name, component in table.components.items() if component.every > 1]
     return execution_groups(components, connections, before, train, slow)
-
-
-def idle_settings(table: MasterTable) -> list[str]:
-    """What the user set that has no effect beside the other settings, in words.
-
-    Args:
-        table: of the scenario.
-    """
-    needs = {
-        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
-        "tolerance": ("control", "doubling", table.control == "doubling"),
-        "smallest_step": ("control", "doubling", table.control == "doubling"),
-    }
-    return [
-        f"master.{key} has no effect without master.{other} = '{value}'."
-        for key, (other, value, works) in needs.items()
-        if key in table.model_fields_set and not works
-    ]

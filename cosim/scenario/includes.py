@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.merging import Line, join, merge, removed_components
+from cosim.scenario.merging import Line, join, merge
 from cosim.scenario.override import flat, override
 from cosim.scenario.package_names import is_package
 from cosim.scenario.paths import absolute, map_paths
@@ -156,7 +156,7 @@ def _add(earlier: Tables, later: Tables, by: Path) -> None:
             place = tables.places.get((CONNECTIONS,), by)
             raise ScenarioError(f"{place}: connections: expected a list of lines 'source.signal -> target.signal'.")
     try:
-        removed = removed_components(earlier.data, later.data)
+        removed = _removed_components(earlier.data, later.data)
         lines = join(earlier.lines, later.lines, removed)
     except ScenarioError as error:
         raise ScenarioError(f"{by}: {error}") from error
@@ -186,3 +186,13 @@ def _places(data: Any, place: str, key: Key = ()) -> dict[Key, str]:
         here = (*key, str(name))
         found |= {here: place} | _places(value, place, here)
     return found
+
+
+def _removed_components(earlier: Mapping[str, Any], later: Mapping[str, Any]) -> set[str]:
+    """Names of the components that the later tables set to false."""
+    components, old = later.get("components"), earlier.get("components", {})
+    names = {name for name, table in components.items() if table is False} if isinstance(components, dict) else set()
+    for name in sorted(names):
+        if name not in old:
+            raise ScenarioError(f"components.{name} = false: no included file has this component; {nearest(name, old)}")
+    return names

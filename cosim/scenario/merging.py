@@ -31,20 +31,6 @@ def merge(earlier: dict[str, Any], later: Mapping[str, Any]) -> None:
     _merge({k: v for k, v in later.items() if k != "connections"}, earlier, ())
 
 
-def removed_components(earlier: Mapping[str, Any], later: Mapping[str, Any]) -> set[str]:
-    """Names of the components that the later tables set to false.
-
-    Raises:
-        ScenarioError: the earlier tables do not have one of them.
-    """
-    components, old = later.get("components"), earlier.get("components", {})
-    names = {name for name, table in components.items() if table is False} if isinstance(components, dict) else set()
-    for name in sorted(names):
-        if name not in old:
-            raise ScenarioError(f"components.{name} = false: no included file has this component; {nearest(name, old)}")
-    return names
-
-
 def _merge(later: Mapping[str, Any], earlier: dict[str, Any], path: tuple[str, ...]) -> None:
     for name, value in later.items():
         before = earlier.get(name)

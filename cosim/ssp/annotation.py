@@ -15,10 +15,10 @@ from typing import Any
 
 from lxml import etree
 
-from cosim.ssp.common import UnitTable, read_transformation, read_type
-from cosim.ssp.document import NAMESPACES, Node, fail, find, find_all, flag
+from cosim.ssp.common import UnitTable, read_type
+from cosim.ssp.document import NAMESPACES, Node, fail, find, find_all
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.package_data import Parameter, SsdEntry
+from cosim.ssp.package_data import Parameter
 
 _TYPE = "fmu-observer.scenario"
 NAMESPACE = "urn:fmu-observer:scenario:1"
@@ -47,26 +47,6 @@ def read_parameter_set(root: Node, prefix: str, lapses: Lapses) -> tuple[Paramet
             fail(node, f"parameter {node.get('name')!r} is given twice in this set.")
         parameters[parameter.name] = parameter
     return tuple(parameters.values())
-
-
-def read_mapping(root: Node) -> tuple[SsdEntry, ...]:
-    """The entries of a valid ParameterMapping.
-
-    Args:
-        root: element of the document.
-
-    Raises:
-        ScenarioError: two entries have one target.
-    """
-    entries: dict[str, SsdEntry] = {}
-    for node in find_all(root, "ssm:MappingEntry"):
-        source, target = node.get("source"), node.get("target")
-        if target in entries:
-            fail(node, f"two parameters are mapped to {target!r}; map one.")
-        entries[target] = SsdEntry(
-            source, target, flag(node, "suppressUnitConversion"), read_transformation(node), node
-        )
-    return tuple(entries.values())
 
 
 def _parameter(node: Node, units: UnitTable, prefix: str) -> Parameter:

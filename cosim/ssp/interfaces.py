@@ -6,13 +6,10 @@ from __future__ import annotations
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from cosim.components.description import read_description
-from cosim.errors import FmuLoadError, nearest
+from cosim.errors import nearest
 from cosim.ssp.common import FAMILIES, NamedUnit
 from cosim.ssp.document import Node, fail
-from cosim.ssp.lapses import Lapses
-from cosim.ssp.package_data import ComponentElement, Connector
-from fmus.fmi.sense import doubled_names
+from cosim.ssp.package_data import Connector
 from fmus.fmi.types import enumeration_items
 from fmus.fmi.units import Units
 from plant_models.hybrid.units import UnitError
@@ -79,22 +76,3 @@ class Interface:
                 f"connector {connector.name!r} is of type {connector.type.name}, the variable of {self.what} of type "
                 f"{variable.type}.",
             )
-
-
-def interface_of(element: ComponentElement, lapses: Lapses) -> Interface:
-    """The interface of a component's FMU.
-
-    Args:
-        element: the component. lapses: receives names that it gives twice.
-
-    Raises:
-        ScenarioError: its file is no FMU that can be read.
-    """
-    try:
-        description = read_description(element.fmu, element.name)
-    except FmuLoadError as error:
-        fail(element.node, str(error).replace(str(element.fmu), element.member))
-    doubled = doubled_names(description)
-    if doubled is not None:
-        lapses.forgive(element.node, f"{element.member}: {doubled}")
-    return Interface(description, f"component {element.name!r} ({element.member})")

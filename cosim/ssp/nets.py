@@ -6,13 +6,14 @@ Flattens; changes nothing. The directions follow the table "Allowed Connections"
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from cosim.errors import nearest
+from cosim.components.description import read_description
+from cosim.errors import FmuLoadError, nearest
 from cosim.ssp.common import NamedUnit, Step
 from cosim.ssp.document import Node, fail
-from cosim.ssp.interfaces import Interface, interface_of
+from cosim.ssp.interfaces import Interface
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.package_data import (
     ComponentElement,
@@ -23,6 +24,7 @@ from cosim.ssp.package_data import (
     SsdElement,
     SystemElement,
 )
+from fmus.fmi.sense import doubled_names
 
 Path = tuple[str, ...]
 """Names of the elements from the root system downwards; the root itself is the empty path."""
@@ -132,7 +134,7 @@ class Nets:
         self.root = root
         self.elements: dict[Path, SsdElement] = dict(_walk(root, ()))
         self.interfaces: dict[Path, Interface] = {
-            p: interface_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
+            p: _interface_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
         }
         for path, interface in self.interfaces.items():
             for connector in self.elements[path].connectors.values():
@@ -280,20 +282,13 @@ def _walk(element: SsdElement, path: Path) -> Iterator[tuple[Path, SsdElement]]:
             yield from _walk(child, (*path, name))
 
 
-def flat_names(paths: Iterable[Path]) -> dict[Path, str]:
-    """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits
-    and ``_`` replaced.
-
-    Args:
-        paths: of components.
-    """
-    names: dict[Path, str] = {}
-    for path in paths:
-        parts = ["".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in part) for part in path]
-        name = "__".join(parts)
-        name = f"_{name}" if name[:1].isdigit() else name
-        base, number = name, 2
-        while name in names.values():
-            name, number = f"{base}_{number}", number + 1
-        names[path] = name
-    return names
+def _interface_of(element: ComponentElement, lapses: Lapses) -> Interface:
+    """The interface of a component's FMU."""
+    try:
+        description = read_description(element.fmu, element.name)
+    except FmuLoadError as error:
+        fail(element.node, str(error).replace(str(element.fmu), element.member))
+    doubled = doubled_names(description)
+    if doubled is not None:
+        lapses.forgive(element.node, f"{element.member}: {doubled}")
+    return Interface(description, f"component {element.name!r} ({element.member})")

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
+from cosim.coupling.transformation import as_affine
 from cosim.errors import ScenarioError, nearest
 from cosim.run.component_models import LATE_PARAMETERS
 from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
-from cosim.ssp.document import fail
+from cosim.ssp.common import ValueMap
+from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
-from cosim.ssp.nets import Chain, Nets, Path, flat_names
+from cosim.ssp.nets import Chain, Nets, Path
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.package_data import ComponentElement, SsdStructure
-from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
+from cosim.ssp.pipe import Pipe, numeric
 from cosim.ssp.reader import READS_BALISES
 from cosim.ssp.system_structure import read_structure
 
@@ -108,7 +110,7 @@ def load_structure(structure: SsdStructure, package: Package) -> Loaded:
         fail(structure.system.node, "the system holds no component; there is nothing to run.")
     starts = start_values(nets, package.lapses)
     loaded = Loaded({}, package.unpacked)
-    names = flat_names([path for path in nets.interfaces if not _takes_our_place(nets, path, structure)])
+    names = _flat_names([path for path in nets.interfaces if not _takes_our_place(nets, path, structure)])
     tables = loaded.tables
     tables |= {"title": structure.name, "description": structure.description}
     if not structure.extras:
@@ -209,12 +211,12 @@ def _effect(pipe: Pipe, chain: Chain, nets: Nets) -> dict[str, Any]:
     node, kinds = chain.hops[-1].node, {step.kind for step in pipe.maps}
     source, target = (nets.interfaces[point.path].items(point.name) for point in (chain.root, chain.sink))
     if kinds == {"Enumeration"}:
-        table = by_items(pipe.maps, source, target, node)
+        table = _by_items(pipe.maps, source, target, node)
         domain = frozenset(map(float, source.values()))
     else:
         table = numeric(pipe.maps, node)
         domain = frozenset((0.0, 1.0)) if kinds == {"Boolean"} else frozenset(map(float, source.values()))
-    simple = simplest(table, domain)
+    simple = _simplest(table, domain)
     if len(simple) == 2 and not isinstance(simple[0], tuple):
         return {"factor": simple[0], "offset": simple[1]}
     return {"values": [list(entry) for entry in simple]}
@@ -225,3 +227,46 @@ def _localise_files(tables: dict[str, Any], package: Package) -> None:
     balises = tables.get("balises")
     if isinstance(balises, dict) and balises.get("file") in package.sizes:
         tables["balises"] = balises | {"file": str(package.file(balises["file"]))}
+
+
+def _by_items(
+    maps: tuple[ValueMap, ...], source: Mapping[str, int], target: Mapping[str, int], node: Node
+) -> dict[float, float]:
+    """Tables of item names in a row as one of numbers; an item without an entry keeps its name, or else its number."""
+    table: dict[float, float] = {}
+    for first, value in source.items():
+        name = first
+        for step in maps:
+            name = step.entries.get(name, name)
+        if name != first and name not in target:
+            fail(node, f"item {first!r} is mapped to {name!r}, which is no item of the target; {nearest(name, target)}")
+        table[float(value)] = float(target.get(name, value))
+    return table
+
+
+def _simplest(
+    table: Mapping[float, float], domain: frozenset[float]
+) -> tuple[float, float] | tuple[tuple[float, float], ...]:
+    """A table as ``(factor, offset)`` where that does the same on its domain, else as its entries that change
+    something.
+    """
+    affine = as_affine(table, domain)
+    if affine is not None:
+        return affine
+    return tuple((source, target) for source, target in sorted(table.items()) if source != target)
+
+
+def _flat_names(paths: Iterable[Path]) -> dict[Path, str]:
+    """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits
+    and ``_`` replaced.
+    """
+    names: dict[Path, str] = {}
+    for path in paths:
+        parts = ["".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in part) for part in path]
+        name = "__".join(parts)
+        name = f"_{name}" if name[:1].isdigit() else name
+        base, number = name, 2
+        while name in names.values():
+            name, number = f"{base}_{number}", number + 1
+        names[path] = name
+    return names

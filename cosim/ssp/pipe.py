@@ -6,11 +6,8 @@ Pure functions on numbers and units; knows neither systems nor FMUs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from cosim.coupling.transformation import as_affine
-from cosim.errors import nearest
 from cosim.ssp.common import Linear, NamedUnit, Step, ValueMap
 from cosim.ssp.document import Node, fail
 from plant_models.hybrid.units import UnitError, conversion
@@ -126,41 +123,6 @@ def numeric(maps: tuple[ValueMap, ...], node: Node) -> dict[float, float]:
         keys = {**table, **entries}
         table = {key: entries.get(table.get(key, key), table.get(key, key)) for key in keys}
     return table
-
-
-def by_items(
-    maps: tuple[ValueMap, ...], source: Mapping[str, int], target: Mapping[str, int], node: Node
-) -> dict[float, float]:
-    """Tables of item names in a row as a table of numbers; an item without an entry keeps its name, or else its number.
-
-    Args:
-        source, target: items of the two enumerations.
-        maps: value maps of both ends. node: element of the document.
-
-    Raises:
-        ScenarioError: an entry leads to an item that the target does not have.
-    """
-    table: dict[float, float] = {}
-    for first, value in source.items():
-        name = first
-        for step in maps:
-            name = step.entries.get(name, name)
-        if name != first and name not in target:
-            fail(node, f"item {first!r} is mapped to {name!r}, which is no item of the target; {nearest(name, target)}")
-        table[float(value)] = float(target.get(name, value))
-    return table
-
-
-def simplest(
-    table: Mapping[float, float], domain: frozenset[float]
-) -> tuple[float, float] | tuple[tuple[float, float], ...]:
-    """A table as ``(factor, offset)`` where that does the same on its domain, else as its entries that change
-    something.
-    """
-    affine = as_affine(table, domain)
-    if affine is not None:
-        return affine
-    return tuple((source, target) for source, target in sorted(table.items()) if source != target)
 
 
 def _numbers(step: ValueMap, node: Node) -> dict[float, float]:

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from cosim.errors import nearest
 from cosim.scenario.package_names import split_variant
-from cosim.ssp.annotation import read_extras, read_mapping, read_parameter_set
+from cosim.ssp.annotation import read_extras, read_parameter_set
 from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag, parse, short, validated
 from cosim.ssp.lapses import Lapses
@@ -225,7 +225,7 @@ class _Reader:
         mapping: tuple[SsdEntry, ...] | None = None
         mapped = find(node, "ssd:ParameterMapping")
         if mapped is not None:
-            mapping = read_mapping(self._part(mapped, "ssm", component, mapped))
+            mapping = _read_mapping(self._part(mapped, "ssm", component, mapped))
         return Binding(parameters, mapping, node)
 
     def _part(self, node: Node, kind: str, component: str | None, holder: Node | None = None) -> Node:
@@ -298,3 +298,16 @@ def _indices(text: str) -> tuple[int, ...]:
 
 def _title(package: Package, member: str) -> str:
     return f"{package.title}: {member}"
+
+
+def _read_mapping(root: Node) -> tuple[SsdEntry, ...]:
+    """The entries of a valid ParameterMapping."""
+    entries: dict[str, SsdEntry] = {}
+    for node in find_all(root, "ssm:MappingEntry"):
+        source, target = node.get("source"), node.get("target")
+        if target in entries:
+            fail(node, f"two parameters are mapped to {target!r}; map one.")
+        entries[target] = SsdEntry(
+            source, target, flag(node, "suppressUnitConversion"), read_transformation(node), node
+        )
+    return tuple(entries.values())

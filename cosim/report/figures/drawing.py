@@ -10,10 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from cosim.drawing.style import ALARM, BLACK, MARK, TIME, ZONE
-from cosim.evaluation.event_counts import accepted_stamps
+from cosim.drawing.style import MARK, ZONE
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.scales import curve_size
 from cosim.results.result import Result
 from fmus.tables.numbers import number
 
@@ -59,28 +57,6 @@ def curve(ax: Axes, time: np.ndarray, values: np.ndarray, limits: tuple[float, f
     ax.plot(*thin(time, shown), **line)
 
 
-def is_wild(values: np.ndarray, limits: tuple[float, float] | None) -> bool:
-    """Whether a curve has left the axis by more than its height, for more than a spike.
-
-    Args:
-        values: values, shape (rows,).
-        limits: lowest and highest value of the axis, or None.
-    """
-    return limits is not None and curve_size(values - sum(limits) / 2) > 1.5 * (limits[1] - limits[0])
-
-
-def is_noisy(values: np.ndarray) -> bool:
-    """Whether a curve turns round at more than a quarter of its rows: drawn in full width it would hide all others.
-
-    Args:
-        values: values, shape (rows,).
-    """
-    with np.errstate(invalid="ignore", over="ignore"):
-        steps = np.diff(values)
-        turns = steps[1:] * steps[:-1] < 0
-    return bool(np.count_nonzero(turns) > 0.25 * max(len(turns), 100))
-
-
 def shade_zones(ax: Axes, spec: ReportSpec) -> None:
     """Shade the low-adhesion zones behind the curves.
 
@@ -90,24 +66,6 @@ def shade_zones(ax: Axes, spec: ReportSpec) -> None:
     """
     for i, (start, end) in enumerate(spec.zones):
         ax.axvspan(start, end, color=ZONE, linewidth=0, zorder=0, label="low adhesion" if i == 0 else None)
-
-
-def balise_ticks(ax: Axes, result: Result) -> None:
-    """Ticks along the bottom where balises were passed and used; false telegrams stand taller.
-
-    Args:
-        ax: the axes.
-        result: with the telegrams.
-    """
-    used = accepted_stamps(result.events)
-    false = [event.stamp for event in result.events if event.kind == "false"]
-    across = ax.get_xaxis_transform()
-    if used:
-        ax.vlines(used, 0.0, 0.035, transform=across, color=BLACK, linewidth=0.6)
-        ax.plot([], [], "|", color=BLACK, label="balises")
-    if false:
-        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM, linewidth=1.6)
-        ax.plot([], [], "|", color=ALARM, markersize=10, markeredgewidth=1.6, label="false telegrams")
 
 
 def mark_evaluation(ax: Axes, result: Result, spec: ReportSpec) -> None:
@@ -122,18 +80,6 @@ def mark_evaluation(ax: Axes, result: Result, spec: ReportSpec) -> None:
         ax.axvline(
             spec.evaluate_after, color=MARK, linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on"
         )
-
-
-def time_axis(ax: Axes, result: Result) -> None:
-    """Label the time axis and give it the length of the run.
-
-    Args:
-        ax: the axes.
-        result: the run.
-    """
-    ax.set_xlabel(TIME)
-    if len(result.time) and result.time[-1] > result.time[0]:
-        ax.set_xlim(float(result.time[0]), float(result.time[-1]))
 
 
 def logarithmic(ax: Axes) -> None:

@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import MARK, WILD_LINE, observer_line
+from cosim.drawing.style import ALARM, BLACK, MARK, WILD_LINE, observer_line
+from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.metrics import error_size
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import balise_ticks, curve, logarithmic, mark_evaluation, shade_zones
+from cosim.report.figures.drawing import curve, logarithmic, mark_evaluation, shade_zones
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum, window_length
 from cosim.results.result import Result
@@ -103,7 +104,7 @@ class _ErrorPanel(Panel):
             for observer, error in cls._errors(result, spec).items()
         ]
         draw_errors(ax, curves, cls.quantity, cls.unit)
-        balise_ticks(ax, result)
+        _balise_ticks(ax, result)
         mark_evaluation(ax, result, spec)
 
     @classmethod
@@ -137,3 +138,16 @@ class PositionErrorPanel(_ErrorPanel):
     caption = "Estimated minus true position, on a scale chosen in the same way."
     place = 3
     quantity, unit = "position", "m"
+
+
+def _balise_ticks(ax: Axes, result: Result) -> None:
+    """Ticks along the bottom where balises were passed and used; false telegrams stand taller."""
+    used = accepted_stamps(result.events)
+    false = [event.stamp for event in result.events if event.kind == "false"]
+    across = ax.get_xaxis_transform()
+    if used:
+        ax.vlines(used, 0.0, 0.035, transform=across, color=BLACK, linewidth=0.6)
+        ax.plot([], [], "|", color=BLACK, label="balises")
+    if false:
+        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM, linewidth=1.6)
+        ax.plot([], [], "|", color=ALARM, markersize=10, markeredgewidth=1.6, label="false telegrams")

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import PANEL_SIZE, axes_or_new, styled
+from cosim.drawing.style import PANEL_SIZE, TIME, axes_or_new, styled
 from cosim.evaluation.roles import estimate
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import legend_above, time_axis
+from cosim.report.figures.drawing import legend_above
 from cosim.results.result import Result
 
 
@@ -51,7 +51,7 @@ class Panel(ABC):
         ax = axes_or_new(ax, cls.size)
         cls.plot(result, spec, ax)
         if cls.over_time:
-            time_axis(ax, result)
+            _time_axis(ax, result)
         legend_above(ax)
         return ax
 
@@ -81,3 +81,10 @@ def any_estimate(result: Result, spec: ReportSpec, *signals: str) -> bool:
         result: the run. spec: roles of its signals. signals: names of outputs.
     """
     return any(estimate(result, observer, signal) is not None for observer in spec.observers for signal in signals)
+
+
+def _time_axis(ax: Axes, result: Result) -> None:
+    """Label the time axis and give it the length of the run."""
+    ax.set_xlabel(TIME)
+    if len(result.time) and result.time[-1] > result.time[0]:
+        ax.set_xlim(float(result.time[0]), float(result.time[-1]))

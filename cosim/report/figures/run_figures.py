@@ -24,9 +24,9 @@ from cosim.drawing.style import (
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, is_noisy, is_wild, shade_zones
+from cosim.report.figures.drawing import curve, shade_zones
 from cosim.report.figures.panel import Panel, any_estimate
-from cosim.report.figures.scales import bounded, slip_in_percent, value_limits
+from cosim.report.figures.scales import bounded, curve_size, slip_in_percent, value_limits
 from cosim.results.result import Result
 
 KMH = 3.6  # km/h in a m/s
@@ -63,9 +63,9 @@ def _draw_estimates(
     settled = result.time >= spec.evaluate_after
     for observer, values in estimates.items():
         line, text = observer_line(spec.observers, observer), label(spec, observer)
-        if is_wild(values[settled], limits):
+        if _is_wild(values[settled], limits):
             line, text = line | WILD_LINE, f"{text} (off scale)"
-        elif is_noisy(values[settled]):
+        elif _is_noisy(values[settled]):
             line = line | NOISY_LINE
         _draw(ax, result, [values], limits, text, line)
     if limits is not None:
@@ -167,8 +167,30 @@ class AdhesionPanel(_RunPanel):
         estimates = _estimates(result, spec, "adhesion_force", 1e-3)
         limits = value_limits(true, list(estimates.values()))
         shade_zones(ax, spec)
-        true_line = TRUE_LINE_ABOVE if any(map(is_noisy, estimates.values())) else TRUE_LINE
+        true_line = TRUE_LINE_ABOVE if any(map(_is_noisy, estimates.values())) else TRUE_LINE
         _draw(ax, result, true, limits, "true", true_line)
         _draw_estimates(ax, result, spec, estimates, limits)
         ax.set_ylabel("Adhesion force [kN]")
         ax.ticklabel_format(axis="y", useOffset=False)  # a force that does not change has no scale of its own
+
+
+def _is_wild(values: np.ndarray, limits: tuple[float, float] | None) -> bool:
+    """Whether a curve has left the axis by more than its height, for more than a spike.
+
+    Args:
+        values: values, shape (rows,).
+        limits: lowest and highest value of the axis, or None.
+    """
+    return limits is not None and curve_size(values - sum(limits) / 2) > 1.5 * (limits[1] - limits[0])
+
+
+def _is_noisy(values: np.ndarray) -> bool:
+    """Whether a curve turns round at more than a quarter of its rows: drawn in full width it would hide all others.
+
+    Args:
+        values: values, shape (rows,).
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(values)
+        turns = steps[1:] * steps[:-1] < 0
+    return bool(np.count_nonzero(turns) > 0.25 * max(len(turns), 100))
