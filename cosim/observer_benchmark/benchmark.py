@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,18 +14,20 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
 from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
 from cosim.observer_benchmark.observer_runs import ObserverRun, ObserverRuns
-from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
+from cosim.observer_benchmark.observer_scores import ObserverScore, divergence, gap_certified, longest_gap, measured
 from cosim.observer_benchmark.playback import ScenarioParts, find_parts, recording_scenario
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import write_results
-from cosim.run.certificates import check_certificates
+from cosim.run.component_models import make_system
 from cosim.run.expected_gaps import ExpectedGap, expected_gap
 from cosim.run.layouts import make_layout
+from cosim.run.observer_findings import evaluated
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.run.run_seeds import with_seeds
 from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
+from fmu_observer.certificates.finding import Finding
 
 Progress = Callable[[str, int, int], None]
 _MICROSECONDS = 1e6
@@ -226,17 +227,12 @@ class _Evaluation:
         costs = tuple(_MICROSECONDS * cost for cost in run.costs)
         return ObserverScore(name, failure=failure, costs=costs, kind=kind, **known, **scores)
 
-    def _certificate(self, candidate: BenchmarkCandidate) -> CertifiedGap | None:
+    def _certificate(self, candidate: BenchmarkCandidate) -> Finding | None:
         if self.expected is None or candidate.table.observer is None:
             return None
         try:
-            found, _ = check_certificates(
-                {candidate.name: candidate.table}, {candidate.name: self.expected}, "warn", self.scenario.where
-            )
+            system = make_system(candidate.table, self.scenario.where)
+            found, _ = evaluated(candidate.name, candidate.table, system, self.expected)
         except (CosimError, ValueError, ArithmeticError):
             return None  # parameters that cannot be: the run of this observer says so
-        if candidate.name not in found:
-            return None
-        limit = found[candidate.name]["certified_up_to"]
-        # plain data have None for an infinite limit
-        return CertifiedGap(inf if limit is None else limit, self.expected.seconds, self.seen)
+        return None if found is None else gap_certified(found.value, self.expected.seconds, self.seen)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,12 @@ from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
 from cosim.evaluation.roles import Quantity, estimate, estimation_error
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
+from fmu_observer.certificates.finding import Finding
 from fmus.tables.plain_data import jsonable
 
 WHOLE = "whole run"
+SEEN_GAP = "longest gap seen"
+"""Condition of the finding about gaps."""
 
 
 @dataclass(frozen=True)
@@ -40,32 +43,6 @@ class _ErrorAtBalises:
 
 
 @dataclass(frozen=True)
-class CertifiedGap:
-    """What the gains are certified for, beside the gaps of the run.
-
-    Args:
-        limit: gaps that vary are certified up to here [s], or were found stable up to there; infinite where
-            every gap is; None where that is not known.
-        expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
-            [s].
-    """
-
-    limit: float | None
-    expected: float | None
-    seen: float | None
-
-    @property
-    def holds_expected(self) -> bool | None:
-        """Whether it covers what was to be expected."""
-        return None if self.limit is None or self.expected is None else self.expected <= self.limit
-
-    @property
-    def holds_seen(self) -> bool | None:
-        """Whether it covers what occurred."""
-        return None if self.limit is None or self.seen is None else self.seen <= self.limit
-
-
-@dataclass(frozen=True)
 class ObserverScore:
     """One observer in a benchmark.
 
@@ -77,7 +54,8 @@ class ObserverScore:
         whole: errors over the whole evaluated run. phases: in each phase of the scenario.
         speed_at_balises, position_at_balises: errors just before telegrams are used [m/s], [m].
         indicator: what the slip indicator said. false_alarms: indications that began outside the low-adhesion zones.
-        certificate: limits; None where the observer offers no certificate, or where there are no balises.
+        certificate: the gap certified, held against the longest expected and, as its condition, the longest seen; None
+            where nothing is known about gaps, or there are no balises.
         telegrams: what became of them, by outcome. costs: per communication step, one for each repetition [us].
         kind: ``FMU`` or ``block``.
         in_loop: whether it acts on the train in the scenario.
@@ -95,7 +73,7 @@ class ObserverScore:
     position_at_balises: _ErrorAtBalises | None = None
     indicator: IndicatorStatistics | None = None
     false_alarms: int | None = None
-    certificate: CertifiedGap | None = None
+    certificate: Finding | None = None
     telegrams: Mapping[str, int] = field(default_factory=dict)
     costs: tuple[float, ...] = ()
     kind: str = ""
@@ -115,11 +93,7 @@ class ObserverScore:
         """Plain data."""
         data: dict[str, Any] = jsonable(self)
         data["cost_us"] = self.cost
-        if self.certificate is not None:
-            data["certificate"] |= {
-                "holds_expected": self.certificate.holds_expected,
-                "holds_seen": self.certificate.holds_seen,
-            }
+        data["certificate"] = None if self.certificate is None else self.certificate.to_dict()
         return data
 
 
@@ -218,7 +192,7 @@ def telegram_outcomes(events: Sequence[BaliseRecord], name: str) -> dict[str, in
 
 
 def longest_gap(events: Sequence[BaliseRecord], start: float) -> float | None:
-    """Longest time between two balises that were read, or from the start to the first one [s]; None without any.
+    """Longest time between two true balises, or from the start to the first one [s]; None without any.
 
     Args:
         events: the telegrams.
@@ -226,3 +200,15 @@ def longest_gap(events: Sequence[BaliseRecord], start: float) -> float | None:
     """
     stamps = sorted(e.stamp for e in events if e.kind == "true")
     return float(np.diff([start, *stamps]).max()) if stamps else None
+
+
+def gap_certified(limit: float, expected: float | None, seen: float | None) -> Finding:
+    """What the gains are certified for, beside the gaps of the run.
+
+    Args:
+        limit: gaps that vary are certified up to here [s]; inf where every gap is. expected: longest gap to expect
+            before the run [s], None where it cannot be known. seen: longest that occurred [s], None for none.
+    """
+    covers_expected, covers_seen = (None if gap is None else gap <= limit for gap in (expected, seen))
+    occurred = Finding(SEEN_GAP, nan if seen is None else seen, "s", "exact", "the recording", covers_seen)
+    return Finding("mixed gaps", limit, "s", "sufficient", "", covers_expected, conditions=(occurred,), demand=expected)

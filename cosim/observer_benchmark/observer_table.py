@@ -7,7 +7,8 @@ from math import inf
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore
+from cosim.observer_benchmark.observer_scores import SEEN_GAP, ObserverScore
+from fmu_observer.certificates.finding import Finding
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table, error_column, name_column
 
@@ -50,20 +51,15 @@ def _row(score: ObserverScore) -> list[Any]:
         score.position_at_balises and score.position_at_balises.rms,
         "/".join("-" if d is None else number(d) for d in delays) or None,
         score.false_alarms,
-        None if score.certificate is None else _limit(score.certificate),
-        _holds(score.certificate),
+        *_certified(score.certificate),
         None if score.cost is None else _MICRO * score.cost,
     ]
 
 
-def _limit(certificate: CertifiedGap) -> float | str | None:
-    """Longest gap that is certified [s], ``any`` where every gap is, None where it is not known."""
-    return "any" if certificate.limit == inf else certificate.limit
-
-
-def _holds(certificate: CertifiedGap | None) -> str | None:
-    """Whether a certificate holds for the gaps expected and seen, in words; None where there is none."""
-    if certificate is None:
-        return None
+def _certified(gap: Finding | None) -> tuple[float | str | None, str | None]:
+    """Longest gap that is certified [s], ``any`` where every gap is; and whether it covers those expected and seen."""
+    if gap is None:
+        return None, None
     words = {True: "yes", False: "NO", None: "?"}
-    return f"{words[certificate.holds_expected]}/{words[certificate.holds_seen]}"
+    covered = f"{words[gap.holds]}/{words[gap.condition(SEEN_GAP).holds]}"
+    return "any" if gap.value == inf else gap.value, covered

@@ -46,16 +46,16 @@ class ExpectedGap:
 
 
 _NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
-UNTOLD = ExpectedGap(None, "nobody asks for it: there is no certificate")
+UNKNOWN = ExpectedGap(None, "nothing is known about gaps")
 
 
 @dataclass(frozen=True)
 class Sources:
-    """What tells the observers of a scenario of their samples.
+    """Where the observers of a scenario have their samples from.
 
     Args:
         table: of the scenario. components: by name. links: its connections. layout: of the balises, None without.
-        receivers: names of those that are told of balises. network: None without. where: the scenario, for messages.
+        receivers: names of those that take telegrams. network: None without. where: the scenario, for messages.
     """
 
     table: ScenarioTable
@@ -67,50 +67,54 @@ class Sources:
     where: str
 
     def gaps(self) -> dict[str, ExpectedGap]:
-        """The longest gap by component: of all that are told of samples, and of all that have a certificate."""
+        """The longest gap by component: of all that are notified of samples, and of all with a finding about gaps."""
         balises = None
         if self.layout is not None and self.table.balises is not None:
             balises = expected_gap(self.layout, self.table.balises, self.table.start)
         found = {}
         for name, table in self.table.components.items():
-            told = {} if balises is None or name not in self.receivers else {BALISE_EVENT: balises}
+            notified = {} if balises is None or name not in self.receivers else {BALISE_EVENT: balises}
             packets = [] if self.network is None else [x for x in self.network.listeners if x.component == name]
             estimates = table.observer is not None or (table.fmu is not None and packets)
-            if not estimates and not told:
+            if not estimates and not notified:
                 continue
             system: Any = make_system(table, self.where)
-            if hasattr(system, "certify"):
-                told |= {x.event: self._of_packets(x, table, system) for x in packets}
-                found[name] = _longest([*self._of_events(name, table, system, told), *self._of_readings(name, system)])
-            elif told or packets:
-                found[name] = balises if told and balises is not None else UNTOLD
+            if hasattr(system, "sampled_events"):
+                notified |= {x.event: self._of_packets(x, table, system) for x in packets}
+                found[name] = _longest(
+                    [*self._of_events(name, table, system, notified), *self._of_readings(name, system)]
+                )
+            elif notified or packets:
+                found[name] = balises if notified and balises is not None else UNKNOWN
         return found
 
     def _of_packets(self, listener: PacketListener, table: ComponentTable, system: Any) -> ExpectedGap:
-        """Of an event that packets tell."""
+        """Of an event that packets bring."""
         assert self.network is not None
         settings = self.network.settings
-        doubt = _not_as_certified(listener, settings, system) or _late(settings, table, system)
-        if doubt:
-            return ExpectedGap(None, doubt)
+        reason = _not_as_certified(listener, settings, system) or _late(settings, table, system)
+        if reason:
+            return ExpectedGap(None, reason)
         seconds, reason = longest_interval(settings, listener.nodes)
         shortest, longest = settings.delay_range
         waits = longest - shortest if seconds is not None and table.late_policy == "late" else 0.0
         return ExpectedGap(None if seconds is None else seconds + waits, reason)
 
     def _of_events(
-        self, name: str, table: ComponentTable, system: Any, told: Mapping[str, ExpectedGap]
+        self, name: str, table: ComponentTable, system: Any, notified: Mapping[str, ExpectedGap]
     ) -> list[ExpectedGap]:
-        """Of all events that the certificate of a component is about."""
+        """Of all events that the finding of a component is about."""
         values = values_in_use(table, system)
-        sampled = getattr(system, "sampled_events", lambda _: tuple(e.name for e in system.triggered_events))(values)
-        found = [gap for event, gap in told.items()]
+        sampled = system.sampled_events(values)
+        found = [gap for event, gap in notified.items()]
         for event in sampled:
             if is_wired(self.links, name, event):
-                found.append(ExpectedGap(None, f"another component tells its event '{event}', at instants of its own"))
-            elif event not in told:
+                found.append(
+                    ExpectedGap(None, f"another component triggers its event '{event}', at instants of its own")
+                )
+            elif event not in notified:
                 whole = self.table.stop - self.table.start
-                found.append(ExpectedGap(whole, f"nothing tells its event '{event}' in this run", never=True))
+                found.append(ExpectedGap(whole, f"nothing triggers its event '{event}' in this run", never=True))
         if not sampled:
             periods = [float(getattr(values, event.period)) for event in system.periodic_events]
             found.append(ExpectedGap(max(periods), "it reads its measurements at this period"))
@@ -196,7 +200,7 @@ def _late(settings: NetworkSettings, table: ComponentTable, system: Any) -> str:
 
 
 def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedGap:
-    """The longest gap between the stamps of two balises, as far as layout and scenario tell before the run.
+    """The longest gap between the stamps of two balises, as far as layout and scenario say before the run.
 
     A constant latency does not count: what arrives late is used at its stamp.
 

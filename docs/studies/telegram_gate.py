@@ -107,7 +107,7 @@ def settings(name: str, longest: float, model: str) -> tuple[str | None, dict[st
         found = certified_gains(
             longest,
             lambda theta: {FAMILIES[name]: min(theta, 8.0)},
-            lambda gains: observer.certify(longest, gains),  # type: ignore[attr-defined]
+            lambda gains: next(observer.findings(longest, gains)),  # type: ignore[attr-defined]
         )
         values |= found or {}
     if name == "adaptive_gain_cdo":

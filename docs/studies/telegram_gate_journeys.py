@@ -144,7 +144,9 @@ def settings(name: str, journey: Journey, model: str, spacing: float, longest: f
     values |= {"odometer_period": STEP, "estimated_speed": 0.0, "odometer_speed": 0.0}
     if name in FAMILIES:
         found = certified_gains(
-            longest, lambda theta: {FAMILIES[name]: min(theta, 8.0)}, lambda gains: system.certify(longest, gains)
+            longest,
+            lambda theta: {FAMILIES[name]: min(theta, 8.0)},
+            lambda gains: next(system.findings(longest, gains)),
         )
         values |= found or {}
     if name == "adaptive_gain_cdo":

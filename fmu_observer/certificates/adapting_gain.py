@@ -19,8 +19,9 @@ import numpy as np
 
 from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.bisection import bisected
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
+from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
     common_quadratic_form,
@@ -126,14 +127,14 @@ class _Cells:
     largest: np.ndarray
 
 
-def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_model: str) -> Certificate:
+def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_model: str) -> Finding:
     """Certificate of an observer whose high gain follows the speed, for gaps up to `max_gap` [s].
 
     Args:
         adaptation: the rule and what is assumed. max_gap: longest gap asked for [s]. error_model: the error in words.
 
     Returns:
-        The certificate, without observer and preset. Its Lyapunov function is ``theta eps' P eps`` with theta in force.
+        What is found about the gaps. Its Lyapunov function is ``theta eps' P eps`` with theta in force.
     """
     horizon = max(2.0 * max_gap, _LONGEST_X / adaptation.theta_min)
     unstable_x = first_unstable_gap(adaptation.vertices, horizon * adaptation.theta_min)
@@ -142,16 +143,16 @@ def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_mode
     holds = margin > MARGIN
     limit = _aperiodic_limit(adaptation, min(constant, horizon))
     x = adaptation.constant_speed_x(max_gap)
-    return Certificate(
-        max_gap=max_gap,
-        horizon=horizon,
+    return gap_finding(
+        max_gap,
+        horizon,
         constant_limit=constant,
-        aperiodic_limit=max(limit, max_gap) if holds else limit,
-        spectral_radius=max(vertex.spectral_radius(x) for vertex in adaptation.vertices),
-        quadratic_margin=margin,
+        mixed_limit=max(limit, max_gap) if holds else limit,
+        growth=max(vertex.spectral_radius(x) for vertex in adaptation.vertices),
+        decrease=margin,
         holds=holds,
         error_model=error_model,
-        lyapunov_matrix=rows_of(P),
+        matrix=rows_of(P),
     )
 
 

@@ -6,15 +6,16 @@ It uses the exact transitions of `gap_error` and the candidates of `quadratic`, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, reduce
 from math import inf
 
 import numpy as np
 
 from fmu_observer.certificates.bisection import bisected
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding, remark
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap, rows_of
+from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
     common_quadratic_form,
@@ -44,7 +45,7 @@ class Decrease:
 
 def certify_sampled_error(
     vertices: tuple[GapError, ...], max_gap: float, error_model: str, *, switching: bool = False
-) -> Certificate:
+) -> Finding:
     """Certificate of an observer whose error is that of one of the vertices over each gap, or always between them.
 
     Args:
@@ -54,29 +55,33 @@ def certify_sampled_error(
             certified holds for that. Otherwise they change from gap to gap only.
 
     Returns:
-        The certificate, without observer and preset.
+        What is found about the gaps.
 
     Raises:
         ValueError: the vertices are errors of different components, or switch and do not share one linear reset.
     """
     _require_comparable(vertices)
-    horizon = max(_SHORTEST_HORIZON, 4.0 * max_gap)
+    horizon = _longest_searched(max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
     found = common_decrease(vertices, max_gap, switching)
     holds = found.margin > MARGIN
     limit = aperiodic_limit(vertices, horizon, switching)
-    return Certificate(
-        max_gap=max_gap,
-        horizon=horizon,
+    return gap_finding(
+        max_gap,
+        horizon,
         constant_limit=constant_limit,
-        aperiodic_limit=max(limit, max_gap) if holds else limit,  # the bisection stops a little below the limit
-        spectral_radius=max(vertex.spectral_radius(max_gap) for vertex in vertices),
-        quadratic_margin=found.margin,
+        mixed_limit=max(limit, max_gap) if holds else limit,  # the bisection stops a little below the limit
+        growth=max(vertex.spectral_radius(max_gap) for vertex in vertices),
+        decrease=found.margin,
         holds=holds,
         error_model=error_model,
-        notes=_left_out(vertices[0], max_gap),
-        lyapunov_matrix=rows_of(found.P),
+        remarks=_left_out(vertices[0], max_gap),
+        matrix=rows_of(found.P),
     )
+
+
+def _longest_searched(gap: float) -> float:
+    return max(_SHORTEST_HORIZON, 4.0 * gap)
 
 
 def _require_comparable(vertices: tuple[GapError, ...]) -> None:
@@ -93,20 +98,20 @@ def _left_out(vertex: GapError, max_gap: float) -> tuple[str, ...]:
     return (f"gaps below {max_gap / (_FINE + 1):.2g} s are left out",)
 
 
-def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...], what: str) -> Certificate:
-    """The certificate of errors constant over each gap, with a note whether it holds where they change within gaps as
-    well.
+def with_switching_noted(found: Finding, vertices: tuple[GapError, ...], what: str) -> Finding:
+    """The finding of errors constant over each gap, with a remark whether it holds where they change within gaps too.
 
     Args:
-        certificate: of `vertices`. what: changes, in the plural, for the words.
+        found: of `vertices`. what: changes, in the plural, for the words.
     """
+    assert found.demand is not None, "a finding about a gap"
     covered = "covered too"
-    if _left_out(vertices[0], certificate.max_gap):
+    if _left_out(vertices[0], found.demand):
         covered = "not judged"
-    elif common_decrease(vertices, certificate.max_gap, True).margin <= MARGIN:
-        limit = aperiodic_limit(vertices, certificate.horizon, switching=True)
+    elif common_decrease(vertices, found.demand, True).margin <= MARGIN:
+        limit = aperiodic_limit(vertices, _longest_searched(found.demand), switching=True)
         covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap that was tried"
-    return replace(certificate, notes=(*certificate.notes, f"{what} that change within a gap are {covered}"))
+    return found.also(remark(f"{what} that change within a gap are {covered}"))
 
 
 @lru_cache(maxsize=256)

@@ -14,8 +14,9 @@ import numpy as np
 import scipy
 
 from fmu_observer.certificates.aperiodic import MARGIN
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
+from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.certificates.quadratic import (
     QuadraticCondition,
@@ -78,7 +79,7 @@ class TwoRateError:
         return matrix
 
 
-def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str) -> Certificate:
+def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str) -> Finding:
     """Certificate for balise gaps up to `max_gap` [s], at most one balise in an odometer period.
 
     Constant gaps are whole numbers of odometer periods, at the worst phase.
@@ -87,7 +88,7 @@ def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str
         error: the error equations. max_gap: longest gap asked for [s]. error_model: the same in words.
 
     Returns:
-        The certificate, without observer and preset.
+        What is found about the gaps.
     """
     samples = _samples(error, max_gap)
     horizon = max(_HORIZON, 2.0 * max_gap)
@@ -96,17 +97,17 @@ def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str
     searched = int(unstable[0]) if unstable.size else len(radii)
     covered = _aperiodic_samples(error, searched)
     margin, P = _common_decrease(error, samples)
-    return Certificate(
-        max_gap=max_gap,
-        horizon=horizon,
+    return gap_finding(
+        max_gap,
+        horizon,
         constant_limit=float((unstable[0] + 1) * error.period) if unstable.size else inf,
-        aperiodic_limit=inf if covered == len(radii) else covered * error.period,
-        spectral_radius=float(radii[samples - 1]),
-        quadratic_margin=margin,
+        mixed_limit=inf if covered == len(radii) else covered * error.period,
+        growth=float(radii[samples - 1]),
+        decrease=margin,
         holds=margin > MARGIN,
         error_model=error_model,
-        notes=("at most one balise in an odometer period",),
-        lyapunov_matrix=rows_of(P),
+        remarks=("at most one balise in an odometer period",),
+        matrix=rows_of(P),
     )
 
 

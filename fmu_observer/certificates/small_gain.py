@@ -13,7 +13,7 @@ from math import inf, pi
 
 import numpy as np
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 
 _FREQUENCIES = 2000
 _SPAN = 1e3  # the grid reaches from the slowest rate over this to the fastest times this
@@ -50,19 +50,17 @@ def independent_gap_limit(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.nda
     return pi / (2.0 * bound)
 
 
-def with_independent_samples(certificate: Certificate, limit: float) -> Certificate:
-    """A certificate of samples that come together, for samples that come each at their own instants.
+def with_independent_samples(found: Finding, limit: float) -> Finding:
+    """A finding of samples that come together, for samples that come each at their own instants.
 
     Args:
-        certificate: of samples that come together. limit: as `independent_gap_limit` gives it [s].
+        found: of samples that come together. limit: as `independent_gap_limit` gives it [s].
     """
-    note = f"samples each at their own instants are covered up to gaps of {limit:.4g} s, by a small-gain condition"
-    return replace(
-        certificate,
-        holds=certificate.holds and certificate.max_gap < limit,
-        aperiodic_limit=min(certificate.aperiodic_limit, limit if limit < certificate.horizon else inf),
-        notes=(*certificate.notes, note),
-    )
+    text = f"samples each at their own instants are covered up to gaps of {limit:.4g} s, by a small-gain condition"
+    assert found.demand is not None, "a finding about a gap"
+    what = "gap between samples at their own instants"
+    own = Finding(what, limit, "s", "sufficient", "small-gain condition", found.demand < limit, text)
+    return (found if limit >= found.value else replace(found, value=limit, kind="sufficient")).also(own)
 
 
 def _confirmed(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, bound: float) -> float:

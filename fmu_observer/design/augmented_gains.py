@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from fmu_observer.certificates.aperiodic import aperiodic_limit, certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 
 _ORDER = 4
@@ -35,7 +35,7 @@ class _PositionGains:
 
     gains: tuple[float, ...]
     decay: float
-    certificate: Certificate
+    certificate: Finding
     _noise_to_speed: float
 
 

@@ -1,10 +1,10 @@
-"""The largest member of a family of gains that a certificate covers. Knows certificates, no observer and no track."""
+"""The largest member of a family of gains that a finding covers. Knows findings, no observer and no track."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 
 Gains = dict[str, float]
 
@@ -15,7 +15,7 @@ SHARES = (3.0, 2.0, 1.2)  # of an adapting gain: theta_min times longest gap, la
 
 
 def certified_gains(
-    gap: float, family: Callable[[float], Gains], certify: Callable[[Mapping[str, float]], Certificate]
+    gap: float, family: Callable[[float], Gains], evaluate: Callable[[Mapping[str, float]], Finding]
 ) -> Gains | None:
     """Gains of a family with the largest theta up to ``LIMIT / gap``, to three digits, certified for a gap.
 
@@ -23,7 +23,7 @@ def certified_gains(
     beyond ``LIMIT / gap`` is not sought.
 
     Args:
-        gap: longest gap to certify [s]. family: gains by theta [1/s]. certify: judges gains for that gap.
+        gap: longest gap to certify [s]. family: gains by theta [1/s]. evaluate: gains, for that gap.
 
     Returns:
         The gains, or None where none were found.
@@ -31,10 +31,10 @@ def certified_gains(
     theta = _LIMIT / gap
     for _ in range(_TRIALS):
         candidate = family(rounded_down(theta))
-        certificate = certify(candidate)
-        if certificate.holds:
+        found = evaluate(candidate)
+        if found.holds:
             return candidate
-        theta = min(theta * certificate.aperiodic_limit / gap, 0.99 * theta)
+        theta = min(theta * found.limit / gap, 0.99 * theta)
         if not theta > 0.0:
             break
     return None

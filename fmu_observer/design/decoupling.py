@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.suitability import require_linear
@@ -62,7 +62,7 @@ def _decoupling_ranks(H: np.ndarray, C: np.ndarray) -> tuple[int, int]:
     return int(np.sum(seen > len(C) * np.finfo(float).eps * 100.0 * scale)), int(np.linalg.matrix_rank(H))
 
 
-def decoupling_condition(model: ObserverModel) -> Condition:
+def decoupling_condition(model: ObserverModel) -> Finding:
     """Whether a decoupling observer of a model exists: ranks, and the invariant zeros, which stay poles of its error.
 
     Args:
@@ -80,12 +80,12 @@ def decoupling_condition(model: ObserverModel) -> Condition:
     seen, whole = _decoupling_ranks(H, model.C)
     values: dict[str, float] = {"rank_CH": seen, "rank_H": whole}
     if seen < whole:
-        return Condition(False, values, _STATEMENT, SOURCE)
+        return condition_found(False, values, _STATEMENT, SOURCE)
     fixed = decoupling(model.A, H, model.C).fixed.real
     values["invariant_zeros"] = len(fixed)
     if len(fixed):
-        values["rightmost_zero"] = float(fixed.max())
-    return Condition(bool(np.all(fixed < 0.0)), values, _STATEMENT, SOURCE)
+        values["rightmost_zero [1/s]"] = float(fixed.max())
+    return condition_found(bool(np.all(fixed < 0.0)), values, _STATEMENT, SOURCE)
 
 
 def require_decoupling(model: ObserverModel, observer: str) -> None:

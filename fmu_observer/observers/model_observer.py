@@ -5,14 +5,16 @@ It knows models and hybrid systems, and nothing of how an observer corrects itse
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
-from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.model_signals import (
     arrival_event,
     estimate_outputs,
@@ -27,7 +29,7 @@ from plant_models.hybrid.missing import or_else
 Timing = Literal["continuous", "periodic", "event"]
 
 
-class ModelObserver(JudgedObserver):
+class ModelObserver(EvaluatedObserver):
     """Base of the observers of a model ``dx = A x + B u + phi(x, u)``, ``y = C x`` (`ObserverModel`).
 
     The contract:
@@ -78,6 +80,10 @@ class ModelObserver(JudgedObserver):
         self.parameters = (*self.gain_parameters, *((period,) if self.timing == "periodic" else ()))
         self.events = self._events()
         super().__init__(model=self.model.name, **options)
+
+    @abstractmethod
+    def condition_of(self, p: Any) -> Finding:
+        """Existence or stability condition for the gains in the named tuple `p` of all parameters."""
 
     # -- what it may use --------------------------------------------------------------------------------------------
 

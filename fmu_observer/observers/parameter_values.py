@@ -1,4 +1,4 @@
-"""Parameter values of a preset with some of them replaced, as a named tuple. Used wherever a gain in use is judged."""
+"""Parameter values of a preset with some of them replaced: used wherever a gain in use is evaluated."""
 
 from __future__ import annotations
 
@@ -28,11 +28,26 @@ def parameter_values(
     Raises:
         ValueError: a parameter is unknown, not finite, outside its bounds or of another size, or the preset is unknown.
     """
-    values = system.start_parameters(preset)
+    return replaced_parameters(system, system.start_parameters(preset), overrides or {}, purpose)
+
+
+def replaced_parameters(
+    system: HybridSystem, values: np.ndarray, overrides: Mapping[str, Value], purpose: str = "to certify"
+) -> np.ndarray:
+    """Parameters with some replaced, flat, shape (k,).
+
+    Args:
+        system: whose parameters. values: of all of them, shape (k,); they stay as they are.
+        overrides, purpose: as for `parameter_values`.
+
+    Raises:
+        ValueError: as `parameter_values`.
+    """
+    values = values.copy()
     names = [name for signal in system.parameter_signals for name in signal.scalar_names]
     signals = {name: signal for signal in system.parameter_signals for name in (signal.name, *signal.scalar_names)}
     vectors = {signal.name: signal.scalar_names for signal in system.parameter_signals}
-    for name, value in (overrides or {}).items():
+    for name, value in overrides.items():
         targets = (name,) if name in names else vectors.get(name)
         if targets is None:
             raise ValueError(f"{system.name}: unknown parameter {name!r} {purpose}; it has: {', '.join(vectors)}.")

@@ -10,6 +10,8 @@ from weakref import WeakKeyDictionary
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmu_observer.certificates.finding import Finding
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
 from fmus.documentation.licences import licence_files, model_terms
 from fmus.documentation.prose import blocks, pieces
@@ -206,7 +208,7 @@ def _certificate_rows(system: HybridSystem) -> list[_CertificateRow] | None:
     Args:
         system: the hybrid system.
     """
-    if not hasattr(system, "certify"):
+    if not hasattr(system, "sampled_events"):
         return None
     if system not in _known:  # it takes up to half a second; FMI 2 and FMI 3 say the same
         _known[system] = [_certificate(system, preset) for preset in (*system.presets,) or (None,)]
@@ -216,17 +218,18 @@ def _certificate_rows(system: HybridSystem) -> list[_CertificateRow] | None:
 def _certificate(system: Any, preset: str | None) -> _CertificateRow:
     name = preset or "declared starts"
     try:
-        certificate = system.certify(0.1, preset=preset)  # the limits do not depend on the gap asked for
-        limits = (_limit(certificate.aperiodic_limit, certificate), _limit(certificate.constant_limit, certificate))
-        notes = f" Also checked: {'; '.join(certificate.notes)}." if certificate.notes else ""
-        return _CertificateRow(name, *limits, f"Checked on the {certificate.error_model}.{notes}", certificate.event)
+        found = next(iter(system.findings(preset=preset)))
+        notes = f" Also checked: {'; '.join(found.remarks)}." if found.remarks else ""
+        event = found.what.removeprefix("mixed ").removesuffix(" gaps")
+        words = f"Checked on the {found.source}.{notes}", event
+        return _CertificateRow(name, _limit(found), _limit(found.condition(CONSTANT_GAP)), *words)
     except Exception as error:  # a user's own check may fail in any way; the FMU is none the worse
         return _CertificateRow(name, "unknown", "unknown", f"The check failed: {error}", "")
 
 
-def _limit(limit: float, certificate: Any) -> str:
-    reach = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
-    return reach if isinf(limit) else f"{limit:.3g} s"
+def _limit(found: Finding) -> str:
+    reach = "none" if isinf(found.value) else f"none up to {found.value:g} s"
+    return reach if isinf(found.limit) else f"{found.value:.3g} s"
 
 
 # -- how a library is built again from its sources, and linked statically ---------------------------------------------

@@ -38,7 +38,7 @@ def main(names: list[str]) -> None:
         certify = (
             "-"
             if name not in OBSERVERS or not hasattr(system, "certify")
-            else f"{once(lambda s=system: s.certify(0.2)):.1f}"
+            else f"{once(lambda s=system: next(s.findings(0.2))):.1f}"
         )
         columns = f"{native(system):>10.3f}{python(system):>10.2f}{1e3 * construct:>11.2f}{certify:>10}"
         print(f"{name:<32}{step_length(system):>14g}{columns}", flush=True)

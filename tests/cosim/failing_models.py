@@ -99,7 +99,7 @@ class Judged(DiscreteMeasurementObserver):
     def error_bounds(self, *_: Any) -> Any:
         raise RuntimeError(WORDS)
 
-    def limits(self, *_: Any) -> Any:
+    def findings(self, *_: Any) -> Any:
         raise RuntimeError(WORDS)
 
 

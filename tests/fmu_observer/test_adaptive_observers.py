@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from adaptive_runs import Samples, motion
+from own_condition import own_condition
 from scipy.integrate import solve_ivp
 
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.formulas.adaptation.adaptive_law import _own_excitation, smallest_eigenvalue
 from fmu_observer.models.known_models import find_state_affine_model
@@ -133,10 +135,10 @@ def test_the_covariance_is_that_of_the_responses_to_each_sample(make: type[Adapt
 def test_the_certificate_counts_with_the_adaptation(
     make: type[AdaptivePredictor | AdaptiveHold], gap: float, holds: bool
 ) -> None:
-    certificate = make().certify(gap)
+    certificate = next(make().findings(gap))
     assert certificate.holds == holds
     assert "of the first error after 40 s, the constants rho1" in certificate.explain()
-    assert (certificate.constant_limit >= gap) == holds
+    assert (certificate.condition(CONSTANT_GAP).limit >= gap) == holds
 
 
 def test_what_the_certificate_says_is_left_is_left() -> None:
@@ -153,13 +155,13 @@ def test_what_the_certificate_says_is_left_is_left() -> None:
 
 
 def test_the_condition_is_the_excitation_that_lasts() -> None:
-    lasting = AdaptivePredictor("excited_oscillator").condition()
-    assert lasting.values["alpha0"] == pytest.approx(2.0 * lasting.values["least_alpha0"], rel=0.3)
+    lasting = own_condition(AdaptivePredictor("excited_oscillator"))
+    assert lasting.numbers["alpha0"] == pytest.approx(2.0 * lasting.numbers["least_alpha0"], rel=0.3)
     assert not lasting.holds  # the period of (4.63) is 1e-10 s
-    assert lasting.values["smallest_inverse_R"] == pytest.approx(np.exp(-2.0) * lasting.values["alpha0"])
-    fading = AdaptiveHold().condition()
+    assert lasting.numbers["smallest_inverse_R"] == pytest.approx(np.exp(-2.0) * lasting.numbers["alpha0"])
+    fading = own_condition(AdaptiveHold())
     assert not fading.holds
-    assert fading.values["alpha0"] < 2.0 / 16.0 * fading.values["least_alpha0"]  # the Gramian fades as 1/t^4
+    assert fading.numbers["alpha0"] < 2.0 / 16.0 * fading.numbers["least_alpha0"]  # the Gramian fades as 1/t^4
 
 
 def test_excitation_in_closed_form() -> None:
@@ -205,13 +207,13 @@ def test_bad_input_is_told_in_words() -> None:
 
 
 @pytest.mark.parametrize("observer", [AdaptiveHold(), AdaptivePredictor()], ids=lambda observer: observer.name)
-def test_a_trial_begins_with_the_true_state_and_follows_the_model(observer: AdaptiveHold | AdaptivePredictor) -> None:
+def test_a_search_begins_with_the_true_state_and_follows_the_model(observer: AdaptiveHold | AdaptivePredictor) -> None:
     """Against the motion that SciPy's LSODA finds from the same start."""
-    model, trial = observer.model, observer.limits()[0].trial
-    assert trial is not None
+    model = observer.model
+    (search,) = (found.search for found in observer.findings() if found.search is not None)
     n, instants = model.order, np.linspace(0.0, 10.0, 11)
     start = np.array(model.example)
-    found = np.array([trial.truth(instants)[s.name] for s in model.states])
+    found = np.array([search.truth(instants)[s.name] for s in model.states])
     u = np.zeros(len(model.inputs))
     expected = solve_ivp(
         lambda t, x: model.flow(t, x, start[n:], u), (0.0, 10.0), start[:n], "LSODA", instants, rtol=1e-10, atol=1e-10

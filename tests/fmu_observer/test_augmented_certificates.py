@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 from fmu_observer.certificates.aperiodic import aperiodic_limit
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.design.augmented_gains import (
     UNIT_POLES,
     _noise_to_speed,
@@ -62,7 +63,7 @@ def test_bad_poles_are_refused(poles: tuple[float, ...]) -> None:
 def test_a_design_is_certified_for_its_gap_and_its_margin(gap: float, margin: float) -> None:
     design = design_for_gap(gap, (0.0, 2e-3), margin)
     assert design.certificate.holds
-    assert design.certificate.aperiodic_limit == pytest.approx((1.0 + margin) * gap, rel=0.01)  # drag and bisection
+    assert design.certificate.limit == pytest.approx((1.0 + margin) * gap, rel=0.01)  # drag and bisection
     assert design.decay == design.gains[0]
     # Never contradicted: random products of the exact transitions vanish.
     product = np.eye(4)
@@ -108,26 +109,26 @@ def test_every_preset_is_certified_for_what_it_is_for(make: type[AugmentedTrainO
     observer = make()
     assert set(observer.presets) == set(LIMITS[make])
     for preset, limit in LIMITS[make].items():
-        certificate = observer.certify(0.5, preset=preset)
+        certificate = next(observer.findings(0.5, preset=preset))
         assert certificate.holds
-        assert certificate.aperiodic_limit == pytest.approx(limit, abs=1e-3)
-        assert certificate.aperiodic_limit <= certificate.constant_limit
+        assert certificate.limit == pytest.approx(limit, abs=1e-3)
+        assert certificate.limit <= certificate.condition(CONSTANT_GAP).limit
         assert ("'gps' samples" if preset == "gps" else "'balise' samples") in certificate.explain()
-    told = observer.certify(0.5).explain()
+    told = next(observer.findings(0.5)).explain()
     assert f"fixes and balises in any order certified for gaps up to 0.1 s ({MIXED[make]})" in told
     for gap, kinds in ((0.3, "fixes and balises in any order"), (2.5, "fixes alone")):
-        certificate = observer.certify(0.5, {"fix_period": gap})
+        certificate = next(observer.findings(0.5, {"fix_period": gap}))
         assert not certificate.holds
         assert f"{kinds} NOT certified for gaps up to {gap} s" in certificate.explain()
 
 
 def test_gains_that_are_too_high_are_not_certified() -> None:
-    certificate = AugmentedHighGainCdo().certify(0.5, {"theta_balise": 3.0}, "balises")
+    certificate = next(AugmentedHighGainCdo().findings(0.5, {"theta_balise": 3.0}, "balises"))
     assert not certificate.holds
-    assert certificate.spectral_radius > 1.0
-    assert certificate.constant_limit == pytest.approx(1.283 / 3.0, rel=2e-3)
-    assert not AugmentedHighGainCdo().certify(0.5, {"odometer_period": 1.0}, "balises").holds
-    assert not AugmentedHighGainCdo().certify(0.5, {"theta_balise": 0.0, "theta_gps": 0.0}).holds
+    assert certificate.numbers[GROWTH] > 1.0
+    assert certificate.condition(CONSTANT_GAP).limit == pytest.approx(1.283 / 3.0, rel=2e-3)
+    assert not next(AugmentedHighGainCdo().findings(0.5, {"odometer_period": 1.0}, "balises")).holds
+    assert not next(AugmentedHighGainCdo().findings(0.5, {"theta_balise": 0.0, "theta_gps": 0.0})).holds
 
 
 @both

@@ -8,6 +8,7 @@ import scipy
 from observer_runner import SystemRunner
 
 from fmu_observer import OBSERVERS
+from fmu_observer.certificates.gap_finding import DECREASE, GROWTH
 from fmu_observer.observers.train.balise_odometer_ekf import transition
 
 MASS, DRAG, EFFORT, PERIOD = 50e3, 800.0, 20e3, 0.1
@@ -132,7 +133,7 @@ def test_the_certificate_is_that_of_the_riccati_equation() -> None:
     """A balise at each reading: the settled filter is that of one equation with both measurements."""
     system = OBSERVERS["balise_odometer_ekf"]()
     values = {"acceleration_density": 1e-3, "disturbance_density": 1e-4, "davis_b": 0.0, "davis_c": 0.0}
-    found = system.certify(PERIOD, values)
+    found = next(system.findings(PERIOD, values))
     F, QN = exact(PERIOD, 0.0, (1e-3, 1e-4 + drift(20.0, 0.3)))  # judged where the wheels creep as they may
     fade = np.exp(-PERIOD / 20.0)
     F[3, 3], QN[3, 3] = fade, (0.01 * 20.0) ** 2 * (1.0 - fade**2)
@@ -141,10 +142,10 @@ def test_the_certificate_is_that_of_the_riccati_equation() -> None:
     K = P @ C.T @ np.linalg.inv(C @ P @ C.T + RN)
     after = (np.eye(4) - K @ C) @ P
     M = (np.eye(4) - K @ C) @ F
-    assert found.spectral_radius == pytest.approx(np.abs(np.linalg.eigvals(M)).max(), rel=1e-6)
+    assert found.numbers[GROWTH] == pytest.approx(np.abs(np.linalg.eigvals(M)).max(), rel=1e-6)
     root = scipy.linalg.sqrtm(after).real
     decrease = 1.0 - np.linalg.eigvalsh(root @ M.T @ np.linalg.inv(after) @ M @ root).max()
-    assert found.quadratic_margin == pytest.approx(decrease, rel=1e-3)
+    assert found.numbers[DECREASE] == pytest.approx(decrease, rel=1e-3)
     assert np.array(found.lyapunov_matrix) == pytest.approx(np.linalg.inv(after), rel=1e-4, abs=1e-3)
 
 

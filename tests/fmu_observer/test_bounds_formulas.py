@@ -17,7 +17,6 @@ from fmu_observer.certificates.bounds import (
     cdo_bound,
     comparison_bound,
     dmo_bound,
-    growth_over_missing_samples,
     improved_cdo_bound,
     improved_dmo_bound,
     largest_gap,
@@ -111,15 +110,6 @@ def test_gaps_without_a_crossing() -> None:
     assert largest_gap(kept, 0.09) == 0.0
     with pytest.raises(ValueError, match="limit must be a positive number, got 0"):
         largest_gap(kept, 0.0)
-
-
-def test_growth_over_missing_samples() -> None:
-    rows = growth_over_missing_samples(lambda s: 2.0 * s, 0.2, 2)
-    assert rows == ((0, 0.2, 0.4), (1, 0.4, 0.8), (2, pytest.approx(0.6), pytest.approx(1.2)))
-    with pytest.raises(ValueError, match="period must be positive"):
-        growth_over_missing_samples(abs, 0.0, 2)
-    with pytest.raises(ValueError, match="must not be negative, got -1"):
-        growth_over_missing_samples(abs, 0.2, -1)
 
 
 # -- what is carried --------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from sampled_runner import SampledRunner, chain, true_motion
 from scipy.linalg import expm, solve_discrete_are
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, DECREASE, GROWTH
 from fmu_observer.certificates.impulsive_error import ImpulsiveError, row_echelon
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sampled_error import SampledError
@@ -35,9 +36,9 @@ def test_a_decaying_innovation_is_the_sampled_error() -> None:
     np.testing.assert_allclose(impulsive.transition(0.3), sampled.transition(0.3), rtol=1e-13)
     np.testing.assert_allclose(impulsive.transitions(1.0, 7)[1], sampled.transitions(1.0, 7)[1], rtol=1e-13)
     one, other = (certify_sampled_error((error,), 0.3, "any") for error in (sampled, impulsive))
-    assert one.constant_limit == pytest.approx(other.constant_limit, rel=1e-9)
-    assert one.aperiodic_limit == pytest.approx(other.aperiodic_limit, rel=BISECTION)
-    assert one.quadratic_margin == pytest.approx(other.quadratic_margin, rel=1e-3)  # of the solver
+    assert one.condition(CONSTANT_GAP).limit == pytest.approx(other.condition(CONSTANT_GAP).limit, rel=1e-9)
+    assert one.limit == pytest.approx(other.limit, rel=BISECTION)
+    assert one.numbers[DECREASE] == pytest.approx(other.numbers[DECREASE], rel=1e-3)  # of the solver
 
 
 @settings(max_examples=60)
@@ -87,15 +88,17 @@ def test_vertices_that_read_different_components_are_refused() -> None:
 @pytest.mark.parametrize("theta", [1.0, 8.0])
 @pytest.mark.parametrize("make", [ExponentialGain, OutputPredictor])
 def test_double_integrator_limits(make: type[ExponentialGain], theta: float) -> None:
-    certificate = make(chain(2)).certify(0.1 / theta, {"theta": theta})
+    certificate = next(make(chain(2)).findings(0.1 / theta, {"theta": theta}))
     # independently measured; the last digit is read
-    assert theta * certificate.constant_limit == pytest.approx(4.9999, abs=1e-3)
-    assert theta * certificate.aperiodic_limit == pytest.approx(4.0, rel=1e-3)
+    assert theta * certificate.condition(CONSTANT_GAP).limit == pytest.approx(4.9999, abs=1e-3)
+    assert theta * certificate.limit == pytest.approx(4.0, rel=1e-3)
 
 
 def test_four_state_limit() -> None:
-    certificate = ExponentialGain(chain(4)).certify(0.5, {"theta": 1.0, "high_gain": (4.0, 6.0, 4.0, 1.0)})
-    assert certificate.constant_limit == pytest.approx(1.283, abs=1e-3)  # independently measured to that digit
+    certificate = next(ExponentialGain(chain(4)).findings(0.5, {"theta": 1.0, "high_gain": (4.0, 6.0, 4.0, 1.0)}))
+    assert certificate.condition(CONSTANT_GAP).limit == pytest.approx(
+        1.283, abs=1e-3
+    )  # independently measured to that digit
 
 
 @pytest.mark.parametrize("theta", [1.0, 5.0])
@@ -104,20 +107,22 @@ def test_held_innovation_of_a_double_integrator_ends_at_one(theta: float) -> Non
     1.
     """
     observer = HeldInnovation(chain(2))
-    certificate = observer.certify(0.5 / theta, {"theta": theta})
-    assert theta * certificate.constant_limit == pytest.approx(1.0, abs=2e-4)  # an eigenvalue at -1: half of the digits
+    certificate = next(observer.findings(0.5 / theta, {"theta": theta}))
+    assert theta * certificate.condition(CONSTANT_GAP).limit == pytest.approx(
+        1.0, abs=2e-4
+    )  # an eigenvalue at -1: half of the digits
     assert certificate.holds
     x = 0.7
     Phi = np.array([[1.0 - 2.0 * x - 0.5 * x * x, x], [-x, 1.0]])
-    assert observer.certify(x, {"theta": 1.0}).spectral_radius == pytest.approx(
+    assert next(observer.findings(x, {"theta": 1.0})).numbers[GROWTH] == pytest.approx(
         np.abs(np.linalg.eigvals(Phi)).max(), rel=1e-9
     )
 
 
 @pytest.mark.parametrize("width", [2, 3])
 def test_a_wide_chain_has_the_limits_of_a_narrow_one(width: int) -> None:
-    certificate = ExponentialGain(chain(2, width)).certify(0.5, {"theta": 2.0})
-    assert 2.0 * certificate.constant_limit == pytest.approx(4.9999, abs=1e-3)
+    certificate = next(ExponentialGain(chain(2, width)).findings(0.5, {"theta": 2.0}))
+    assert 2.0 * certificate.condition(CONSTANT_GAP).limit == pytest.approx(4.9999, abs=1e-3)
 
 
 def test_the_printed_gains_of_two_measurements_decay_as_measured() -> None:
@@ -140,7 +145,7 @@ def test_a_pure_jump_is_a_discrete_observer(gap: float) -> None:
     observer = HybridImpulsive(chain(2))
     gains = {"flow_gain": L, "flow_matrix": H, "jump_gain": F}
     whole = expm(SHIFT * gap) @ (np.eye(2) - F @ C)
-    assert observer.certify(gap, gains).spectral_radius == pytest.approx(
+    assert next(observer.findings(gap, gains)).numbers[GROWTH] == pytest.approx(
         np.abs(np.linalg.eigvals(whole)).max(), abs=1e-12
     )
 
@@ -192,8 +197,8 @@ def test_the_certified_function_falls_at_every_admissible_gap(
 ) -> None:
     """Exact error by SciPy's exponential of the observer's own equations, gaps on no grid."""
     observer = LINEAR[name]
-    limit = 0.999 * observer.certify(0.1).aperiodic_limit
-    certificate = observer.certify(limit)
+    limit = 0.999 * next(observer.findings(0.1)).limit
+    certificate = next(observer.findings(limit))
     assert certificate.holds
     P = np.array(certificate.lyapunov_matrix)
     error = observer.vertex_error(MODEL.drifts[0], observer.unpack_parameters(observer.start_parameters()))
@@ -244,8 +249,8 @@ def test_samples_at_their_own_instants_never_contradict_the_small_gain_limit(see
     A, B, read, own = observer.error_matrices(observer.unpack_parameters(observer.start_parameters()))
     r = len(A)
     limit = independent_gap_limit(A, B, read, own)
-    assert observer.certify(0.999 * limit).holds
-    assert not observer.certify(1.001 * limit).holds
+    assert next(observer.findings(0.999 * limit)).holds
+    assert not next(observer.findings(1.001 * limit)).holds
     generator = np.block([[A, B], [read, own]])
     numbers = np.random.default_rng(seed)
     zeta, due, t = numbers.normal(size=r + 2), numbers.uniform(0.0, limit, 2), 0.0

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, SteadyMotion, SystemRunner, in_step
 
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
 
 MOTION = SteadyMotion(speed=25.0)
@@ -42,8 +43,8 @@ def errors_at_balises(observer: TrainObserver, gaps: list[float], start: tuple[f
 def test_the_certified_function_falls_from_balise_to_balise(
     observer: TrainObserver, relative: list[float], start: tuple[float, float]
 ) -> None:
-    limit = 0.999 * observer.certify(0.1).aperiodic_limit  # the tolerance of the search for the limit, twice
-    certificate = observer.certify(limit)
+    limit = 0.999 * next(observer.findings(0.1)).limit  # the tolerance of the search for the limit, twice
+    certificate = next(observer.findings(limit))
     assert certificate.holds
     P = np.array(certificate.lyapunov_matrix)
     errors = errors_at_balises(observer, [limit * gap for gap in relative], start)
@@ -54,7 +55,7 @@ def test_the_certified_function_falls_from_balise_to_balise(
 
 @pytest.mark.parametrize("observer", CONTINUOUS_DISCRETE.values(), ids=CONTINUOUS_DISCRETE)
 def test_beyond_the_constant_limit_the_error_grows(observer: TrainObserver) -> None:
-    limit = observer.certify(0.1).constant_limit
+    limit = next(observer.findings(0.1)).condition(CONSTANT_GAP).limit
     start = (0.1, 0.1)
     beyond = errors_at_balises(observer, [1.05 * limit] * 60, start)
     within = errors_at_balises(observer, [0.95 * limit] * 60, start)
@@ -69,8 +70,8 @@ def test_mixed_gaps_between_the_limits_grow_although_each_alone_is_stable() -> N
     observer = DifferentiatorCdo()
     long, short = 4.9 / 8.0, 0.54 / 8.0
     start = (0.01, 0.01)
-    assert max(observer.certify(gap).spectral_radius for gap in (long, short)) < 1.0
-    assert not observer.certify(long).holds
+    assert max(next(observer.findings(gap)).numbers[GROWTH] for gap in (long, short)) < 1.0
+    assert not next(observer.findings(long)).holds
     assert np.abs(errors_at_balises(observer, [long, short] * 25, start)[-1]).max() > 1.0
     assert np.abs(errors_at_balises(observer, [long] * 50, start)[-1]).max() < 0.01
     assert np.abs(errors_at_balises(observer, [short] * 50, start)[-1]).max() < 0.01
@@ -104,8 +105,8 @@ def uio_errors(runner: SystemRunner, stamps: list[float], start: np.ndarray) -> 
 @given(relative=st.lists(st.floats(0.0, 1.0), min_size=10, max_size=40), seed=st.integers(0, 1000))
 def test_the_unknown_input_observer_obeys_its_certificate(relative: list[float], seed: int) -> None:
     runner = uio_in_equilibrium()
-    limit = DiscreteUio().certify(0.1).aperiodic_limit
-    P = np.array(DiscreteUio().certify(limit).lyapunov_matrix)
+    limit = next(DiscreteUio().findings(0.1)).limit
+    P = np.array(next(DiscreteUio().findings(limit)).lyapunov_matrix)
     stamps = [0.05]
     for gap in relative:  # at most one balise in an odometer period, as the certificate demands
         stamps.append(max(stamps[-1] + gap * limit, np.floor(stamps[-1] / 0.1 + 1e-9) * 0.1 + 0.1 + 1e-6))
@@ -116,7 +117,7 @@ def test_the_unknown_input_observer_obeys_its_certificate(relative: list[float],
 
 
 def test_the_unknown_input_observer_diverges_beyond_its_constant_limit() -> None:
-    limit = DiscreteUio().certify(0.1).constant_limit
+    limit = next(DiscreteUio().findings(0.1)).condition(CONSTANT_GAP).limit
     start = np.array([0.1, 0.0, 0.1, 0.0, 0.0, 0.0])
     ends = {}
     for name, gap in (("beyond", limit + 0.2), ("within", limit - 0.2)):

@@ -7,6 +7,7 @@ import pytest
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, DECREASE, GROWTH
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo
 
@@ -29,26 +30,26 @@ def double_integrator(theta: float) -> SampledError:
     ],
 )
 def test_printed_takagi_sugeno_gains_by_decay(decay: float, constant: float | None, aperiodic: float) -> None:
-    certificate = TakagiSugenoCdo().certify(0.25, {"innovation_decay": decay})
+    certificate = next(TakagiSugenoCdo().findings(0.25, {"innovation_decay": decay}))
     if constant is not None:
-        assert certificate.constant_limit == pytest.approx(constant, rel=READING)
-    assert certificate.aperiodic_limit == pytest.approx(aperiodic, rel=READING)
+        assert certificate.condition(CONSTANT_GAP).limit == pytest.approx(constant, rel=READING)
+    assert certificate.limit == pytest.approx(aperiodic, rel=READING)
     assert certificate.holds
 
 
 def test_published_gains_grow_the_error_at_their_design_gap() -> None:
-    certificate = TakagiSugenoCdo().certify(0.5, preset="as_published")
-    assert certificate.spectral_radius == pytest.approx(2.7226, abs=5e-5)  # independently measured to that digit
+    certificate = next(TakagiSugenoCdo().findings(0.5, preset="as_published"))
+    assert certificate.numbers[GROWTH] == pytest.approx(2.7226, abs=5e-5)  # independently measured to that digit
     assert not certificate.holds
-    assert certificate.quadratic_margin < 0.0
-    assert certificate.preset == "as_published"
+    assert certificate.numbers[DECREASE] < 0.0
+    assert "(as_published)" in certificate.explain()
 
 
 @pytest.mark.parametrize("theta", [1.0, 2.0, 8.0, 30.0])
 def test_double_integrator_limits_scale_with_theta(theta: float) -> None:
     certificate = certify_sampled_error((double_integrator(theta),), 0.1 / theta, "double integrator")
-    assert theta * certificate.constant_limit == pytest.approx(5.0, rel=READING)
-    assert theta * certificate.aperiodic_limit == pytest.approx(4.0, rel=READING)
+    assert theta * certificate.condition(CONSTANT_GAP).limit == pytest.approx(5.0, rel=READING)
+    assert theta * certificate.limit == pytest.approx(4.0, rel=READING)
 
 
 def test_constant_limit_is_the_root_of_the_closed_form() -> None:
@@ -68,20 +69,20 @@ def test_contraction_at_half_a_second() -> None:
 @pytest.mark.parametrize("observer", [DifferentiatorCdo(), MultirateCdo()], ids=lambda o: o.name)
 @pytest.mark.parametrize(("gap", "holds"), [(0.3, True), (0.49, True), (0.51, False), (0.63, False)])
 def test_high_gain_observers_hold_up_to_four_over_theta(observer: DifferentiatorCdo, gap: float, holds: bool) -> None:
-    assert observer.certify(gap).holds is holds
+    assert next(observer.findings(gap)).holds is holds
 
 
 def test_no_limit_within_the_horizon_is_infinite() -> None:
-    certificate = DifferentiatorCdo().certify(5.0, {"theta": 0.01})
-    assert certificate.constant_limit == np.inf
-    assert certificate.aperiodic_limit == np.inf
+    certificate = next(DifferentiatorCdo().findings(5.0, {"theta": 0.01}))
+    assert certificate.condition(CONSTANT_GAP).limit == np.inf
+    assert certificate.limit == np.inf
     assert certificate.holds
 
 
 @pytest.mark.parametrize("gains", [{"theta": 0.0}, {"high_gain": (-2.0, -1.0)}], ids=["none", "wrong sign"])
 def test_no_correction_or_a_wrong_one_has_no_stable_gap(gains: dict[str, float | tuple[float, float]]) -> None:
-    certificate = DifferentiatorCdo().certify(0.5, gains)
-    assert (certificate.constant_limit, certificate.aperiodic_limit, certificate.holds) == (0.0, 0.0, False)
+    certificate = next(DifferentiatorCdo().findings(0.5, gains))
+    assert (certificate.condition(CONSTANT_GAP).limit, certificate.limit, certificate.holds) == (0.0, 0.0, False)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +98,7 @@ def test_no_correction_or_a_wrong_one_has_no_stable_gap(gains: dict[str, float |
 def test_values_that_cannot_be_are_refused(value: dict[str, Any], message: str) -> None:
     """A negative mass was once found unstable, a mass of zero divided by."""
     with pytest.raises(ValueError, match=message):
-        DifferentiatorCdo().certify(0.5, value)
+        next(DifferentiatorCdo().findings(0.5, value))
 
 
 def test_transitions_on_a_grid_are_the_single_ones() -> None:

@@ -22,7 +22,7 @@ def test_a_lying_solver_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None
     other = replace(MODEL, decay=16.001)  # not in the cache
     certificate = certify_sampled_error((other,), 0.4, "any")
     assert not certificate.holds
-    assert certificate.aperiodic_limit < 0.4
+    assert certificate.limit < 0.4
 
 
 def test_a_failing_solver_certifies_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

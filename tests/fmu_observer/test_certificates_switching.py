@@ -12,6 +12,7 @@ from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.aperiodic import MARGIN, certify_sampled_error, common_decrease
+from fmu_observer.certificates.gap_finding import DECREASE
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sampled_error import SampledError
@@ -88,19 +89,19 @@ def test_constant_equations_that_stand_up_alone_may_grow_where_they_take_turns()
     observer = TakagiSugenoCdo(premise="live")
     gains = observer.unpack_parameters(parameter_values(observer, UNEQUAL, None))
     vertices = tuple(observer._error_at(h, gains) for h in (1.0, 0.0))
-    limit = certify_sampled_error(vertices, 1.0, "constant").aperiodic_limit
+    limit = certify_sampled_error(vertices, 1.0, "constant").limit
     growth = max(
         np.abs(np.linalg.eigvals(transition(vertices[::order], [at * limit], 0.999 * limit))).max()
         for at in np.linspace(0.05, 0.95, 19)
         for order in (1, -1)
     )
     assert growth > 1.2
-    assert certify_sampled_error(vertices, 1.0, "switching", switching=True).aperiodic_limit < 0.3 * limit
+    assert certify_sampled_error(vertices, 1.0, "switching", switching=True).limit < 0.3 * limit
 
 
 @pytest.mark.parametrize(("premise", "holds"), [("frozen", True), ("live", False), ("estimated", False)])
 def test_weights_that_change_within_a_gap_are_certified_as_such(premise: str, holds: bool) -> None:
-    certificate = TakagiSugenoCdo(premise=premise).certify(1.85, parameters=UNEQUAL)
+    certificate = next(TakagiSugenoCdo(premise=premise).findings(1.85, parameters=UNEQUAL))
     assert certificate.holds is holds
     words = "constant over a gap, as frozen ones are" if holds else "changing at any time, by 1.7e+00 1/s"
     assert words in certificate.explain()
@@ -133,25 +134,25 @@ def test_two_copies_part_where_the_certificate_says_so() -> None:
 
 def test_shipped_gains_lose_next_to_nothing() -> None:
     """Their slopes differ by some 1e-3 1/s: the bound is of first order in that."""
-    frozen, live = (TakagiSugenoCdo(premise=premise).certify(0.2).aperiodic_limit for premise in ("frozen", "live"))
+    frozen, live = (next(TakagiSugenoCdo(premise=premise).findings(0.2)).limit for premise in ("frozen", "live"))
     assert live == pytest.approx(frozen, rel=1e-3)
-    at_the_limit = OBSERVERS["differentiator_cdo"]().certify(0.5)
+    at_the_limit = next(OBSERVERS["differentiator_cdo"]().findings(0.5))
     assert at_the_limit.holds
     assert "drag slopes that change within a gap are covered up to 0.4998 s only" in at_the_limit.explain()
-    assert "are covered too" in OBSERVERS["differentiator_cdo"]().certify(0.49).explain()
+    assert "are covered too" in next(OBSERVERS["differentiator_cdo"]().findings(0.49)).explain()
 
 
 def test_equal_vertices_change_nothing() -> None:
     vertices = pair(4.0, (0.3, 0.3), (1.0, 1.0))
     constant, switching = (certify_sampled_error(vertices, 0.5, "same", switching=s) for s in (False, True))
-    assert switching.aperiodic_limit == pytest.approx(constant.aperiodic_limit, rel=1e-3)
-    assert switching.quadratic_margin == pytest.approx(constant.quadratic_margin, rel=1e-3)
+    assert switching.limit == pytest.approx(constant.limit, rel=1e-3)
+    assert switching.numbers[DECREASE] == pytest.approx(constant.numbers[DECREASE], rel=1e-3)
 
 
 def test_slopes_within_gaps_are_noted_for_observers_of_models() -> None:
     assert (
         "slopes that change within a gap are covered for no gap"
-        in OBSERVERS["exponential_gain"]().certify(0.3).explain()
+        in next(OBSERVERS["exponential_gain"]().findings(0.3)).explain()
     )
 
 

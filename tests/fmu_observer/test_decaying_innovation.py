@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from observer_runner import SteadyMotion
+from own_condition import other_gains, own_condition
 from sampled_runner import Motion, SampledRunner, chain, true_motion
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
@@ -18,6 +19,7 @@ from fmu_observer.block import make_block
 from fmu_observer.certificates.aperiodic import certify_sampled_error, common_decrease
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
 from fmu_observer.certificates.switching_error import SwitchingError
 from fmu_observer.formulas.correction.innovation_decay import innovation_left
@@ -122,7 +124,7 @@ def test_the_transitions_are_those_of_the_observer_that_runs() -> None:
 )
 def test_the_certified_function_falls_at_every_admissible_gap(relative: list[float], start: tuple[float, ...]) -> None:
     error = decaying_error(SHIFT, np.array([[10.0], [25.0]]), C, 10.0, 0.25, (0, 1))
-    limit = 0.999 * certify_sampled_error((error,), 0.1, "any").aperiodic_limit
+    limit = 0.999 * certify_sampled_error((error,), 0.1, "any").limit
     certificate = certify_sampled_error((error,), limit, "any")
     assert certificate.holds
     P, e = np.array(certificate.lyapunov_matrix), np.array(start)
@@ -207,10 +209,10 @@ def test_its_ends_are_the_held_and_the_exponential_observer() -> None:
     law = {"decay_rate": 4.0, "decay_exponent": 1.0}
     decaying = followed(DecayingInnovation(), motion, gaps, theta=2.0, **law)
     np.testing.assert_allclose(decaying, followed(ExponentialGain(), motion, gaps, theta=2.0), atol=1e-9)
-    certificates = [o.certify(0.3, {"theta": 2.0}) for o in (HeldInnovation(), ExponentialGain())]
-    ends = [DecayingInnovation().certify(0.3, {"theta": 2.0, **p}) for p in ({"decay_rate": 0.0}, law)]
+    certificates = [next(o.findings(0.3, {"theta": 2.0})) for o in (HeldInnovation(), ExponentialGain())]
+    ends = [next(DecayingInnovation().findings(0.3, {"theta": 2.0, **p})) for p in ({"decay_rate": 0.0}, law)]
     for one, other in zip(ends, certificates, strict=True):
-        assert one.constant_limit == pytest.approx(other.constant_limit, rel=1e-9)
+        assert one.condition(CONSTANT_GAP).limit == pytest.approx(other.condition(CONSTANT_GAP).limit, rel=1e-9)
 
 
 def test_two_outputs_are_two_observers() -> None:
@@ -368,20 +370,25 @@ def test_theorems_as_numbers(K: tuple[float, float], L: float, theta_inf: float,
     assert bounds.strict_gap(sigma) < bounds.longest_gap == bounds.strict_gap(0.0)
 
 
+def periods(observer: Any, preset: str | None = None) -> list[float]:
+    """Limits of the period: as printed, then the exact one."""
+    found = [f for f in observer.findings(preset=preset) if f.what in ("period of the samples", "gap between balises")]
+    return [f.value for f in found if f.search is None]
+
+
 def test_limits_stand_beside_what_is_exact() -> None:
-    (held,) = DecayingInnovation(chain(2)).limits()
-    assert held.exact == pytest.approx(1.7, rel=1e-6)  # (4 - 2 g1 I0 + 2 g2 I1)/(g2 I0), g = (10, 25), a = 0.5
+    *printed, exact = periods(DecayingInnovation(chain(2)))
+    assert exact == pytest.approx(1.7, rel=1e-6)  # (4 - 2 g1 I0 + 2 g2 I1)/(g2 I0), g = (10, 25), a = 0.5
     bounds = decay_bounds(SHIFT, np.array([[2.0], [1.0]]), C, 5.0, 10.0, 0.0)
-    assert [b.value for b in held.printed] == [bounds.longest_gap, bounds.strict_gap(0.25 * bounds.alpha)]
-    (settling,) = DynamicHighGain(chain(2)).limits()
-    assert settling.exact == pytest.approx(1.0, rel=1e-3)  # 5/theta
+    assert printed == [bounds.longest_gap, bounds.strict_gap(0.25 * bounds.alpha)]
+    *printed, exact = periods(DynamicHighGain(chain(2)))
+    assert exact == pytest.approx(1.0, rel=1e-3)  # 5/theta
     limit = dynamic_theta_bounds(SHIFT, np.array([[2.0], [1.0]]), C, 0.0, 5.0)
-    assert settling.printed[0].value == limit.longest_gap
-    assert settling.printed[1].value < settling.printed[0].value
-    (hole,) = DecayingInnovationCdo().limits(preset="balise_holes")
-    assert hole.exact is not None
-    assert 32.0 < hole.exact < 100.0
-    assert hole.printed[0].value < 0.1
+    assert printed[0] == limit.longest_gap
+    assert printed[1] < printed[0]
+    printed_hole, hole = periods(DecayingInnovationCdo(), "balise_holes")
+    assert 32.0 < hole < 100.0
+    assert printed_hole < 0.1
 
 
 def test_a_shape_that_does_not_stabilise_has_no_bounds() -> None:
@@ -397,8 +404,8 @@ def test_the_printed_law_of_theta_is_a_preset() -> None:
     assert limit == pytest.approx(
         dynamic_theta_bounds(model.A, np.array([[2.0], [1.0]]), model.C, model.lipschitz, 1.0).theta_limit
     )
-    assert not observer.certify(0.05, preset="as_published").holds  # theta times the gap is 11
-    assert observer.condition(preset="as_published").values["longest_gap"] < 1e-4
+    assert not next(observer.findings(0.05, preset="as_published")).holds  # theta times the gap is 11
+    assert own_condition(observer, preset="as_published").numbers["longest_gap"] < 1e-4
 
 
 # -- the train --------------------------------------------------------------------------------------------------------
@@ -463,23 +470,22 @@ def test_a_gain_that_settles_follows_its_law_and_is_the_adapting_one_once_settle
 
 def test_holes_are_certified_by_what_acts_in_them() -> None:
     observer = DecayingInnovationCdo()
-    assert observer.certify(32.0, preset="balise_holes").holds
-    held = observer.certify(32.0, {"decay_rate": 0.0}, preset="balise_holes")
+    assert next(observer.findings(32.0, preset="balise_holes")).holds
+    held = next(observer.findings(32.0, {"decay_rate": 0.0}, preset="balise_holes"))
     assert not held.holds
-    assert held.constant_limit == pytest.approx(1.0 / 0.12, rel=0.01)  # the drag adds a little
+    assert held.condition(CONSTANT_GAP).limit == pytest.approx(1.0 / 0.12, rel=0.01)  # the drag adds a little
 
 
 def test_the_gain_that_settles_is_certified_at_its_limit() -> None:
-    assert DynamicGainCdo().certify(32.0, preset="balise_holes").holds
-    assert not DynamicGainCdo().certify(32.0, {"theta_limit": 0.2}, preset="balise_holes").holds
+    assert next(DynamicGainCdo().findings(32.0, preset="balise_holes")).holds
+    assert not next(DynamicGainCdo().findings(32.0, {"theta_limit": 0.2}, preset="balise_holes")).holds
 
 
 def test_gains_that_it_advises_are_certified() -> None:
     observer = DecayingInnovationCdo()
-    advice = observer.advise(32.0)
-    assert advice is not None
+    advice = other_gains(observer, 32.0)
     theta, rate = (float(part.split("=")[1].split()[0]) for part in advice.split(" are ")[0].split(" and "))
-    assert observer.certify(32.0, {"theta": theta, "decay_rate": rate}).holds
+    assert next(observer.findings(32.0, {"theta": theta, "decay_rate": rate})).holds
 
 
 def test_a_decaying_error_compares_with_its_like_only() -> None:

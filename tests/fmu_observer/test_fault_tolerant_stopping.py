@@ -294,7 +294,7 @@ def test_a_balise_sets_the_position_and_is_counted() -> None:
 
 
 def test_what_the_certificate_says() -> None:
-    good = SYSTEM.certify(10.0)
+    good = next(SYSTEM.findings(10.0))
     assert good.holds
     assert "exp(-1.5 t)" in good.explain()
-    assert not SYSTEM.certify(10.0, {"observer_gain": (101.4, 2650.0, -3750.0)}).holds
+    assert not next(SYSTEM.findings(10.0, {"observer_gain": (101.4, 2650.0, -3750.0)})).holds

@@ -16,6 +16,7 @@ from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, INERTIA, MASS, RADIUS, St
 from scipy.linalg import eigh, expm
 
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.observers.train import AdaptiveGainCdo, DifferentiatorCdo, TrainObserver
 from plant_models.hybrid import Runtime
 
@@ -174,14 +175,14 @@ def adaptation(**changes: object) -> GainAdaptation:
 def test_without_any_change_of_speed_it_is_the_constant_gains_certificate() -> None:
     steady = adaptation(acceleration=0.0, speed_tolerance=0.0, spacing_tolerance=0.0)
     certificate = certify_adapting_gain(steady, 10.0, "model")
-    assert certificate.aperiodic_limit * 0.12 == pytest.approx(4.0, abs=0.03)  # drag: 0.02 at this theta
-    assert certificate.constant_limit * 0.12 == pytest.approx(5.0, abs=0.05)
-    assert certificate.spectral_radius == pytest.approx(
-        DifferentiatorCdo().certify(10.0, {"theta": 0.2}).spectral_radius, rel=0.02
+    assert certificate.limit * 0.12 == pytest.approx(4.0, abs=0.03)  # drag: 0.02 at this theta
+    assert certificate.condition(CONSTANT_GAP).limit * 0.12 == pytest.approx(5.0, abs=0.05)
+    assert certificate.numbers[GROWTH] == pytest.approx(
+        next(DifferentiatorCdo().findings(10.0, {"theta": 0.2})).numbers[GROWTH], rel=0.02
     )
-    reference = DifferentiatorCdo().certify(20.0, {"theta": 0.12})
-    assert certificate.constant_limit == pytest.approx(reference.constant_limit, rel=2e-3)
-    assert certificate.aperiodic_limit == pytest.approx(reference.aperiodic_limit, rel=5e-3)
+    reference = next(DifferentiatorCdo().findings(20.0, {"theta": 0.12}))
+    assert certificate.condition(CONSTANT_GAP).limit == pytest.approx(reference.condition(CONSTANT_GAP).limit, rel=2e-3)
+    assert certificate.limit == pytest.approx(reference.limit, rel=5e-3)
 
 
 def test_a_ratio_beyond_four_is_certified_only_while_the_upper_limit_holds() -> None:
@@ -189,12 +190,12 @@ def test_a_ratio_beyond_four_is_certified_only_while_the_upper_limit_holds() -> 
         adaptation(ratio=4.5, acceleration=0.0, speed_tolerance=0.0, spacing_tolerance=0.0), 1.0, "m"
     )
     assert certificate.holds
-    assert certificate.aperiodic_limit * 3.0 == pytest.approx(4.0, abs=0.02)
+    assert certificate.limit * 3.0 == pytest.approx(4.0, abs=0.02)
 
 
 def test_every_assumption_costs_gap() -> None:
     limits = [
-        certify_adapting_gain(adaptation(**change), 1.0, "m").aperiodic_limit
+        certify_adapting_gain(adaptation(**change), 1.0, "m").limit
         for change in ({}, {"acceleration": 1.0}, {"speed_tolerance": 0.15}, {"spacing_tolerance": 0.2})
     ]
     assert all(limit < 0.97 * limits[0] for limit in limits[1:])
@@ -245,7 +246,7 @@ WIDE = adaptation(
 
 @cache
 def limit() -> float:
-    return certify_adapting_gain(RULE, 1.0, "model").aperiodic_limit
+    return certify_adapting_gain(RULE, 1.0, "model").limit
 
 
 @settings(max_examples=40, deadline=None)
@@ -292,7 +293,7 @@ def hardest(rule: GainAdaptation, P: np.ndarray, max_gap: float) -> float:
 
 @pytest.mark.parametrize("rule", [RULE, WIDE], ids=["narrow", "wide"])
 def test_hard_braking_and_hard_acceleration_do_not_contradict_it(rule: GainAdaptation) -> None:
-    limit = 0.999 * certify_adapting_gain(rule, 1.0, "model").aperiodic_limit
+    limit = 0.999 * certify_adapting_gain(rule, 1.0, "model").limit
     P = np.array(certify_adapting_gain(rule, limit, "model").lyapunov_matrix)
     assert 0.5 < hardest(rule, P, limit) < 1.0  # they come near
     assert hardest(rule, P, 1.3 * limit) > 1.0  # and pass it where more is asked
@@ -310,16 +311,15 @@ def test_the_bounds_of_speed_times_gap_are_reached_and_no_more() -> None:
 
 
 def test_the_observer_says_what_it_assumes() -> None:
-    certificate = AdaptiveGainCdo().certify(10.0, {"assumed_acceleration": 0.5})
+    certificate = next(AdaptiveGainCdo().findings(10.0, {"assumed_acceleration": 0.5}))
     assert certificate.holds
     assert "acceleration stays within 0.5 m/s2" in certificate.explain()
     assert "balises every 50 m" in certificate.explain()
-    assert dict(certificate.parameters)["assumed_acceleration"] == 0.5
-    assert not AdaptiveGainCdo().certify(10.0, {"assumed_acceleration": 1.5}).holds
+    assert not next(AdaptiveGainCdo().findings(10.0, {"assumed_acceleration": 1.5})).holds
 
 
 def test_a_sampled_first_stage_is_judged_too() -> None:
     observer = AdaptiveGainCdo(first_stage="multirate")
-    assert observer.certify(5.0).holds
-    assert "wheel stage" in observer.certify(5.0).explain()
-    assert not observer.certify(5.0, {"odometer_period": 1.0}).holds
+    assert next(observer.findings(5.0)).holds
+    assert "wheel stage" in next(observer.findings(5.0)).explain()
+    assert not next(observer.findings(5.0, {"odometer_period": 1.0})).holds

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_condition import own_condition
 
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.observers.generic.differentiators import FilteringDifferentiator, LevantDifferentiator
@@ -134,12 +135,12 @@ def test_units_follow_the_signal() -> None:
 
 
 def test_the_condition_is_one_on_the_signal() -> None:
-    condition = LevantDifferentiator(2).condition({"bound": 8.0, "internal_step": 0.01})
+    condition = own_condition(LevantDifferentiator(2), {"bound": 8.0, "internal_step": 0.01})
     assert condition.holds
-    assert condition.values["unit_sine_rate"] == pytest.approx(2.0)  # the third derivative of sin(2 t) is bounded by 8
-    assert [condition.values[f"chatter_{i}"] for i in range(3)] == pytest.approx([8e-6, 8e-4, 8e-2])
+    assert condition.numbers["unit_sine_rate"] == pytest.approx(2.0)  # the third derivative of sin(2 t) is bounded by 8
+    assert [condition.numbers[f"chatter_{i}"] for i in range(3)] == pytest.approx([8e-6, 8e-4, 8e-2])
     with pytest.raises(ValueError, match="bound"):
-        LevantDifferentiator(2).condition({"bound": 0.0})  # no signal but a polynomial has such a bound
+        own_condition(LevantDifferentiator(2), {"bound": 0.0})  # no signal but a polynomial has such a bound
 
 
 def test_orders_that_are_not_tabulated() -> None:

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_condition import own_condition
 from sampled_runner import Motion, SampledRunner, aperiodic_instants, true_motion
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.generic.sampled import (
     DecayingInnovation,
     DynamicHighGain,
@@ -138,26 +140,25 @@ def test_the_traced_kernel_and_plain_numpy_agree(make: Make) -> None:
 @every_observer
 def test_every_observer_answers_for_its_gaps(make: Make) -> None:
     observer = make()
-    certificate = observer.certify(0.1)
-    assert isinstance(certificate, Certificate)
+    certificate = next(observer.findings(0.1))
+    assert isinstance(certificate, Finding)
     assert certificate.holds
-    assert certificate.observer == observer.name
-    assert certificate.max_gap <= certificate.aperiodic_limit <= certificate.constant_limit
-    assert certificate.spectral_radius < 1.0
-    assert certificate.error_model in certificate.explain()
+    assert certificate.demand <= certificate.limit <= certificate.condition(CONSTANT_GAP).limit
+    assert certificate.numbers[GROWTH] < 1.0
+    assert certificate.source in certificate.explain()
     assert "balise" not in certificate.explain()
-    assert json.loads(json.dumps(certificate.to_dict(), allow_nan=False))["observer"] == observer.name
-    assert {name.split("[")[0] for name, _ in certificate.parameters} <= {s.name for s in observer.parameters}
-    beyond = observer.certify(3.0)
+    assert json.loads(json.dumps(certificate.to_dict(), allow_nan=False))["explanation"].startswith(observer.name)
+    assert {name.split("[")[0] for name in observer.deciding_values()} <= {s.name for s in observer.parameters}
+    beyond = next(observer.findings(3.0))
     assert not beyond.holds
-    assert beyond.aperiodic_limit == pytest.approx(certificate.aperiodic_limit, rel=1e-2)
+    assert beyond.limit == pytest.approx(certificate.limit, rel=1e-2)
 
 
 @every_observer
 @pytest.mark.parametrize("gap", [0.0, -1.0, np.inf, np.nan])
 def test_a_gap_must_be_positive_and_finite(make: Make, gap: float) -> None:
-    with pytest.raises(ValueError, match="max_gap must be positive"):
-        make().certify(gap)
+    with pytest.raises(ValueError, match="gap must be positive"):
+        next(make().findings(gap))
 
 
 @every_observer
@@ -165,18 +166,18 @@ def test_gains_of_another_size_are_refused_with_the_expected_one(make: Make) -> 
     observer = make()
     gain = next(s for s in observer.parameters if s.size is not None)
     with pytest.raises(ValueError, match=f"needs {gain.size} finite"):
-        observer.certify(0.1, {gain.name: [1.0] * (gain.width + 1)})
+        next(observer.findings(0.1, {gain.name: [1.0] * (gain.width + 1)}))
     with pytest.raises(ValueError, match=f"needs {gain.size} finite"):
-        observer.condition({gain.name: [1.0] * (gain.width + 1)})  # type: ignore[attr-defined]
+        own_condition(observer, {gain.name: [1.0] * (gain.width + 1)})  # type: ignore[attr-defined]
     with pytest.raises(ValueError, match="unknown parameter 'nonsense'"):
-        observer.certify(0.1, {"nonsense": 1.0})
+        next(observer.findings(0.1, {"nonsense": 1.0}))
 
 
 @every_observer
 def test_every_condition_says_its_numbers(make: Make) -> None:
-    condition = make().condition()  # type: ignore[attr-defined]
-    assert all(np.isfinite(value) for value in condition.values.values())
-    assert all(name in condition.explain() for name in condition.values)
+    condition = own_condition(make())  # type: ignore[attr-defined]
+    assert all(np.isfinite(value) for value in condition.numbers.values())
+    assert all(name in condition.explain() for name in condition.numbers)
     assert make().source.split(",")[0] in condition.source or "exact transition" in condition.source
 
 
@@ -243,7 +244,7 @@ def test_bounds_of_the_thesis_as_numbers() -> None:
     assert eight.longest_gap == pytest.approx(0.0034, abs=5e-5)
     assert high_gain_bounds(A, K, C, 8.0, beta, mu=3.0).longest_gap == pytest.approx(eight.longest_gap)  # mu cancels
     assert high_gain_bounds(A, -K, C, 8.0, beta).smallest_theta == np.inf
-    values = ExponentialGain("freight_train").condition({"theta": 8.0}).values
+    values = own_condition(ExponentialGain("freight_train"), {"theta": 8.0}).numbers
     assert values["longest_gap"] == pytest.approx(0.0034, abs=5e-5)
     assert values["smallest_theta"] == pytest.approx(0.0212, abs=5e-4)  # the same with b = 32.4, c = 1.65287
 
@@ -251,4 +252,4 @@ def test_bounds_of_the_thesis_as_numbers() -> None:
 @pytest.mark.parametrize(("theta", "period", "holds"), [(1.0, 0.02, True), (1.0, 0.04, False), (0.01, 0.02, False)])
 def test_both_bounds_must_hold(theta: float, period: float, holds: bool) -> None:
     observer = ExponentialGain(replace(find_model("freight_train"), sample_period=period))
-    assert observer.condition({"theta": theta}).holds is holds
+    assert own_condition(observer, {"theta": theta}).holds is holds

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_condition import own_condition
 from sampled_runner import chain
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
@@ -69,7 +70,7 @@ def test_the_sylvester_equation_is_solved_to_rounding() -> None:
     assert np.abs(error).max() < 2e-14
     np.testing.assert_allclose(design.T[:, :r], np.eye(r), atol=1e-12)
     np.testing.assert_allclose(sorted(np.linalg.eigvals(design.A).real), [-2.5, -2.0], atol=1e-9)
-    assert MultirateSylvester().condition().values["residual"] < 2e-14
+    assert own_condition(MultirateSylvester()).numbers["residual"] < 2e-14
 
 
 @settings(max_examples=40)
@@ -134,17 +135,17 @@ def test_traced_and_plain_agree() -> None:
 
 def test_matrices_that_no_longer_fit_each_other_are_found() -> None:
     observer = MultirateSylvester()
-    condition = observer.condition({"filter_gain[1]": 5.0})
+    condition = own_condition(observer, {"filter_gain[1]": 5.0})
     assert not condition.holds
-    assert condition.values["residual"] > 1e-3
-    assert not observer.certify(0.1, {"filter_gain[1]": 5.0}).holds
-    assert not observer.condition({"filter_matrix": np.eye(2).ravel()}).holds
+    assert condition.numbers["residual"] > 1e-3
+    assert not next(observer.findings(0.1, {"filter_gain[1]": 5.0})).holds
+    assert not own_condition(observer, {"filter_matrix": np.eye(2).ravel()}).holds
 
 
 def test_one_sampled_output_needs_no_small_gain() -> None:
-    notes = MultirateSylvester(continuous=2).certify(0.1).notes
+    notes = next(MultirateSylvester(continuous=2).findings(0.1)).remarks
     assert len(notes) == 1
-    assert "small-gain" in MultirateSylvester().certify(0.1).explain()
+    assert "small-gain" in next(MultirateSylvester().findings(0.1)).explain()
 
 
 def test_models_that_do_not_suit_are_refused() -> None:

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from own_condition import own_condition
 from sampled_runner import SampledRunner, chain, true_motion
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observers.generic.sampled import RiccatiHighGain
 
@@ -79,21 +81,21 @@ def test_the_settled_error_falls_as_the_certificate_says(period: float) -> None:
 
 def test_a_linear_model_has_no_longest_period() -> None:
     """With F exact ``e' S e`` falls at every period: Kalman."""
-    assert RiccatiHighGain(chain(2)).certify(1.0).constant_limit == np.inf
+    assert next(RiccatiHighGain(chain(2)).findings(1.0)).condition(CONSTANT_GAP).limit == np.inf
 
 
 def test_slopes_that_differ_from_the_believed_one_have_a_longest_period() -> None:
-    certificate = RiccatiHighGain().certify(0.1)
-    assert 0.5 < certificate.aperiodic_limit <= certificate.constant_limit < 2.0
-    far = RiccatiHighGain().certify(1.5)
+    certificate = next(RiccatiHighGain().findings(0.1))
+    assert 0.5 < certificate.limit <= certificate.condition(CONSTANT_GAP).limit < 2.0
+    far = next(RiccatiHighGain().findings(1.5))
     assert not far.holds
-    assert far.spectral_radius > 1.0
+    assert far.numbers[GROWTH] > 1.0
 
 
 def test_the_period_is_judged_by_the_condition() -> None:
     observer = RiccatiHighGain()
-    assert observer.condition().holds
-    assert observer.condition({"sample_period": 0.2}).values["gap"] == 0.2
+    assert own_condition(observer).holds
+    assert own_condition(observer, {"sample_period": 0.2}).numbers["gap"] == 0.2
 
 
 @pytest.mark.parametrize("name", ["theta", "state_weight", "output_weight", "sample_period"])
@@ -103,4 +105,4 @@ def test_weights_that_leave_no_riccati_equation_are_refused_by_name(name: str, v
     solver.
     """
     with pytest.raises(ValueError, match=f"'{name}' to certify must be at least"):
-        RiccatiHighGain().certify(0.3, {name: value})
+        next(RiccatiHighGain().findings(0.3, {name: value}))

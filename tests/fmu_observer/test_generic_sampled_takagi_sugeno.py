@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_condition import own_condition
 from sampled_runner import SampledRunner, aperiodic_instants, true_motion
 from scipy.linalg import expm
 
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled import TakagiSugenoAperiodic, TakagiSugenoPeriodic
@@ -74,8 +76,8 @@ def test_the_certified_function_falls_at_every_gap_and_weight(
 ) -> None:
     """Weights of the four mixtures' whole range, gaps on no grid, exact exponentials of the vertices' own equations."""
     observer, model = TakagiSugenoAperiodic(), find_takagi_sugeno_model("pendulum")
-    limit = 0.999 * observer.certify(0.1).aperiodic_limit
-    P = np.array(observer.certify(limit).lyapunov_matrix)
+    limit = 0.999 * next(observer.findings(0.1)).limit
+    P = np.array(next(observer.findings(limit)).lyapunov_matrix)
     gains = observer.gains(observer.unpack_parameters(observer.start_parameters()))
     e, levels = np.array([np.cos(angle), 2.0 * np.sin(angle)]), []
     for gap, h in relative:
@@ -88,9 +90,9 @@ def test_the_certified_function_falls_at_every_gap_and_weight(
 
 def test_beyond_the_constant_limit_the_error_grows() -> None:
     observer = TakagiSugenoPeriodic()
-    certificate = observer.certify(0.1)
-    beyond = observer.certify(1.05 * certificate.constant_limit)
-    assert beyond.spectral_radius > 1.0
+    certificate = next(observer.findings(0.1))
+    beyond = next(observer.findings(1.05 * certificate.condition(CONSTANT_GAP).limit))
+    assert beyond.numbers[GROWTH] > 1.0
     assert not beyond.holds
 
 
@@ -103,16 +105,16 @@ def test_the_gains_place_the_same_poles_at_every_vertex() -> None:
 
 
 def test_the_condition_tells_the_slope_it_tolerates() -> None:
-    condition = TakagiSugenoPeriodic().condition()
+    condition = own_condition(TakagiSugenoPeriodic())
     assert condition.holds
     # no less than the slowest pole can bear, no more than it could
-    assert 0.1 < condition.values["tolerated_slope"] < 2.0
-    wrong = TakagiSugenoPeriodic().condition({"gain": [-1.0, 0.0, -1.0, 0.0]})
+    assert 0.1 < condition.numbers["tolerated_slope"] < 2.0
+    wrong = own_condition(TakagiSugenoPeriodic(), {"gain": [-1.0, 0.0, -1.0, 0.0]})
     assert not wrong.holds
-    assert wrong.values["tolerated_slope"] == 0.0
+    assert wrong.numbers["tolerated_slope"] == 0.0
 
 
 def test_the_train_is_told_of_balises() -> None:
     observer = TakagiSugenoAperiodic("takagi_sugeno_train")
     assert [e.name for e in observer.triggered_events] == ["balise"]
-    assert observer.certify(0.5).holds
+    assert next(observer.findings(0.5)).holds

@@ -4,7 +4,8 @@ missing or lie, standstill, and what is refused.
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from scipy.integrate import solve_ivp
 from fmu_observer.observers.train import ContinuousDiscreteObserver, DiscreteMeasurementObserver
 from plant_models.hybrid.requirements import unfulfilled
 
+KIND = attrgetter("kind")
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 BOTH = pytest.mark.parametrize("make", [DiscreteMeasurementObserver, ContinuousDiscreteObserver])
 SET_C_PRESETS = ("as_published", "m_0_1_alpha_4", "m_0_5_alpha_100", "m_1_alpha_100")
@@ -327,10 +329,10 @@ def test_the_position_bound_starts_anew_at_a_balise() -> None:
 def test_gains_are_certified_at_the_odometer_period_and_over_balise_gaps() -> None:
     observer = DiscreteMeasurementObserver()
     for preset, gap in (("repaired", 0.2), ("as_published_set_d", 20.0)):
-        assert observer.certify(gap, preset=preset).holds, (preset, gap)
-    slow = observer.certify(1.0, {"gain": (0.1, 0.5, -0.1), "gain_schedule": 0.0})
+        assert next(observer.findings(gap, preset=preset)).holds, (preset, gap)
+    slow = next(observer.findings(1.0, {"gain": (0.1, 0.5, -0.1), "gain_schedule": 0.0}))
     assert not slow.holds
-    assert "decides the size of the error and not whether it is forgotten" in slow.error_model
+    assert "decides the size of the error and not whether it is forgotten" in slow.source
 
 
 def test_a_matrix_that_proves_nothing_is_refused() -> None:
@@ -352,19 +354,22 @@ def test_a_matrix_that_proves_nothing_is_refused() -> None:
 def test_bounds_of_an_observer_are_ordered() -> None:
     """What can happen lies below what is carried; missing samples let both grow."""
     for preset in ("repaired", "as_published_set_d", "m_0_1_alpha_1"):  # fastest, with negative drag, slowest
-        rows = DiscreteMeasurementObserver().error_bounds(preset=preset).growth(4)
-        for row in rows:
-            assert 0.0 < row.exact < row.carried, (preset, row)
-        assert all(a.carried < b.carried and a.as_printed < b.as_printed for a, b in pairwise(rows))
+        found = DiscreteMeasurementObserver().error_bounds(preset=preset).findings(missing=4)
+        of_kind = {kind: [f.value for f in fs] for kind, fs in groupby(sorted(found, key=KIND), KIND)}
+        printed, carried, exact = (of_kind[kind] for kind in ("as printed", "sufficient", "exact"))
+        assert all(0.0 < e < c for e, c in zip(exact, carried, strict=True)), preset
+        assert all(a < b for values in (carried, printed) for a, b in pairwise(values))
 
 
 def test_the_largest_gaps_keep_their_limit() -> None:
     bounds = DiscreteMeasurementObserver().error_bounds(preset="as_published_set_d")
-    found = bounds.largest_gaps(1.2)
-    for name in ("as_printed", "carried", "exact"):
-        assert getattr(bounds, name)(found[name]) == pytest.approx(1.2, rel=1e-3)  # of the worst case's grid
-    periods = bounds.largest_periods(1.2)
-    assert periods["as_printed"] == found["as_printed"]
-    assert periods["carried"] < found["carried"]
+    found = [f for f in bounds.findings(1.2) if f.unit == "s"]
+    gaps, periods = ({f.kind: f.value for f in found if f.what.startswith(what)} for what in ("gap", "period"))
+    for kind, name in (("as printed", "as_printed"), ("sufficient", "carried"), ("exact", "exact")):
+        assert getattr(bounds, name)(gaps[kind]) == pytest.approx(1.2, rel=1e-3)  # of the worst case's grid
+    assert periods["as printed"] == gaps["as printed"]
+    assert periods["sufficient"] < gaps["sufficient"]
     with pytest.raises(ValueError, match="limit must be a positive number"):
-        bounds.largest_gaps(-1.0)
+        bounds.findings(-1.0)
+    with pytest.raises(ValueError, match="must not be negative, got -1"):
+        bounds.findings(missing=-1)

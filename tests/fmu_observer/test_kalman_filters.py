@@ -9,6 +9,7 @@ import numpy as np
 import pykalman
 import pytest
 from block_systems import Driven
+from own_condition import own_condition
 
 from fmu_observer.models.exhibits.cart_pendulum_model import cart_pendulum
 from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
@@ -495,8 +496,8 @@ def test_the_square_root_form_needs_positive_weights() -> None:
 def test_what_is_not_seen_is_told_by_the_condition() -> None:
     """The angle of the motor: rank 3 of 4, Allaoui 2024, section IV.2.3.7."""
     motor = ExtendedKalmanFilter("synchronous_motor", outputs=["current_d", "current_q"])
-    condition = motor.condition()
+    condition = own_condition(motor)
     assert not condition.holds
-    assert condition.values["rank"] == 3
-    assert PENDULUM.condition().holds
-    assert PENDULUM.condition({"process_covariance": 0.0}).values["driven"] == 0
+    assert condition.numbers["rank"] == 3
+    assert own_condition(PENDULUM).holds
+    assert own_condition(PENDULUM, {"process_covariance": 0.0}).numbers["driven"] == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import Any
 
@@ -13,13 +13,18 @@ from shipped import shipped
 
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.bounds.worst_case import worst_case
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 
 STEP = 0.01  # [s] for which the effort is held
 ROUGH = 2e-3  # [m/s2]: what a held effort leaves, the drag's slope 0.05 1/s times 1.7 m/s2 times the step
 SECONDS = 6.0
 PREFIX = "Bound of the "
-CERTIFIED = GapCertified.limits
+
+
+def batched(found: Iterable[Any]) -> Iterator[tuple[Any, ...]]:
+    """Findings in threes: as printed, sufficient, exact."""
+    one = iter(found)
+    return zip(one, one, one, strict=True)
 
 
 def bounds_of(name: str) -> dict[str, str]:
@@ -91,21 +96,24 @@ def test_no_run_exceeds_what_is_called_a_bound(name: str, preset: str) -> None:
 @pytest.mark.parametrize(("name", "preset"), CASES)
 def test_no_table_of_bounds_is_below_what_can_happen(name: str, preset: str) -> None:
     bounds: Any = OBSERVERS[name]().error_bounds(None, preset)
-    columns = set(vars(bounds.growth(0)[0])) - {"missing", "gap", "exact", "as_printed"}
-    assert columns == {"carried"}
-    for row in bounds.growth(6):
-        for column in columns:
-            assert getattr(row, column) >= row.exact
+    rows = list(batched(bounds.findings(missing=6)))
+    assert len(rows) == 7
+    for printed, carried, exact in rows:
+        assert (printed.kind, carried.kind, exact.kind) == ("as printed", "sufficient", "exact")
+        assert carried.value >= exact.value
 
 
 # those whose limits are their certificate's alone have nothing printed
-PRINTED = [name for name, made in OBSERVERS.items() if getattr(made, "limits", CERTIFIED) is not CERTIFIED]
+CERTIFIED = GapCertified.limit_findings
+PRINTED = [name for name, made in OBSERVERS.items() if getattr(made, "limit_findings", CERTIFIED) is not CERTIFIED]
 
 
 @pytest.mark.parametrize("name", PRINTED)
 def test_no_printed_limit_is_beyond_the_exact_one(name: str) -> None:
     observer: Any = OBSERVERS[name]()
     for preset in observer.presets or (None,):
-        for limit in observer.limits(None, preset):
-            for printed in limit.printed:
-                assert limit.exact is None or printed.value <= limit.exact, (preset, printed)
+        found = [limit for limit in observer.findings(preset=preset) if limit.unit == "s"]
+        exact = {limit.what: limit.limit for limit in found if limit.kind in ("exact", "not found up to")}
+        for printed in found:
+            if printed.kind == "as printed":
+                assert printed.value <= exact[printed.what], (preset, printed)

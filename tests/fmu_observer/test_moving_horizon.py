@@ -16,6 +16,7 @@ import scipy.optimize
 import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_condition import own_condition
 
 from fmu_observer import OBSERVERS
 from fmu_observer.formulas.moving_horizon import robust_loss
@@ -393,10 +394,10 @@ def test_illegal_options_are_refused_in_words(options: dict[str, Any], said: str
 
 
 def test_a_window_that_does_not_tell_a_state_says_which() -> None:
-    short, long = (MovingHorizonObserver("linear_pendulum", window=w).condition() for w in (1, 2))
-    assert short.values["window_rank"] == 1
+    short, long = (own_condition(MovingHorizonObserver("linear_pendulum", window=w)) for w in (1, 2))
+    assert short.numbers["window_rank"] == 1
     assert "A window of 1 full row tells 1 without the arrival cost; it does not tell rate," in short.statement
-    assert long.values["window_rank"] == 2
+    assert long.numbers["window_rank"] == 2
     assert "A window of 2 full rows tells all of them" in long.statement
 
 

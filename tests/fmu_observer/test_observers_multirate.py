@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from observer_runner import SteadyMotion, in_step
 
+from fmu_observer.certificates.gap_finding import DECREASE
 from fmu_observer.observers.train import MultirateCdo
 from plant_models.hybrid import scalar_names
 
@@ -45,8 +46,8 @@ def test_a_balise_leaves_the_wheel_stage_alone() -> None:
 
 def test_the_wheel_stage_alone_decides_nothing_about_balises_but_can_spoil_the_certificate() -> None:
     observer = MultirateCdo()
-    assert observer.certify(0.4).holds
-    fast = observer.certify(0.4, {"theta_1": 60.0})  # theta_1 times the period: 6, beyond 5
+    assert next(observer.findings(0.4)).holds
+    fast = next(observer.findings(0.4, {"theta_1": 60.0}))  # theta_1 times the period: 6, beyond 5
     assert not fast.holds
-    assert fast.quadratic_margin == observer.certify(0.4).quadratic_margin
+    assert fast.numbers[DECREASE] == next(observer.findings(0.4)).numbers[DECREASE]
     assert "spectral radius" in fast.explain()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_condition import own_condition
 from scipy.integrate import solve_ivp
 from shipped import shipped
 
@@ -100,14 +101,14 @@ def test_a_fast_plant_at_a_slow_period() -> None:
     accurate = KalmanFilter(Fast(), outputs=["y"], period=0.2)
     assert accurate.model.sample_period == 0.2
     assert moved(accurate.model, np.ones(1), 0.2) == pytest.approx(exp(-10.0), rel=1e-6)
-    judged = accurate.condition()
+    judged = own_condition(accurate)
     assert judged.holds
-    assert judged.values["transition_error"] < 1e-9
-    assert not judged.warnings
-    coarse = KalmanFilter(Fast(), outputs=["y"], substeps=4).condition({"sample_period": 0.2})
+    assert judged.numbers["transition_error"] < 1e-9
+    assert not judged.remarks
+    coarse = own_condition(KalmanFilter(Fast(), outputs=["y"], substeps=4), {"sample_period": 0.2})
     assert not coarse.holds
-    assert coarse.values["transition_error"] == pytest.approx(0.1767, rel=1e-3)
-    assert "not accurate" in coarse.warnings[0]
+    assert coarse.numbers["transition_error"] == pytest.approx(0.1767, rel=1e-3)
+    assert "not accurate" in coarse.remarks[0]
 
 
 def test_a_motor_at_50_ms_is_that_of_another_solver() -> None:
@@ -119,11 +120,10 @@ def test_a_motor_at_50_ms_is_that_of_another_solver() -> None:
         lambda t, y: system.state_derivative(t, y, u, p), (0.0, 0.05), x, "LSODA", rtol=1e-12, atol=1e-12
     )
     np.testing.assert_allclose(ours, theirs.y[:, -1], rtol=1e-7)  # 500 steps of order 4
-    assert filters.condition().values["transition_error"] < 1e-8
+    assert own_condition(filters).numbers["transition_error"] < 1e-8
     assert (
-        ExtendedKalmanFilter("synchronous_motor", **MOTOR, substeps=4)
-        .condition({"sample_period": 0.05})
-        .warnings[0]
+        own_condition(ExtendedKalmanFilter("synchronous_motor", **MOTOR, substeps=4), {"sample_period": 0.05})
+        .remarks[0]
         .startswith("its transition over a period is not accurate")
     )
 

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cosim import Scenario
+from fmu_observer.certificates.gap_finding import GROWTH
 from fmu_observer.design.quasi_lpv_published import PUBLISHED, SECTION_3_3_4
 from fmu_observer.observers.train import OdometerReset, QuasiLpvUio
 from fmu_observer.observers.train.quasi_lpv_uio import speed_errors
@@ -164,24 +165,24 @@ def test_a_balise_ends_the_position_error() -> None:
 @pytest.mark.parametrize("period", [0.05, 0.2, 0.7, 2.0])
 def test_the_certificate_is_that_of_the_held_innovation_at_the_period(preset: str, period: float) -> None:
     """Against the transition of a period, as a matrix exponential of its own."""
-    certificate = QuasiLpvUio().certify(4.0, {"odometer_period": period}, preset=preset)
+    certificate = next(QuasiLpvUio().findings(4.0, {"odometer_period": period}, preset=preset))
     observer = QuasiLpvUio()
     drifts, gains = speed_errors(observer.unpack_parameters(observer.start_parameters(preset)))
     radii = []
     for A, K in zip(drifts, gains, strict=True):
         whole = expm(period * np.block([[A, K], [np.zeros((1, 4))]]))
         radii.append(np.abs(np.linalg.eigvals(whole[:3, :3] - whole[:3, 3:] @ [[1.0, 0.0, 0.0]])).max())
-    assert certificate.spectral_radius == pytest.approx(max(radii), abs=1e-9)
+    assert certificate.numbers[GROWTH] == pytest.approx(max(radii), abs=1e-9)
     assert certificate.holds == (max(radii) < 1.0) == (period < 1.0)
-    assert QuasiLpvUio(hold="reading").certify(4.0, {"odometer_period": period}, preset=preset).holds
+    assert next(QuasiLpvUio(hold="reading").findings(4.0, {"odometer_period": period}, preset=preset)).holds
 
 
 def test_gains_of_the_wrong_sign_are_not_certified() -> None:
     wrong = {"gain_low": [-g for g in SECTION_3_3_4.gain_low], "gain_high": [-g for g in SECTION_3_3_4.gain_high]}
     for hold in ("innovation", "reading"):
-        certificate = QuasiLpvUio(hold=hold).certify(4.0, wrong)  # type: ignore[arg-type]
+        certificate = next(QuasiLpvUio(hold=hold).findings(4.0, wrong))  # type: ignore[arg-type]
         assert not certificate.holds
-        assert certificate.aperiodic_limit == 0.0
+        assert certificate.limit == 0.0
 
 
 @pytest.mark.parametrize(("options", "said"), [({"rules": "x"}, "unknown rules"), ({"hold": "x"}, "unknown hold")])

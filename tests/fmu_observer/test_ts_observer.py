@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from own_condition import own_condition
 from takagi_sugeno_runs import PLANTS, errors, final_quarter, sampling
 
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_finding import GROWTH
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.exhibits.four_state_example import triangularisable_chain
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
@@ -49,7 +51,7 @@ def test_printed_gains_by_vertex(
 ) -> None:
     observer = GeneralTakagiSugenoCdo(name)
     vertices = observer.vertex_errors(preset="as_published")
-    found = list(observer.condition(preset="as_published").values.values())
+    found = list(own_condition(observer, preset="as_published").numbers.values())
     np.testing.assert_allclose(found, abscissas, atol=5e-3)
     np.testing.assert_allclose([v.spectral_radius(observer.model.max_gap) for v in vertices], radii, atol=6e-4)
     unstable = [first_unstable_gap((v,), 20.0) for v in vertices]
@@ -61,10 +63,10 @@ def test_printed_gains_by_vertex(
 
 def test_printed_gains_of_the_first_example_are_certified_for_mixed_gaps() -> None:
     observer = GeneralTakagiSugenoCdo(FIRST)
-    certificate = observer.certify(0.2)
+    certificate = next(observer.findings(0.2))
     assert certificate.holds
     assert (certificate.observer, certificate.preset) == ("general_takagi_sugeno_cdo", "as_published")
-    assert not observer.certify(0.3).holds
+    assert not next(observer.findings(0.3)).holds
     P = np.array(certificate.lyapunov_matrix)  # in the plant's own coordinates, whatever the scaling
     assert np.linalg.eigvalsh(P)[0] > 0.0
     moved = GeneralTakagiSugenoCdo(replace(observer.model, scaling=(1.0,) * 4), gains=GAINS[FIRST]["as_published"])
@@ -75,10 +77,10 @@ def test_printed_gains_of_the_first_example_are_certified_for_mixed_gaps() -> No
 
 
 def test_the_train_as_a_general_model_has_the_certificate_of_its_own_observer() -> None:
-    published = GeneralTakagiSugenoCdo(TRAIN).certify(0.5, preset="as_published")
-    assert published.spectral_radius == pytest.approx(2.7226, abs=5e-5)
-    assert published.aperiodic_limit == pytest.approx(0.286, rel=0.01)
-    assert GeneralTakagiSugenoCdo(TRAIN).certify(0.5).holds
+    published = next(GeneralTakagiSugenoCdo(TRAIN).findings(0.5, preset="as_published"))
+    assert published.numbers[GROWTH] == pytest.approx(2.7226, abs=5e-5)
+    assert published.limit == pytest.approx(0.286, rel=0.01)
+    assert next(GeneralTakagiSugenoCdo(TRAIN).findings(0.5)).holds
 
 
 # -- premises: sampling pattern and seeds are ours, so sizes are compared within the spread of seeds
@@ -257,12 +259,12 @@ def test_a_model_of_ones_own_needs_gains_and_a_sampled_output() -> None:
     with pytest.raises(ValueError, match="no gains are shipped for model 'own'"):
         GeneralTakagiSugenoCdo(model)
     observer = GeneralTakagiSugenoCdo(model, gains=GAINS[TRAIN]["redesigned"])
-    assert observer.certify(0.5).holds
+    assert next(observer.findings(0.5)).holds
     with pytest.raises(ValueError, match="no sampled measurement"):
         GeneralTakagiSugenoCdo(replace(model, sampled=(), C_sampled=np.zeros((0, 2))))
 
 
 @pytest.mark.parametrize("gap", [0.0, -1.0, np.inf])
 def test_a_gap_must_be_positive(gap: float) -> None:
-    with pytest.raises(ValueError, match="max_gap must be positive"):
-        GeneralTakagiSugenoCdo().certify(gap)
+    with pytest.raises(ValueError, match="gap must be positive"):
+        next(GeneralTakagiSugenoCdo().findings(gap))

@@ -16,6 +16,7 @@ from fmpy import read_model_description
 from lxml import etree, html
 
 from fmu_observer import OBSERVERS
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.documentation.licences import licence_files, licence_texts
 from fmus.documentation.page import page
@@ -84,19 +85,19 @@ def test_starts_and_presets_are_those_of_the_model() -> None:
     assert f"{system.default_preset} (this FMU)" in titles
 
 
-@pytest.mark.parametrize("name", [name for name in OBSERVERS if hasattr(OBSERVERS[name], "certify")])
+@pytest.mark.parametrize("name", [name for name in OBSERVERS if hasattr(OBSERVERS[name], "sampled_events")])
 def test_certificates_are_those_of_the_observer(name: str) -> None:
     system: Any = recipe(name)
     tables = html.document_fromstring(documentation(system, 3)["index.html"])
     rows = {row[0].text_content(): [cell.text_content() for cell in row[1:]] for row in tables.xpath("//tbody/tr")}
     for preset in list(system.presets) or [None]:
-        certificate = system.certify(0.2, preset=preset)
-        found = (certificate.aperiodic_limit, certificate.constant_limit)
-        unlimited = "none" if isinf(certificate.horizon) else f"none up to {certificate.horizon:g} s"
-        limits = [unlimited if isinf(limit) else f"{limit:.3g} s" for limit in found]
+        certificate = next(system.findings(0.2, preset=preset))
+        found = (certificate, certificate.condition(CONSTANT_GAP))
+        ends = ["none" if isinf(part.value) else f"none up to {part.value:g} s" for part in found]
+        limits = [end if isinf(part.limit) else f"{part.limit:.3g} s" for part, end in zip(found, ends, strict=True)]
         assert rows[preset or "declared starts"][-2:] == limits
-        assert certificate.error_model in tables.text_content()
-        assert f"mixed {certificate.event} gaps certified up to" in tables.text_content()
+        assert certificate.source in tables.text_content()
+        assert f"{certificate.what} certified up to" in tables.text_content()
 
 
 def test_events_are_told_as_the_version_of_fmi_does() -> None:
@@ -147,7 +148,10 @@ class Odd(HybridSystem):
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {"out": x.place}
 
-    def certify(self, max_gap: float, preset: str | None = None) -> Any:
+    def sampled_events(self, p: Any) -> tuple[str, ...]:
+        return ("tick",)
+
+    def findings(self, gap: float | None = None, parameters: Any = None, preset: str | None = None) -> Any:
         raise ArithmeticError("1 < 0")
 
 

@@ -211,10 +211,10 @@ def test_a_class_that_was_replaced_has_no_identity(monkeypatch: pytest.MonkeyPat
 def test_code_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[str] = []
     monkeypatch.setattr(identity, "_folder_digest", lambda name: seen.append(name) or name)
-    first = identity.identity(OBSERVERS["takagi_sugeno_cdo"](), code=("cosim/run/certificates.py",))
-    assert seen == ["cosim/run/certificates.py", "fmu_observer", "plant_models"]
+    first = identity.identity(OBSERVERS["takagi_sugeno_cdo"](), code=("cosim/run/observer_findings.py",))
+    assert seen == ["cosim/run/observer_findings.py", "fmu_observer", "plant_models"]
     monkeypatch.setattr(identity, "_folder_digest", lambda name: f"{name}, edited")
-    edited = identity.identity(OBSERVERS["takagi_sugeno_cdo"](), code=("cosim/run/certificates.py",))
+    edited = identity.identity(OBSERVERS["takagi_sugeno_cdo"](), code=("cosim/run/observer_findings.py",))
     assert None not in (first, edited)
     assert first != edited
 

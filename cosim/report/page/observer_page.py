@@ -171,9 +171,10 @@ def _benchmark_page(benchmark: BenchmarkScores, picture: bytes) -> str:
 
 def _certificates(benchmark: BenchmarkScores) -> Table:
     rows = [
-        [s.label, c.limit, c.expected, HOLDS.get(str(c.holds_expected)), c.seen, HOLDS.get(str(c.holds_seen))]
+        [s.label, c.value, c.demand, HOLDS.get(str(c.holds)), seen.value, HOLDS.get(str(seen.holds))]
         for s in benchmark.scores
         if (c := s.certificate) is not None
+        for seen in c.conditions
     ]
     columns = [
         OBSERVER,

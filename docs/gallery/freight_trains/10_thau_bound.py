@@ -19,7 +19,7 @@ def main() -> None:
     """Both bounds for the gain (4, 4), and the growth of the error where phi has a constant slope."""
     sheet = Sheet(__file__, "Thau's condition, printed and valid", "Bouchama 2024, (1.8), Theorem 1")
     observer = Thau("pendulum")
-    values = observer.condition().values
+    values = next(observer.findings()).numbers
     sheet.add("Lipschitz constant allowed, gain (4, 4)", "1/s", values["printed_bound"], values["bound"], UNSAFE)
     sheet.add("the same in the best scaled coordinates", "1/s", None, values["scaled_bound"], UNSAFE)
     model = find_model("pendulum")

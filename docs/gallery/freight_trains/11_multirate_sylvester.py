@@ -35,7 +35,7 @@ def main() -> None:
     sheet = Sheet(__file__, "Multirate observer by a Sylvester equation", "Bouchama 2024, (1.42)-(1.46)")
     observer = MultirateSylvester()
     model = observer.model
-    residual = unless_rounding(observer.condition().values["residual"], 1e-13)
+    residual = unless_rounding(next(observer.findings()).numbers["residual"], 1e-13)
     sheet.add("relative residual of (1.46)", "1", None, residual, INDEPENDENT)
     sheet.add("fastest growth of the plant", "1/s", None, np.linalg.eigvals(model.A).real.max(), "the plant is ours")
     # held upright, by its true state

@@ -66,11 +66,11 @@ def main() -> None:
     gain = extended_gain(np.array([[-0.1]]), np.eye(1), np.eye(1), 2, [-50.0, -50.0, -1.5])
     for name, value, published in zip(("v", "d", "d'"), gain[:, 0], (101.4, 2650.0, 3750.0), strict=True):
         sheet.add(f"gain of {name} for poles -50, -50, -1.5 1/s", "SI", published, value)
-    printed = ProportionalIntegralUio().condition(preset="as_published")
-    sheet.add("slowest pole of the printed gain", "1/s", -1.5, printed.values["abscissa"], independent=-1.5)
+    printed = next(ProportionalIntegralUio().findings(preset="as_published"))
+    sheet.add("slowest pole of the printed gain", "1/s", -1.5, printed.numbers["abscissa"], independent=-1.5)
     exists = decoupling_condition(coupled_vehicles())
-    sheet.add("rank(C H) where two speeds are measured", "1", None, exists.values["rank_CH"], OURS)
-    sheet.add("invariant zeros there", "1", None, exists.values["invariant_zeros"], OURS)
+    sheet.add("rank(C H) where two speeds are measured", "1", None, exists.numbers["rank_CH"], OURS)
+    sheet.add("invariant zeros there", "1", None, exists.numbers["invariant_zeros"], OURS)
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     kinds = {
         "luenberger": Luenberger("coupled_vehicles"),

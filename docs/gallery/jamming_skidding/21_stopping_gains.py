@@ -36,7 +36,7 @@ def main() -> None:
     sheet.add("its largest value", "m/s", None, np.abs(residual).max(), independent=0.0189)
     sheet.add("after", "s", None, times[np.abs(residual).argmax()], "told to the millisecond there", independent=0.019)
     sheet.add("steady error of the disturbance", "m/s2", None, lasting.steady_error[1], independent=-2.6223)
-    sampled = OBSERVERS["stopping_uio"]().certify(10.0)
+    sampled = next(OBSERVERS["stopping_uio"]().findings(10.0))
     sheet.add("sampled every millisecond, certified stable", "", None, "yes" if sampled.holds else "no", NOT_PRINTED)
     figure, axis = plt.subplots(figsize=(6, 3.6), layout="constrained")
     axis.plot(times * 1e3, np.abs(residual) * 1e3)

@@ -37,10 +37,12 @@ def main() -> None:
     _misprints(sheet)
     _unknown_load(sheet)
     for observer, rank in ((MotorEkf(), "3 of 4"), (MotorEkfStator(), "4 of 4")):
-        found = observer.condition().values
+        found = next(observer.findings()).numbers
         text = f"{found['rank']:.0f} of {found['order']:.0f}"
         sheet.add(f"observability at 100 rad/s, {observer.name}", "1", None, text, RANK, independent=rank)
-    still = MotorEkfStator().condition(speed=0.0, current_q=0.0).values
+    standing = MotorEkfStator()
+    p = standing.unpack_parameters(standing.start_parameters())
+    still = standing.condition_of(p, speed=0.0, current_q=0.0).numbers
     text = f"{still['rank']:.0f} of 4"
     sheet.add("the same at rest without current, motor_ekf_stator", "1", None, text, "nothing turns")
 

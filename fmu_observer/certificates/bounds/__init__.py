@@ -1,9 +1,9 @@
-"""Bounds of the error of an observer whose measurement is held between samples: formulas, growth, largest gaps, the
+"""Bounds of the error of an observer whose measurement is held between samples: formulas, largest gaps, the
 exact worst case.
 """
 
-from fmu_observer.certificates.bounds.bounded_gaps import growth_over_missing_samples, largest_gap
-from fmu_observer.certificates.bounds.error_bounds import BoundRow, ErrorBounds, bound_data, bound_text
+from fmu_observer.certificates.bounds.bounded_gaps import largest_gap
+from fmu_observer.certificates.bounds.error_bounds import ErrorBounds
 from fmu_observer.certificates.bounds.formulas import (
     cdo_bound,
     comparison_bound,
@@ -15,15 +15,11 @@ from fmu_observer.certificates.bounds.formulas import (
 from fmu_observer.certificates.bounds.worst_case import WorstCase, worst_case
 
 __all__ = [
-    "BoundRow",
     "ErrorBounds",
     "WorstCase",
-    "bound_data",
-    "bound_text",
     "cdo_bound",
     "comparison_bound",
     "dmo_bound",
-    "growth_over_missing_samples",
     "improved_cdo_bound",
     "improved_dmo_bound",
     "largest_gap",

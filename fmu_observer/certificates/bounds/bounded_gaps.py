@@ -1,4 +1,4 @@
-"""What a bound over time says of gaps: the largest one that keeps a limit, and the growth over missing samples."""
+"""What a bound over time says of gaps: the largest one that keeps a limit."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from math import inf, isfinite
 
 from fmu_observer.certificates.bisection import bisected
 
-Bound = Callable[[float], float]
-
 HORIZON = 1e4  # [s]: a bound that keeps its limit so long keeps it for ever
 FIRST = 1e-3  # [s]
-_HALVINGS = 60  # of the bracket, to rounding
+HALVINGS = 60  # of the bracket, to rounding
 
 
-def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON, halvings: int = _HALVINGS) -> float:
+def largest_gap(
+    bound: Callable[[float], float], limit: float, horizon: float = HORIZON, halvings: int = HALVINGS
+) -> float:
     """Largest gap up to which a bound stays at or below a limit: the use that Aguiar Cota 2019, 4.2 makes of tau_M.
 
     The bounds of this room start at the error of the sample and cross a limit above that once: they are convex, or rise
@@ -41,22 +41,3 @@ def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON, halvings: 
             return inf
         low, high = high, min(2.0 * high, horizon)
     return bisected(lambda gap: bound(gap) <= limit, low, high, halvings)[0]
-
-
-def growth_over_missing_samples(bound: Bound, period: float, missing: int) -> tuple[tuple[int, float, float], ...]:
-    """The bound just before the next sample where samples in between are missing or discarded.
-
-    Args:
-        bound: of the time since the sample [s]. period: between samples [s]. missing: most samples missing in a row.
-
-    Returns:
-        A row for each number of missing samples from 0: number, time since the last sample [s], bound.
-
-    Raises:
-        ValueError: the period is not positive, or the number is negative.
-    """
-    if not (isfinite(period) and period > 0.0):
-        raise ValueError(f"Missing samples: the period must be positive [s], got {period!r}.")
-    if missing < 0:
-        raise ValueError(f"Missing samples: their number must not be negative, got {missing}.")
-    return tuple((k, (k + 1) * period, bound((k + 1) * period)) for k in range(missing + 1))

@@ -4,36 +4,22 @@ keeps a limit. NumPy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
-from math import exp, inf, sqrt
-from typing import Any
+from math import exp, isfinite, sqrt
 
 import numpy as np
 
-from fmu_observer.certificates.bounds.bounded_gaps import FIRST, HORIZON, growth_over_missing_samples, largest_gap
+from fmu_observer.certificates.bounds.bounded_gaps import FIRST, HALVINGS, HORIZON, largest_gap
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates.bounds.worst_case import worst_case
+from fmu_observer.certificates.finding import Finding, Kind, limit_found
+
+_Bound = Callable[[float], float]
 
 _EXACT_HORIZON = 1e3  # [s] up to which gaps of the worst case are searched
 _COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
-
-
-@dataclass(frozen=True)
-class BoundRow:
-    """Bounds of the speed error just before the next sample.
-
-    Attributes:
-        missing: samples missing since the last one. gap: time since the last one [s].
-        as_printed, carried, exact: see `ErrorBounds` [m/s].
-    """
-
-    missing: int
-    gap: float
-    as_printed: float
-    carried: float
-    exact: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,57 +94,63 @@ class ErrorBounds:
             worst_case(F, K, self.rate, self.period, gap).error for F, K in zip(self.drifts, self.gains, strict=True)
         )
 
-    def growth(self, missing: int) -> tuple[BoundRow, ...]:
-        """The bounds over missing samples.
+    def findings(self, limit: float | None = None, missing: int = 0) -> Iterator[Finding]:
+        """The curves as numbers: just before the next sample, and the largest gaps and periods that keep a limit.
 
         Args:
-            missing: most samples missing in a row.
+            limit: of the speed error [m/s]; None for none. missing: most samples missing in a row.
 
         Returns:
-            A row for each number of missing samples from 0.
-        """
-        rows = growth_over_missing_samples(self.as_printed, self.period, missing)
-        return tuple(BoundRow(k, gap, value, self.carried(gap), self.exact(gap)) for k, gap, value in rows)
-
-    def largest_gaps(self, limit: float) -> dict[str, float]:
-        """Largest time since a sample at which each bound keeps a limit, samples before at the period.
-
-        Args:
-            limit: of the error [m/s].
-
-        Returns:
-            By the name of the bound [s]; 0 where it is exceeded at the sample already.
+            By number of missing samples, and then by what keeps the limit: as printed, sufficient, exact.
 
         Raises:
-            ValueError: the limit is not positive.
+            ValueError: the limit is not positive, or `missing` is negative.
         """
-        exact = cache(lambda gap: self.exact(max(gap, FIRST)))
-        bounds: dict[str, Callable[[float], float]] = {
-            "as_printed": self.as_printed,
-            "carried": self.carried,
-        }
-        found = {name: largest_gap(bound, limit) for name, bound in bounds.items()}
-        found["exact"] = largest_gap(exact, limit, _EXACT_HORIZON, _COARSE)
-        return found
+        if missing < 0:
+            raise ValueError(f"Missing samples: their number must not be negative, got {missing}.")
+        if limit is not None and not (isfinite(limit) and limit > 0.0):
+            raise ValueError(f"Largest gap: the limit must be a positive number, got {limit!r}.")
+        return self._findings(limit, missing)
 
-    def largest_periods(self, limit: float) -> dict[str, float]:
-        """Largest period of the odometer at which each bound keeps a limit, no sample missing.
+    def _findings(self, limit: float | None, missing: int) -> Iterator[Finding]:
+        for k in range(missing + 1):
+            gap = (k + 1) * self.period
+            what = f"speed error after {gap:.3g} s, {k} sample{'' if k == 1 else 's'} missing"
+            for kind, curve in self._curves().items():
+                value = curve(gap)
+                yield Finding(what, value, "m/s", kind, self._sources[kind], _within(value, limit), demand=limit)
+        if limit is not None:
+            for what, curves in (("gap", self._curves()), ("period", self._curves_over_periods())):
+                for kind, curve in curves.items():
+                    horizon, halvings = (_EXACT_HORIZON, _COARSE) if kind == "exact" else (HORIZON, HALVINGS)
+                    longest = largest_gap(cache(curve), limit, horizon, halvings)
+                    text = f"{what} that keeps {limit:g} m/s"
+                    yield limit_found(text, longest, horizon, self._sources[kind], kind=kind)
 
-        Args:
-            limit: of the error [m/s].
-
-        Returns:
-            By the name of the bound [s]; the printed formula knows no past, so that its gap is its period.
-
-        Raises:
-            ValueError: the limit is not positive.
-        """
+    @property
+    def _sources(self) -> dict[Kind, str]:
+        unknown = " ".join(f"{v:g}" for v in self.disturbances)
         return {
-            "as_printed": largest_gap(self.as_printed, limit),
-            "carried": largest_gap(lambda period: self._at_period(period).carried(max(period, FIRST)), limit),
-            "exact": largest_gap(
-                lambda period: self._at_period(period).exact(max(period, FIRST)), limit, _EXACT_HORIZON, _COARSE
-            ),
+            "as printed": f"no bound: from the sample on, error there stated as {self.sample_error:g}, beta "
+            f"{self.beta:g}, m {self.m:g} 1/s; no noise, no unknown input",
+            "sufficient": f"carried over all samples before; noise up to {self.noise:g} m/s and unknown inputs up to "
+            f"{unknown} (m/s2, m/s3, m/s4) in it",
+            "exact": "the worst acceleration there is; no noise, no unknown input",
+        }
+
+    def _curves(self) -> dict[Kind, _Bound]:
+        return {
+            "as printed": self.as_printed,
+            "sufficient": self.carried,
+            "exact": lambda gap: self.exact(max(gap, FIRST)),
+        }
+
+    def _curves_over_periods(self) -> dict[Kind, _Bound]:
+        """Over the period, no sample missing; the printed formula knows no past, so that its gap is its period."""
+        return {
+            "as printed": self.as_printed,
+            "sufficient": lambda period: self._at_period(period).carried(max(period, FIRST)),
+            "exact": lambda period: self._at_period(period).exact(max(period, FIRST)),
         }
 
     def _at_period(self, period: float) -> ErrorBounds:
@@ -176,67 +168,5 @@ class ErrorBounds:
         return sqrt(float(z @ self.P @ z))
 
 
-def bound_data(bounds: ErrorBounds, limit: float | None, missing: int) -> dict[str, Any]:
-    """The bounds as plain data.
-
-    Args:
-        bounds: of an observer. limit: of the error, for the largest gaps [m/s]; None for none.
-        missing: most samples missing in a row.
-
-    Returns:
-        Observer, numbers, `rows` and, with a limit, `largest_gaps` and `largest_periods` [s].
-
-    Raises:
-        ValueError: the limit is not positive, or `missing` is negative.
-    """
-    shared = ("observer", "preset", "period", "rate", "beta", "m", "gain", "sample_error", "noise", "disturbances")
-    data: dict[str, Any] = {name: getattr(bounds, name) for name in (*shared, "decay")}
-    data["rows"] = [asdict(row) for row in bounds.growth(missing)]
-    if limit is not None:
-        data |= {
-            "limit": limit,
-            "largest_gaps": bounds.largest_gaps(limit),
-            "largest_periods": bounds.largest_periods(limit),
-        }
-    return data
-
-
-def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:
-    """The bounds as a table for a terminal.
-
-    Args:
-        bounds: of an observer. limit: of the error, for the largest gaps [m/s]; None for none.
-        missing: most samples missing in a row.
-
-    Returns:
-        Lines, without a last line break.
-    """
-    lines = [
-        f"{bounds.observer} ({bounds.preset}): odometer every {bounds.period:g} s, accelerations up to "
-        f"{bounds.rate:g} m/s2",
-        "Speed error [m/s] just before the next sample:",
-        f"{'missing':>8} {'gap [s]':>8} {'as printed':>10} {'carried':>10} {'exact':>10}",
-    ]
-    lines += [
-        f"{row.missing:8d} {row.gap:8.3g} {row.as_printed:10.4g} {row.carried:10.4g} {row.exact:10.4g}"
-        for row in bounds.growth(missing)
-    ]
-    if limit is not None:
-        for what, found in (("gap", bounds.largest_gaps(limit)), ("period", bounds.largest_periods(limit))):
-            shown = ", ".join(f"{name.replace('_', ' ')} {_seconds(name, value)}" for name, value in found.items())
-            lines.append(f"Largest {what} that keeps {limit:g} m/s: {shown}")
-    lines.append(
-        f"as printed, no bound: from the sample on, error there stated as {bounds.sample_error:g}, beta "
-        f"{bounds.beta:g}, m {bounds.m:g} 1/s; no noise, no unknown input"
-    )
-    lines.append(
-        f"carried, a bound: over all samples before; noise up to {bounds.noise:g} m/s and unknown inputs up to "
-        f"{' '.join(f'{v:g}' for v in bounds.disturbances)} (m/s2, m/s3, m/s4) in it"
-    )
-    lines.append("exact: the worst acceleration there is; no noise, no unknown input")
-    return "\n".join(lines)
-
-
-def _seconds(name: str, value: float) -> str:
-    horizon = _EXACT_HORIZON if name == "exact" else HORIZON
-    return f"> {horizon:.4g} s" if value == inf else f"{value:.4g} s"
+def _within(value: float, limit: float | None) -> bool | None:
+    return None if limit is None else value <= limit

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import HighGainBounds, high_gain_bounds
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.models.observer_model import shift_matrix
@@ -171,8 +172,8 @@ def _row(theta: float, lipschitz: float) -> DesignBoundRow:
         by_3_32=longest_gap_3_32(theta, lipschitz),
         by_3_67=longest_gap_3_67(theta, lipschitz),
         by_3_87=longest_gap_3_87(theta, lipschitz),
-        constant=exact.constant_limit,
-        aperiodic=exact.aperiodic_limit,
+        constant=exact.condition(CONSTANT_GAP).limit,
+        aperiodic=exact.limit,
     )
 
 

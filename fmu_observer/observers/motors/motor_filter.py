@@ -7,22 +7,21 @@ the business of its subclasses.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.formulas.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
 from fmu_observer.models.observer_model import named_as, stacked_of
+from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from fmu_observer.observers.model_signals import LOG_LIKELIHOOD, sampling_event
-from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
     Array,
-    HybridSystem,
     Signal,
     discrete_output,
     input_signal,
@@ -42,7 +41,7 @@ STATES = (
 LOAD = output_signal("load_torque", "N.m", "Torque of the load against the rotation")
 
 
-class MotorFilter(HybridSystem):
+class MotorFilter(EvaluatedObserver):
     """Base: at ``start + k sample_period`` a prediction over the period that has passed, with the voltages held in it,
     then the correction by the currents measured at its end.
 
@@ -147,34 +146,23 @@ class MotorFilter(HybridSystem):
         """The covariance of the first estimate is one."""
         return positive("estimate_covariance", x.estimate_covariance, self.order, definite=False)
 
-    def condition(
-        self,
-        parameters: Mapping[str, Value] | None = None,
-        preset: str | None = None,
-        *,
-        speed: float = 100.0,
-        current_q: float = 1.5,
-    ) -> Condition:
+    def condition_of(self, p: Any, speed: float = 100.0, current_q: float = 1.5) -> Finding:
         """Whether n samples show all states of the motor that turns steadily: the rank of
         ``[H_0; H_1 F_0; H_2 F_1 F_0; ...]``.
 
         Args:
-            parameters: values that replace those of the preset. preset: by name; None for the default.
-            speed: of the shaft [rad/s]. current_q: current along q, without one along d [A].
+            p: parameters, as in `HybridSystem.flow`. speed: of the shaft [rad/s].
+            current_q: current along q, without one along d [A].
 
         Returns:
             Rank, number of states, smallest singular value.
-
-        Raises:
-            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
         """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
         matrix = self._observability(speed, current_q, p)
         rank, smallest = int(np.linalg.matrix_rank(matrix)), float(np.linalg.svd(matrix, compute_uv=False)[-1])
-        steady = {"speed": speed, "current_q": current_q}
-        return Condition(
+        steady = {"speed [rad/s]": speed, "current_q [A]": current_q}
+        return condition_found(
             holds=rank == self.order,
-            values={"rank": rank, "order": self.order, "smallest_singular_value": smallest} | steady,
+            numbers={"rank": rank, "order": self.order, "smallest_singular_value": smallest} | steady,
             statement="n samples of the motor at a steady speed show all states (rank = order)",
             source=self.source,
         )

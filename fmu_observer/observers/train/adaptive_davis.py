@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.formulas.adaptation.adaptation_at_samples import (
     AtSample,
@@ -24,7 +24,7 @@ from fmu_observer.formulas.adaptation.adaptation_at_samples import (
 )
 from fmu_observer.formulas.adaptation.adaptive_law import Sizes, learnt_constants, smallest_eigenvalue
 from fmu_observer.models.observer_model import named_as
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
@@ -261,7 +261,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         known, since = _parts_of(x)
         return _root(self._covariance(x, known, since, constants_now(known, since))[0, 0])
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of position and speed with the coefficients known and the odometer read all the time."""
         K = _settled(float(p.mu))
         drift = A - K[:, 1:] @ C[1:]
@@ -271,7 +271,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
             "of the coefficients obey least squares at any gaps, in cascade; drag slopes, noise and standstill are "
             "left out"
         )
-        return certify_sampled_error((error,), max_gap, model)
+        return certify_sampled_error((error,), gap, model)
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -4,16 +4,15 @@ Ours.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
 
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.design.certified_gains import certified_gains, rounded_down
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K
-from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_observer import TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range
@@ -40,7 +39,7 @@ class AdaptiveGainCdo(HighGainTrainObserver):
     diverges for spacings of 8.7 m and more at 14 m/s. Theta is memory: it is in force, with its own decay of the
     innovation, until the next balise.
 
-    `certify(max_gap)` assumes what must be assumed of a journey: the speed is never below ``d / max_gap`` (with the
+    `findings(gap)` assumes what must be assumed of a journey: the speed is never below ``d / gap`` (with the
     tolerance of d), acceleration and deceleration stay within `assumed_acceleration`, v is right within
     `assumed_speed_error` and each spacing is d within `assumed_spacing_error`. These three act on the certificate only.
     A smaller ratio leaves more room for changing speeds, a larger one corrects faster; theta_min at most
@@ -130,19 +129,19 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         theta = np.clip(p.ratio * speed / spacing, p.theta_min, np.maximum(p.theta_max, p.theta_min))  # as certified
         return super().update(event, t, x, u, p) | {"theta": theta} | learnt
 
-    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+    def alternative(self, gap: float, p: Any, evaluate: Evaluate) -> str | None:
         """The ratio and theta_min of a few that are certified; where none is, a constant theta."""
         for share in _ADVISED_SHARES:
-            rule = {"ratio": _ADVISED_RATIO, "theta_min": rounded_down(share / max_gap)}
-            if certify(rule).holds:
+            rule = {"ratio": _ADVISED_RATIO, "theta_min": rounded_down(share / gap)}
+            if evaluate(rule).holds:
                 values = f"ratio = {_ADVISED_RATIO:g} and theta_min = {rule['theta_min']:g}"
-                return f"{values} are certified for {max_gap:.3g} s"
-        gains = certified_gains(max_gap, lambda theta: {"theta_min": theta, "theta_max": theta}, certify)
+                return f"{values} are certified for {gap:.3g} s"
+        gains = certified_gains(gap, lambda theta: {"theta_min": theta, "theta_max": theta}, evaluate)
         if gains is None:
             return None
-        return f"theta_min = theta_max = {gains['theta_min']:g} is certified for {max_gap:.3g} s"
+        return f"theta_min = theta_max = {gains['theta_min']:g} is certified for {gap:.3g} s"
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over all gaps, gains and changes of gain that the assumed journey allows."""
         slowest, fastest = drag_slope_range(p, 0.0, TOP_SPEED)
         adaptation = GainAdaptation(
@@ -157,7 +156,7 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             spacing_tolerance=float(p.assumed_spacing_error),
             learnt=self.spacing == "learnt",
         )
-        return self.stage.judged(certify_adapting_gain(adaptation, max_gap, _error_model(adaptation)), p)
+        return self.stage.also_of(certify_adapting_gain(adaptation, gap, _error_model(adaptation)), p)
 
     def _spacing(self, x: Any, u: Any, p: Any) -> tuple[Array, dict[str, Array]]:
         """Spacing d to expect [m], and the memory of balises after this one."""

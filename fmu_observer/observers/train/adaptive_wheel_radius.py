@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.formulas.adaptation.adaptive_law import (
     Plant,
@@ -20,7 +20,7 @@ from fmu_observer.formulas.adaptation.adaptive_law import (
     learnt_constants,
     start_covariance,
 )
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.standstill import stands
@@ -188,7 +188,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""
         return _root(x.error_covariance[0, 0])
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of the observer that knows the wheel radius, ``d e = -mu c``, ``d c = -mu c``, ``c = e`` at a
         balise; what is learnt obeys least squares, which forget at any gaps.
         """
@@ -198,7 +198,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
             "error of the position with the wheel radius known; that of the wheel radius obeys least squares at any "
             "gaps, in cascade; noise, standstill and wheels that lock or spin are left out"
         )
-        return certify_sampled_error((error,), max_gap, model)
+        return certify_sampled_error((error,), gap, model)
 
 
 DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.design.augmented_gains import augmented_matrix
 from fmu_observer.observers.train.augmented_observer import ORDER, WAYS_OF_FIXES, AugmentedTrainObserver, Fixes
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED
@@ -100,8 +100,8 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         """An odometer sample."""
         return self.stage.sampled(x, u)
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of the second stage, and for sampled odometers the exact check of the first at its constant
         period.
         """
-        return self.stage.judged(super().error_certificate(max_gap, p), p)
+        return self.stage.also_of(super().gap_finding(gap, p), p)

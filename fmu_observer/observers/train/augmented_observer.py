@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.train.standstill import held_disturbance, stands
@@ -188,7 +188,7 @@ class AugmentedTrainObserver(TrainObserver):
         """What an event changes that the subclass adds."""
         raise NotImplementedError(f"{type(self).__name__} has no jump for event {event!r}.")
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of the sensors in use: of balises, and where fixes are used too, of fixes and of mixtures of
         both.
         """
@@ -199,16 +199,14 @@ class AugmentedTrainObserver(TrainObserver):
             "inputs to it, and standstill are left out"
         )
         errors = self._errors_of(used[0], p)
-        certificate = certify_sampled_error(errors, max_gap, f"{model}; corrected by '{used[0]}' samples")
-        certificate = with_switching_noted(certificate, errors, "drag slopes")
+        found = certify_sampled_error(errors, gap, f"{model}; corrected by '{used[0]}' samples")
+        found = with_switching_noted(found, errors, "drag slopes")
         if len(used) == 1:
-            return certificate
-        gap = float(p.fix_period)
-        alone, mixed = (self._mixture(sensors, gap, p, model) for sensors in (("gps",), SENSORS))
-        rare = "the change between times with fixes and without is taken to be rare"
-        notes = (f"fixes alone {_in_words(alone)}", f"fixes and balises in any order {_in_words(mixed)}; {rare}")
-        return replace(
-            certificate, holds=certificate.holds and alone.holds and mixed.holds, notes=(*certificate.notes, *notes)
+            return found
+        alone, mixed = (self._mixture(sensors, float(p.fix_period), p, model) for sensors in (("gps",), SENSORS))
+        rare = "; the change between times with fixes and without is taken to be rare"
+        return found.also(
+            _described(alone, "fixes alone", ""), _described(mixed, "fixes and balises in any order", rare)
         )
 
     def sampled_events(self, p: Any) -> tuple[str, ...]:
@@ -227,13 +225,14 @@ class AugmentedTrainObserver(TrainObserver):
         gains, decay = self.gains_of(sensor, p)
         return tuple(SampledError.of(drift.tolist(), gains, float(decay)) for drift in self.error_drifts(p))
 
-    def _mixture(self, sensors: tuple[str, ...], gap: float, p: Any, model: str) -> Certificate:
+    def _mixture(self, sensors: tuple[str, ...], gap: float, p: Any, model: str) -> Finding:
         vertices = tuple(error for sensor in sensors for error in self._errors_of(sensor, p))
         return certify_sampled_error(vertices, gap, model)
 
 
-def _in_words(certificate: Certificate) -> str:
-    verdict = "certified" if certificate.holds else "NOT certified"
-    limit = certificate.aperiodic_limit
-    reach = f"limit {limit:.4g} s" if isfinite(limit) else f"no limit found up to {certificate.horizon:.4g} s"
-    return f"{verdict} for gaps up to {certificate.max_gap:.4g} s ({reach})"
+def _described(found: Finding, what: str, further: str) -> Finding:
+    """A finding about gaps as a condition of another, with its verdict in words."""
+    verdict = "certified" if found.holds else "NOT certified"
+    reach = f"limit {found.value:.4g} s" if isfinite(found.limit) else f"no limit found up to {found.value:.4g} s"
+    text = f"{what} {verdict} for gaps up to {found.demand:.4g} s ({reach}){further}"
+    return replace(found, what=what, statement=text)

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
+from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.formulas.filtering.kalman import (
     correct,
     integrated_noise,
@@ -17,7 +18,7 @@ from fmu_observer.formulas.filtering.kalman import (
     normalised_square,
     predicted_covariance,
 )
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.innovation_gate import place_deviation
@@ -270,28 +271,28 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         """Three standard deviations of the position at the last event [m]."""
         return SIGMAS * np.sqrt(np.maximum(x.estimate_covariance[0, 0], 0.0))
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate by the filter's own function ``e' inv(P) e``, which falls over every sequence of gaps.
 
         Judged is the settled filter at the gap and at the horizon, at 20 m/s: how much the error and that function
         fall from balise to balise.
         """
-        horizon = max(HORIZON, max_gap)
-        asked, longest = _settled(max_gap, p), _settled(horizon, p)
+        horizon = max(HORIZON, gap)
+        asked, longest = _settled(gap, p), _settled(horizon, p)
         stable = longest.spectral_radius < 1.0 and longest.margin > 0.0
-        return Certificate(
-            max_gap=max_gap,
-            horizon=horizon,
+        return gap_finding(
+            gap,
+            horizon,
             constant_limit=inf if stable else 0.0,
-            aperiodic_limit=inf if stable else 0.0,
-            spectral_radius=asked.spectral_radius,
-            quadratic_margin=asked.margin,
+            mixed_limit=inf if stable else 0.0,
+            growth=asked.spectral_radius,
+            decrease=asked.margin,
             holds=stable and asked.spectral_radius < 1.0 and asked.margin > 0.0,
             error_model="error of position, speed, disturbance and creep of the linear train at 20 m/s, the wheels "
             "creeping as much as they may, readings at their period and a balise at the end of each gap; readings that "
             "are refused, and standstill, are left out",
-            notes=("the filter's own function e' inv(P) e grows over no sequence of gaps, whatever they are",),
-            lyapunov_matrix=rows_of(np.linalg.inv(asked.covariance)),
+            remarks=("the filter's own function e' inv(P) e grows over no sequence of gaps, whatever they are",),
+            matrix=rows_of(np.linalg.inv(asked.covariance)),
         )
 
     def deciding_parameters(self) -> tuple[Signal, ...]:

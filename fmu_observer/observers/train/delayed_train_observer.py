@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Self
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
 from fmu_observer.models.train.networked_train_model import networked_train
 from fmu_observer.observers.generic.delayed.delayed_state_observer import (
@@ -59,9 +59,9 @@ class DelayedTrainObserver(DelayedStateObserver):
         """Both measurements together; that they come each at its own instants is checked beside it."""
         return (tuple(range(self.outputs_count)),)
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate where balises and packets come together, and a small-gain condition where they do not."""
-        found, n = super().error_certificate(max_gap, p), self.model.order
+        found, n = super().gap_finding(gap, p), self.model.order
         errors = [self.error_generator(drift, p) for drift in self.model.drifts]
         limits = [independent_gap_limit(e[:n, :n], e[:n, n:], e[n:, :n], e[n:, n:]) for e in errors]
         return with_independent_samples(found, min(limits))

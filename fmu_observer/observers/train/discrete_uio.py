@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.design.noise_covariance import process_covariance
 from fmu_observer.design.uio_design import uio_matrices
@@ -111,7 +111,7 @@ class DiscreteUio(TrainObserver):
         estimate = stacked_of(x, self.estimator_states)
         return named_as(self.estimator_states, (estimate[i] - gain[i] * innovation for i in range(ORDER)))
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over the products of per-sample updates with and without a balise."""
         A, _ = uio_matrices(float(p.mass), float(_drag_slope(p)))
         error = TwoRateError(
@@ -128,7 +128,7 @@ class DiscreteUio(TrainObserver):
             "odometer samples at their period and the balise at any phase between them; the difference of the true "
             "drag, an input to it, and the constant resistance near standstill are left out"
         )
-        return certify_two_rate_error(error, max_gap, model)
+        return certify_two_rate_error(error, gap, model)
 
 
 def _drag_slope(p: Any) -> Array:

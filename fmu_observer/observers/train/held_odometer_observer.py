@@ -5,7 +5,7 @@ speed error that run between them: what the two of them share.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import sqrt
 from typing import Any, Literal
@@ -16,7 +16,7 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error, with_swit
 from fmu_observer.certificates.bounds import ErrorBounds
 from fmu_observer.certificates.bounds.carried import first_component, level, level_of_box
 from fmu_observer.certificates.bounds.formulas import improved_dmo_bound
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -302,7 +302,7 @@ class HeldOdometerObserver(TrainObserver):
         limited = tuple(s for s in self.estimator_parameters if s.min is not None)
         return super().requirements(p) | within_bounds(limited, p) | {_PROOF: shown[0] * shown[1]}
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of ``de = (A - K C) e`` with the position behind it, for all drag slopes up to `speed_max`."""
         vertices = tuple(position_error(a11, p) for a11 in dict.fromkeys(map(float, _error_slopes(p))))
         model = (
@@ -311,7 +311,7 @@ class HeldOdometerObserver(TrainObserver):
             f"so that its period ({float(p.odometer_period):g} s) decides the size of the error and not whether it is "
             "forgotten: see error_bound; standstill is left out"
         )
-        return with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")
+        return with_switching_noted(certify_sampled_error(vertices, gap, model), vertices, "drag slopes")
 
     def error_bounds(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> ErrorBounds:
         """What the bounds say with given parameters: at the period, over missing samples, largest gaps.
@@ -327,6 +327,9 @@ class HeldOdometerObserver(TrainObserver):
             ValueError: a parameter or the preset is unknown or not legal, or P does not prove the decay.
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to bound its error"))
+        return self._error_bounds(p, preset or self.default_preset or "")
+
+    def _error_bounds(self, p: Any, preset: str) -> ErrorBounds:
         slopes = tuple(map(float, _error_slopes(p)))
         if not all(proven(a11, p) for a11 in slopes):
             gain = [float(k) for k in p.gain]
@@ -336,7 +339,7 @@ class HeldOdometerObserver(TrainObserver):
         unknown = (float(p.unknown_acceleration), float(p.unknown_jerk), float(p.unknown_jerk_rate))
         return ErrorBounds(
             observer=self.name,
-            preset=preset or self.default_preset or "",
+            preset=preset,
             gain=max(sqrt(float(K @ K)) for K in gains),
             disturbances=unknown,
             P=p.lyapunov_matrix,
@@ -344,6 +347,13 @@ class HeldOdometerObserver(TrainObserver):
             gains=gains,
             **numbers,
         )
+
+    def limit_findings(self, values: np.ndarray) -> Iterator[Finding]:
+        """The constant gap between balises, and the speed error just before the next sample of the odometer."""
+        yield from super().limit_findings(values)
+        p = self.unpack_parameters(values)
+        if all(proven(a11, p) for a11 in map(float, _error_slopes(p))):
+            yield from self._error_bounds(p, "").findings()
 
     # -- internals --------------------------------------------------------------------------------------------------
 

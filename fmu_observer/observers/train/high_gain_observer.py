@@ -4,18 +4,18 @@ from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import GapError
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import certified_gains
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
-from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
@@ -99,14 +99,14 @@ class HighGainTrainObserver(TrainObserver):
             return self.stage.sampled(x, u)
         return {BALISE_INNOVATION.name: x.estimated_position - u.balise_position}
 
-    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+    def alternative(self, gap: float, p: Any, evaluate: Evaluate) -> str | None:
         """The largest theta that is certified."""
-        gains = certified_gains(max_gap, lambda theta: {self.theta_name: theta}, certify)
+        gains = certified_gains(gap, lambda theta: {self.theta_name: theta}, evaluate)
         if gains is None:
             return None
-        return f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {max_gap:.3g} s"
+        return f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {gap:.3g} s"
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed
         range, and of the first stage.
         """
@@ -115,5 +115,5 @@ class HighGainTrainObserver(TrainObserver):
             f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a "
             "gap; standstill and the error of the adhesion force, an input to it, are left out"
         )
-        found = with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")
-        return self.stage.judged(found, p)
+        found = with_switching_noted(certify_sampled_error(vertices, gap, model), vertices, "drag slopes")
+        return self.stage.also_of(found, p)

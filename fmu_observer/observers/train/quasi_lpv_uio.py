@@ -7,8 +7,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
+from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.periodic import PeriodicStability, periodic_stability
 from fmu_observer.certificates.polytope import polytope_stability
@@ -22,7 +23,7 @@ from fmu_observer.design.quasi_lpv_published import (
 )
 from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, RULES, RuleChoice, noise_warnings, stated_bounds, verdict
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.train.standstill import held_disturbance, stands
@@ -219,7 +220,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         """While the odometer is not believed no balise is to be doubted: it is what the speed is corrected by."""
         return _OPEN_BOUND * self.rules.fault(x)
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""
         errors, gains = speed_errors(p)
         period = f"{float(p.odometer_period):g} s"
@@ -229,24 +230,24 @@ class QuasiLpvUio(GatedObserver, GapCertified):
                 f"the innovation held for {period}",
             )
         else:
-            found = _read_stability(errors, gains, max_gap)
+            found = _read_stability(errors, gains, gap)
             between = f"what the speed changes while a reading is held, {period}, an input to it, whatever the period"
         model = (
             f"error of speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
             f"{float(p.schedule_max):g} m/s), changing between them at any time, {between}; a balise ends the position "
             "error; times at which the odometer is not believed, and standstill, are left out"
         )
-        return Certificate(
-            max_gap=max_gap,
-            horizon=inf,
+        return gap_finding(
+            gap,
+            inf,
             constant_limit=inf if found.constant else 0.0,
-            aperiodic_limit=inf if found.holds else 0.0,
-            spectral_radius=found.radius,
-            quadratic_margin=found.margin,
+            mixed_limit=inf if found.holds else 0.0,
+            growth=found.radius,
+            decrease=found.margin,
             holds=found.holds,
             error_model=model,
-            notes=(found.note,),
-            lyapunov_matrix=rows_of(found.P),
+            remarks=(found.note,),
+            matrix=rows_of(found.P),
         )
 
     def working_point(self, p: Any) -> list[str]:

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
+from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,
@@ -21,7 +22,7 @@ from fmu_observer.detection.threshold_detector import (
     judge,
     threshold_requirements,
 )
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.train.train_signals import (
     BALISE,
@@ -197,11 +198,11 @@ class StoppingUio(GatedObserver, GapCertified):
             "held_odometer": x.held_seen,
         }
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate of the error of speed, disturbance and its rate, exact for an innovation held between samples.
 
         Args:
-            max_gap: longest gap between two balises [s]; they end the position error and act on nothing else.
+            gap: longest gap between two balises [s]; they end the position error and act on nothing else.
         """
         period = float(p.sample_period)
         transition = sampled_error(float(p.davis_b) / float(p.mass), np.asarray(p.observer_gain, dtype=float), period)
@@ -215,20 +216,20 @@ class StoppingUio(GatedObserver, GapCertified):
             form = scipy.linalg.solve_discrete_lyapunov(scaled.T, np.eye(3))
             margin = float(np.linalg.eigvalsh(form - scaled.T @ form @ scaled).min() / np.linalg.eigvalsh(form).max())
             rows = rows_of(rate @ form @ rate)
-        return Certificate(
-            max_gap=max_gap,
-            horizon=inf,
+        return gap_finding(
+            gap,
+            inf,
             constant_limit=inf if stable else 0.0,
-            aperiodic_limit=inf if margin > 0.0 else 0.0,
-            spectral_radius=radius ** (max_gap / period),
-            quadratic_margin=margin,
+            mixed_limit=inf if margin > 0.0 else 0.0,
+            growth=radius ** (gap / period),
+            decrease=margin,
             holds=margin > 0.0,
             error_model=(
                 f"error of speed, disturbance and its rate with the innovation held for {period:g} s; a balise ends "
                 f"the position error and acts on nothing else. Detected jams and standstill are left out"
             ),
-            notes=(f"in the long run the error falls as exp(-{-log(radius) / period:.4g} t)",) if stable else (),
-            lyapunov_matrix=rows,
+            remarks=(f"in the long run the error falls as exp(-{-log(radius) / period:.4g} t)",) if stable else (),
+            matrix=rows,
         )
 
     def deciding_parameters(self) -> tuple[Signal, ...]:

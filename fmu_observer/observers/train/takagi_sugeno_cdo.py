@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import balise_family, certified_gains
-from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
 from plant_models.hybrid import Array, memory, parameter
@@ -142,7 +142,7 @@ class TakagiSugenoCdo(TrainObserver):
         low, high = sorted((float(p.premise_min), float(p.premise_max)))
         return signal, low, high
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over the two vertices and three mixtures of them; live and estimated weights may change at any
         time.
         """
@@ -156,20 +156,20 @@ class TakagiSugenoCdo(TrainObserver):
             f"position and speed error at both vertices ({slowest:g} and {fastest:g} m/s) and three mixtures, weights "
             f"{changes}; standstill, slip and the neglected wheel inertia, the latter inputs to it, are left out"
         )
-        return certify_sampled_error(vertices, max_gap, model, switching=not frozen)
+        return certify_sampled_error(vertices, gap, model, switching=not frozen)
 
-    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+    def alternative(self, gap: float, p: Any, evaluate: Evaluate) -> str | None:
         """A decay that is consistent with the balise gains in use, else the largest high gain that is certified."""
-        consistent = round(dict(certify({}).parameters)["balise_gain_position[1]"], 1)
-        if consistent > 0.0 and certify({"innovation_decay": consistent}).holds:
-            return f"innovation_decay = {consistent:g} is certified for {max_gap:.3g} s"
-        gains = certified_gains(max_gap, balise_family, certify)
+        consistent = round(float(p.balise_gain_position[0]), 1)
+        if consistent > 0.0 and evaluate({"innovation_decay": consistent}).holds:
+            return f"innovation_decay = {consistent:g} is certified for {gap:.3g} s"
+        gains = certified_gains(gap, balise_family, evaluate)
         if gains is None:
             return None
         position, speed = gains["balise_gain_position"], gains["balise_gain_speed"]
         return (
             f"innovation_decay = balise_gain_position = {position:g}, balise_gain_speed = {speed:g} and odometer gains "
-            f"of 0 are certified for {max_gap:.3g} s"
+            f"of 0 are certified for {gap:.3g} s"
         )
 
     def _error_at(self, h: float, p: Any) -> SampledError:

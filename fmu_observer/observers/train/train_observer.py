@@ -6,12 +6,10 @@ It knows the single-mass train (mass, Davis resistance, wheelset) and nothing of
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.detection.slip_indicator import (
     FILTERED_SLIP,
     SLIP_OUTPUTS,
@@ -20,9 +18,8 @@ from fmu_observer.detection.slip_indicator import (
     slip_filter_derivative,
 )
 from fmu_observer.detection.slip_ratio import odometer_slip
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back
 from fmu_observer.observers.train.train_signals import BALISE, POSITION_OUTPUT, SPEED_OUTPUT, TRAIN_PARAMETERS
 from plant_models.hybrid import (
@@ -56,8 +53,8 @@ class TrainObserver(GatedObserver, GapCertified):
        `estimator_events`; the state is laid out as estimator states, filtered slip, memory, and the memory of the gate
        (`GatedObserver`).
     2. It writes `estimator_flow` (derivatives of the estimator states by name), `estimate`, `update` and
-       `error_certificate`.
-    3. `certify` answers whether the very gains in use are stable for balise gaps up to a given length.
+       `gap_finding`.
+    3. `findings` says first whether the very gains in use are stable for balise gaps up to a given length.
     4. Where the speed is a state, the Davis constant and a negative adhesion force (a brake) are dry friction: they
        stop the observed train and hold it, and never push it backwards. For a speed above zero that is the thesis's
        equation.
@@ -134,33 +131,6 @@ class TrainObserver(GatedObserver, GapCertified):
         if not self.frictions:
             return np.zeros(0)
         return vector((p.davis_a + np.maximum(-self.estimate(x, u, p).adhesion_force, 0.0)) / p.mass)
-
-    def advise(
-        self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None
-    ) -> str | None:
-        """What to change where the gains in use are not certified: gains near them that are, by their own certificate.
-
-        Args:
-            max_gap, parameters, preset: as in `certify`.
-
-        Returns:
-            A clause such as ``theta at most 3.91 is certified for 1.02 s``; None where the gains in use are certified,
-            or no other ones are known.
-
-        Raises:
-            ValueError: as in `certify`.
-        """
-        if self.certify(max_gap, parameters, preset).holds:
-            return None
-        return self.alternative(max_gap, lambda gains: self.certify(max_gap, {**(parameters or {}), **gains}, preset))
-
-    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
-        """Clause that names certified gains for a gap [s], or None; `certify` judges changes to the values in use.
-
-        Args:
-            max_gap: longest gap between two balises [s].
-        """
-        return None
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -6,10 +6,9 @@ A stage reads its own states of an observer's, so that any second stage can stan
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
@@ -45,13 +44,13 @@ class WheelStage:
         """The states that an odometer sample changes."""
         return {}
 
-    def judged(self, certificate: Certificate, p: Any) -> Certificate:
-        """The certificate of the second stage, where the first one holds too.
+    def also_of(self, found: Finding, p: Any) -> Finding:
+        """The finding of the second stage, with that of the first.
 
         Args:
-            certificate: of the second stage.
+            found: of the second stage.
         """
-        return certificate
+        return found
 
 
 class DifferentiatorStage(WheelStage):
@@ -120,14 +119,15 @@ class MultirateStage(WheelStage):
         """The innovation is set anew."""
         return {"odometer_innovation": x.wheel_speed_estimate - u.odometer}
 
-    def judged(self, certificate: Certificate, p: Any) -> Certificate:
+    def also_of(self, found: Finding, p: Any) -> Finding:
         """The exact check of this stage at its constant period beside the certificate."""
         gain = correction(float(p.theta_1), p.wheel_high_gain, 1.0)
         wheel = SampledError.of([[0.0, 1.0], [0.0, 0.0]], gain, float(p.theta_1) * float(p.wheel_high_gain[0]))
         period = float(p.odometer_period)
         radius = wheel.spectral_radius(period)
-        note = f"wheel stage at its odometer period of {period:g} s: spectral radius {radius:.4f}"
-        return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(*certificate.notes, note))
+        text = f"wheel stage at its odometer period of {period:g} s: spectral radius {radius:.4f}"
+        what = "growth of the wheel stage from sample to sample"
+        return found.also(Finding(what, radius, "1", "exact", "the transition over its period", radius < 1.0, text))
 
 
 WHEEL_STAGES: dict[str, type[WheelStage]] = {"multirate": MultirateStage, "differentiator": DifferentiatorStage}

@@ -32,8 +32,7 @@ STEPPING = {
     "baseline update": "baseline update BASELINE",
 }
 ASKING = {
-    "bound": "bound {file}:Judged",
-    "limits": "limits {file}:Judged",
+    "certify": "certify {file}:Judged",
     "linearise": "linearise {file}:Traced",
     "show": "show TRACED",
     "export": "export TRACED OUT.ssp",

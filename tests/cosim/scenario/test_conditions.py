@@ -8,7 +8,7 @@ import pytest
 
 import cosim
 from cosim import Scenario
-from cosim.run.conditions import check_conditions
+from cosim.run.observer_findings import evaluate_observers
 
 SHIPPED = sorted(path.stem for path in Path(cosim.__file__).parent.joinpath("scenarios").glob("*.toml"))
 
@@ -25,7 +25,7 @@ def test_of_what_ships_one_printed_filter_alone_is_told() -> None:
     told = {
         name: warnings
         for name in SHIPPED
-        if (warnings := check_conditions(Scenario.load(name).table().components, "warn", name))
+        if (warnings := evaluate_observers(Scenario.load(name).table().components, {}, "warn", name)[1])
     }
     assert list(told) == ["traction_drive"]
     assert "filter: its condition DOES NOT HOLD" in told["traction_drive"][0]
@@ -45,4 +45,4 @@ def test_a_window_that_does_not_tell_a_state_is_told_before_the_run() -> None:
 def test_it_may_be_required_or_left_aside() -> None:
     with pytest.raises(cosim.CosimError, match="does not tell rate"):
         windowed(1, certificates="require").run()
-    assert check_conditions(windowed(1).table().components, "ignore", "here") == []
+    assert evaluate_observers(windowed(1).table().components, {}, "ignore", "here") == ({}, [])

@@ -71,7 +71,7 @@ def test_a_deaf_observer_is_told_before_the_run(name: str, preset: str | None) -
     told = warned(name, preset)
     assert bool(told) == (not moved(name, preset)), told
     if told:
-        assert "nothing tells its event 'gps'" in told[0]
+        assert "nothing is connected to its event 'gps'" in told[0]
 
 
 @pytest.mark.parametrize(("mass", "told"), [(873e3, 0), (120e3, 1), (2000e3, 1)])

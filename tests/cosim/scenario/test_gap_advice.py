@@ -10,10 +10,11 @@ from small_scenarios import small
 
 from cosim import CosimError, Scenario
 from cosim.balises.layout import InstantLayout, by_positions
-from cosim.run.certificates import check_certificates
 from cosim.run.expected_gaps import expected_gap
+from cosim.run.observer_findings import evaluate_observers
 from cosim.scenario.scenario_tables import BalisesTable, ComponentTable
 from fmu_observer import OBSERVERS
+from fmu_observer.observers.evaluated_observer import OTHER_GAINS
 
 POSITIONS = [50.0, 150.0, 250.0]
 
@@ -24,7 +25,7 @@ def warnings_of(observer: str, speed: float | None, **table: Any) -> list[str]:
         position="p.position", speed="p.speed", layout="positions", positions=POSITIONS, expected_speed=speed
     )
     gap = expected_gap(by_positions(POSITIONS), balises, 0.0)
-    return check_certificates(
+    return evaluate_observers(
         {"observer": ComponentTable(observer=observer, **table)}, {"observer": gap}, "warn", "here"
     )[1]
 
@@ -72,7 +73,7 @@ def test_without_a_speed_it_says_from_which_speed_on_the_gains_are_enough() -> N
 def test_no_advice_is_given_where_none_is_known_or_needed() -> None:
     (warning,) = warnings_of("discrete_uio", 10.0)
     assert "Instead" not in warning
-    assert OBSERVERS["differentiator_cdo"]().advise(0.4) is None  # type: ignore[attr-defined]
+    assert all(f.what != OTHER_GAINS for f in OBSERVERS["differentiator_cdo"]().findings(0.4))  # type: ignore[attr-defined]
     far = {
         "innovation_decay": 3.0,
         "balise_gain_position": 2.4,

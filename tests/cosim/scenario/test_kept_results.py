@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,9 @@ from typing import Any
 import pytest
 
 from cosim.components.loading import load_block
-from cosim.run import balise_service, certificates
-from cosim.run.certificates import check_certificates
+from cosim.run import balise_service, observer_findings
 from cosim.run.expected_gaps import ExpectedGap
+from cosim.run.observer_findings import evaluate_observers
 from cosim.scenario.scenario_tables import ComponentTable
 from fmu_observer import OBSERVERS
 from fmus.check.probe import ProbeReport
@@ -36,18 +35,18 @@ def table(name: str, **keys: Any) -> ComponentTable:
 
 @pytest.mark.parametrize("name", ["takagi_sugeno_cdo", "differentiator_cdo"])
 def test_a_certificate_from_the_cache_is_the_computed_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    data, warnings = certificates._judge("it", table(name), OBSERVERS[name](), GAP)
-    computed = check_certificates({"it": table(name)}, {"it": GAP}, "warn", "here")
-    monkeypatch.setattr(certificates, "_judge", never)
-    kept = check_certificates({"it": table(name)}, {"it": GAP}, "warn", "here")
+    found, warnings = observer_findings._evaluated("it", table(name), OBSERVERS[name](), GAP)
+    computed = evaluate_observers({"it": table(name)}, {"it": GAP}, "warn", "here")
+    monkeypatch.setattr(observer_findings, "_evaluated", never)
+    kept = evaluate_observers({"it": table(name)}, {"it": GAP}, "warn", "here")
     assert kept == computed
-    assert kept[0] == {"it": json.loads(json.dumps(data))}
+    assert observer_findings.evaluated("it", table(name), OBSERVERS[name](), GAP) == (found, warnings)
     assert kept[1][: len(warnings)] == warnings
 
 
 def test_a_certificate_is_asked_for_by_all_it_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr(certificates, "_judge", lambda *all_of_it: [asked.append(all_of_it) or {}, []])
+    monkeypatch.setattr(observer_findings, "_evaluated", lambda *all_of_it: (asked.append(all_of_it), []))
     name = "takagi_sugeno_cdo"
     presets = list(OBSERVERS[name]().presets)
     parameter = OBSERVERS[name]().parameters[0].scalar_names[0]
@@ -64,7 +63,7 @@ def test_a_certificate_is_asked_for_by_all_it_depends_on(monkeypatch: pytest.Mon
     ]
     for _ in range(2):
         for component, keys, gap in questions:
-            check_certificates({component: keys}, {component: gap}, "warn", "here")
+            evaluate_observers({component: keys}, {component: gap}, "warn", "here")
     assert len(asked) == len(questions)
 
 
@@ -100,4 +99,4 @@ def test_a_probe_that_saw_nothing_is_made_again(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_detector_is_not_asked_for_a_certificate() -> None:
-    assert check_certificates({"it": table("train_diagnosis")}, {"it": GAP}, "require", "here") == ({}, [])
+    assert evaluate_observers({"it": table("train_diagnosis")}, {"it": GAP}, "require", "here") == ({}, [])

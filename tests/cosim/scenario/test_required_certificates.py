@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -19,9 +20,11 @@ from cosim.errors import CertificateError
 from cosim.network.chance import Chance
 from cosim.network.intervals import BY_ERROR, longest_interval, sends_in_turn
 from cosim.network.settings import NetworkSettings, Node
-from cosim.run import certificates
+from cosim.run import observer_findings
 from cosim.run.expected_gaps import ExpectedGap
 from fmu_observer import OBSERVERS
+from fmu_observer.certificates.finding import Finding
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, gap_finding
 from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal
 
@@ -51,7 +54,7 @@ def everything(name: str) -> tuple[type[HybridSystem], tuple[tuple[str, str], ..
 def required(name: str, told: bool = True, **keys: Any) -> Scenario:
     """An observer of which a certificate is required, and what it may be told of."""
     made, links = everything(name)
-    s = Scenario(stop=0.1, step=0.05, certificates="require")  # as long as the gap of the packets: judged once
+    s = Scenario(stop=0.1, step=0.05, certificates="require")  # as long as the gap of the packets: evaluated once
     s.add("source", model=made)
     s.add("observer", observer=name, **{"as": "block3", **keys})
     events = [event.name for event in OBSERVERS[name]().triggered_events]
@@ -93,21 +96,25 @@ def applied(scenario: Scenario) -> str:
     return str(certificate["explanation"])
 
 
-def judged_unseen(name: str, _table: Any, _system: Any, gap: ExpectedGap) -> tuple[dict[str, Any], list[str]]:
-    """A judgement that holds for every gap that is known."""
-    found = {"holds": gap.seconds is not None, "max_gap": gap.seconds, "explanation": gap.reason}
-    return found, [] if gap.seconds is not None else [f"{name}: {gap.reason}"]
+def evaluated_unseen(name: str, _table: Any, _system: Any, gap: ExpectedGap) -> tuple[Finding, list[str]]:
+    """A finding that holds for every gap that is known."""
+    known = gap.seconds is not None
+    holds = gap_finding(
+        gap.seconds or 1.0, np.inf, np.inf, np.inf, growth=0.5, decrease=1.0, holds=known, error_model="none"
+    )
+    found = replace(holds, what="mixed balise gaps", demand=gap.seconds, explanation=gap.reason)
+    return found, [] if known else [f"{name}: {gap.reason}"]
 
 
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_what_is_required_is_asked_for_every_source_or_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(certificates, "_judge", judged_unseen)
-    monkeypatch.setattr(certificates, "remembered", lambda _kind, _key, make: make())
+    monkeypatch.setattr(observer_findings, "_evaluated", evaluated_unseen)
+    monkeypatch.setattr(observer_findings, "remembered", lambda _kind, _key, make: make())
     unfed = applied(required(name, told=False))
     if name not in TOLD:
         assert "at this period" in unfed
         return
-    assert "nothing tells its event" in unfed
+    assert "nothing triggers its event" in unfed
     assert "from packet to packet" in applied(over_a_network(name))
     assert "lost by chance" in applied(over_a_network(name, loss_fraction=0.01))
 
@@ -201,7 +208,7 @@ def test_a_component_that_tells_at_instants_of_its_own_is_refused() -> None:
     s.add("reader", model="balise_reader", **{"as": "block2"})
     s.add("observer", observer="takagi_sugeno_cdo", **{"as": "block2"})
     s.connect(*(f"reader.balise_{field} -> observer.balise_{field}" for field in ("count", "time", "position")))
-    assert "another component tells its event 'balise'" in applied(s)
+    assert "another component triggers its event 'balise'" in applied(s)
 
 
 # -- the gap of a network, against the instants at which it sends ----------------------------------------------------
@@ -259,7 +266,7 @@ def test_a_node_that_is_picked_by_its_error_may_be_silent(protocol: Any) -> None
 def test_turns_of_nodes_against_products_of_exponentials() -> None:
     """The error of the delayed state of the arm, packet by packet, with SciPy's exponential and resets written out."""
     observer = DelayedStateObserver("flexible_joint_arm")
-    certificate = observer.certify(0.17)
+    certificate = next(observer.findings(0.17))
     assert certificate.holds
     p = observer.unpack_parameters(np.array([v for s in observer.parameter_signals for v in s.start_values]))
     drift = observer.model.drifts[-1]  # the steeper spring decides
@@ -271,12 +278,12 @@ def test_turns_of_nodes_against_products_of_exponentials() -> None:
         flow = scipy.linalg.expm(G * gap)
         return float(np.abs(np.linalg.eigvals(resets[1] @ flow @ resets[0] @ flow)).max())
 
-    limit = certificate.constant_limit
+    limit = certificate.condition(CONSTANT_GAP).limit
     assert radius(limit - 1e-6) < 1.0 <= radius(limit + 1e-6)
     assert radius(0.25) > 1.0
     generator, error = np.random.default_rng(5), np.eye(6)
     for k in range(600):  # gaps of any length, mixed
-        gap = certificate.aperiodic_limit * generator.choice([1.0, generator.uniform(0.01, 1.0)])
+        gap = certificate.limit * generator.choice([1.0, generator.uniform(0.01, 1.0)])
         error = resets[k % 2] @ scipy.linalg.expm(G * gap) @ error
     assert np.abs(error).max() < 1e-6
 
@@ -285,8 +292,9 @@ def test_what_never_gets_a_sample_is_not_told_of_sequences_of_gaps() -> None:
     s = Scenario(stop=700.0, step=1.0).add("train", model="locomotive", **{"as": "block3"})
     s.add("obs", observer="discrete_measurement_observer", **{"as": "block3"})
     s.connect("train.wheel_speed -> obs.odometer")
-    (told,) = [text for text in s.run(warn=lambda _: None).warnings if text.startswith("obs: nothing tells")]
-    assert told.startswith("obs: nothing tells its event 'balise' in this run: it is on its own for all of 700 s, and ")
+    (told,) = [text for text in s.run(warn=lambda _: None).warnings if text.startswith("obs: nothing triggers")]
+    begin = "obs: nothing triggers its event 'balise' in this run: it is on its own for all of 700 s, and "
+    assert told.startswith(begin)
     assert "certified for gaps up to" in told
     assert "sequences" not in told
 
@@ -295,5 +303,5 @@ def test_what_has_no_certificate_is_told_in_words() -> None:
     s = Scenario(stop=1.0, step=0.1).add("train", model="locomotive", **{"as": "block3"})
     s.add("obs", observer="odometer_reset", **{"as": "block3"}).connect("train.wheel_speed -> obs.odometer")
     s.balises(position="train.position", speed="train.speed", layout="instants", instants=[0.5])
-    (told,) = [text for text in s.run(warn=lambda _: None).warnings if "certify" in text]
+    (told,) = [text for text in s.run(warn=lambda _: None).warnings if "findings" in text]
     assert told.startswith("obs: not known before the run whether it stays stable over the gaps between its samples")

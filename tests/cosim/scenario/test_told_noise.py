@@ -9,7 +9,7 @@ from shipped import shipped
 
 import cosim
 from cosim import Scenario
-from cosim.run.conditions import left_working_points
+from cosim.run.checked_observers import _working_points
 from cosim.run.connections import parse_connections
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
@@ -68,19 +68,19 @@ def test_faults_that_are_noise_are_told_by_their_size(name: str) -> None:
 
 def test_gains_that_make_more_of_noise_are_told() -> None:
     loud = {"gain_low": [9.0, -1.34, -0.22], "gain_high": [9.0, -1.33, -0.22]}
-    told = left_working_points(Scenario.load("jam_odometry").table().components, [], "here")
+    told = _working_points(Scenario.load("jam_odometry").table().components, [], "here")
     assert told == []
     scenario = Scenario.load("jam_odometry")
     for key, value in loud.items():
         scenario.set(f"quasi_lpv_uio.{key}", value)
-    (doubt,) = left_working_points(scenario.table().components, [], "here")
+    (doubt,) = _working_points(scenario.table().components, [], "here")
     assert "times as noisy as a reading" in doubt
 
 
 @pytest.mark.parametrize("scenario", SHIPPED)
 def test_nothing_is_said_of_what_ships(scenario: str) -> None:
     table = Scenario.load(scenario).table()
-    assert left_working_points(table.components, parse_connections(table.connections, scenario), scenario) == []
+    assert _working_points(table.components, parse_connections(table.connections, scenario), scenario) == []
 
 
 def test_sensors_have_a_bound_for_each_reading() -> None:

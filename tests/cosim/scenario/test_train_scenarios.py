@@ -289,7 +289,7 @@ def test_the_gains_are_certified_for_ten_fixes_a_second(component: str, observer
     first, *others = (dict(Scenario.load(name).table().components[component].parameters) for name in ALL)
     assert others == [first] * 3
     del first["estimated_speed"]  # a start, no parameter
-    assert observer.certify(0.1, first, preset="gps").holds
+    assert next(observer.findings(0.1, first, preset="gps")).holds
 
 
 @pytest.mark.parametrize("name", ["freight_sc2", "freight_sc4"])  # one of each controller

@@ -25,11 +25,12 @@ from cosim.master.master import Master
 from cosim.observer_benchmark.benchmark import ObserverBenchmark, benchmark_observers
 from cosim.observer_benchmark.candidates import find_candidates
 from cosim.observer_benchmark.observer_scores import (
-    CertifiedGap,
+    SEEN_GAP,
     ObserverScore,
     divergence,
     error_at_balises,
     false_alarms,
+    gap_certified,
     longest_gap,
     telegram_outcomes,
 )
@@ -103,7 +104,7 @@ def test_on_profile_d_every_observer_gives_the_numbers_of_the_joint_run() -> Non
     ]
     assert f"{scored[0].speed.max_abs:.5f}" == "0.00326"  # type: ignore[union-attr]
     seen = {n: c["largest_gap_seen"] for n, c in together.result.summary["certificates"].items()}
-    assert {s.name: s.certificate.seen for s in alone.scores if s.certificate is not None} == seen
+    assert {s.name: s.certificate.condition(SEEN_GAP).value for s in alone.scores if s.certificate is not None} == seen
 
 
 def test_an_observer_in_the_loop_is_recorded_in_it_and_said_to_be() -> None:
@@ -186,9 +187,9 @@ def test_telegrams_that_were_not_used_do_not_count() -> None:
 
 
 def test_a_certificate_is_held_against_both_gaps() -> None:
-    gap = CertifiedGap(limit=0.5, expected=0.4, seen=0.6)
-    assert (gap.holds_expected, gap.holds_seen) == (True, False)
-    assert CertifiedGap(0.5, None, None).holds_expected is None
+    gap = gap_certified(limit=0.5, expected=0.4, seen=0.6)
+    assert (gap.holds, gap.condition(SEEN_GAP).holds) == (True, False)
+    assert gap_certified(0.5, None, None).holds is None
 
 
 # -- who takes part
@@ -229,7 +230,7 @@ def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
 
 
 def test_no_limit_is_told_as_any_gap() -> None:
-    gaps = [CertifiedGap(np.inf, 22.5, 31.9), CertifiedGap(0.5, None, None)]
+    gaps = [gap_certified(np.inf, 22.5, 31.9), gap_certified(0.5, None, None)]
     rows = observer_table([ObserverScore("o", "o", "m", "defaults", certificate=gap) for gap in gaps]).data()
     assert [(row["certified"], row["holds"]) for row in rows] == [("any", "yes/yes"), (0.5, "?/?")]
 

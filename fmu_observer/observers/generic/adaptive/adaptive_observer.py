@@ -5,19 +5,17 @@ samples.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, as_printed, condition_found, limit_found, to_simulate
 from fmu_observer.certificates.gap_error import first_unstable_gap
+from fmu_observer.certificates.gap_finding import with_limit
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.observer_limits import Limit, PrintedBound
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.formulas.adaptation.adaptive_law import (
     Adaptation,
@@ -36,12 +34,10 @@ from fmu_observer.formulas.adaptation.adaptive_law import (
 from fmu_observer.models.known_models import STATE_AFFINE_MODELS, find_state_affine_model
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.state_affine import StateAffineModel
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.generic.adaptive.adaptive_trials import adaptive_trial
-from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.generic.adaptive.adaptive_search import adaptive_search
 from fmu_observer.observers.model_signals import arrival_event, estimate_outputs, estimate_states
-from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Array, HybridSystem, Runtime, Signal, output_signal, parameter, scalar_names
 
 _HORIZON = 40.0  # [s]; the second regressor of the printed example has faded long before
@@ -68,7 +64,7 @@ _LIMITS: dict[Any, float] = {}  # of this process; a run of 40 s takes a quarter
 
 
 _LATER, _EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
-_LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
+_LONGEST_PERIOD = 1.0  # [s] up to which limits are searched
 _NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
 _LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
 _ADAPTIVE_PARAMETERS = (
@@ -80,7 +76,7 @@ _ADAPTIVE_PARAMETERS = (
 )
 
 
-class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
+class AdaptiveObserver(GatedObserver, GapCertified):
     """Base of the observers of state and unknown constants at once: Hann 2014, chapter 4.
 
     States are the estimates, the constants, the adaptation (`adaptive_law.adaptation_states`), and what a subclass
@@ -201,36 +197,31 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         u = self.model.start_inputs
         return ImpulsiveError.with_innovation(np.asarray(self.model.drift(0.0, u)), K, decay, self.model.C)
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate of the state's error with the constants known, and what the adaptation leaves at `max_gap`."""
+    def gap_finding(self, gap: float, p: Any) -> Finding:
+        """Certificate of the state's error with the constants known, and what the adaptation leaves at `gap`."""
         found = certify_sampled_error(
             (self.known_error(float(p.mu)),),
-            max_gap,
+            gap,
             "errors of the states with the constants known, the gain settled and A as it is at time 0; those of the "
             "adaptation by their linear equation, which no measurement enters, from the start on and at a constant gap "
             "only; noise is left out",
         )
         values = np.concatenate([np.ravel(np.asarray(getattr(p, s.name), float)) for s in self.parameter_signals])
-        left = _errors_left(self, values, max_gap)
+        left = _errors_left(self, values, gap)
         of_constants = ", ".join(
             f"{s.name} {share:.2g}" for s, share in zip(self.model.unknowns, left.constants, strict=True)
         )
-        note = (
-            f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
+        text = (
+            f"at a constant gap of {gap:.4g} s the states keep {left.states:.2g} of the first error after "
             f"{_HORIZON:g} s, the constants {of_constants}; {_LEFT:g} of it in the states is allowed"
         )
         known = first_unstable_gap([self.known_error(float(p.mu))], _LONGEST_PERIOD)
         longest = _adaptation_limit(self, values, min(known, _LONGEST_PERIOD))
-        return replace(
-            found,
-            holds=found.holds and max_gap <= longest and left.states < _LEFT,
-            spectral_radius=max(found.spectral_radius, left.states ** (max_gap / _HORIZON)),
-            constant_limit=min(found.constant_limit, longest),
-            aperiodic_limit=min(found.aperiodic_limit, longest),
-            notes=(*found.notes, note),
-        )
+        allowed = gap <= longest and left.states < _LEFT
+        kept = Finding("errors kept by the states", left.states, "1", "exact", "the adaptation", allowed, text)
+        return with_limit(found, longest, left.states ** (gap / _HORIZON)).also(kept)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`."""
         early, late = (adaptive_bounds(self.model, float(p.mu), begin=begin) for begin in (0.5 * _LATER, _LATER))
         alpha0 = late.alpha0
@@ -241,15 +232,15 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
         )
         excited = alpha0 > 0.0 and alpha0 >= values["least_alpha0"]
         if not self.predicts:
-            return Condition(excited, values, statement, "Hann 2014, (4.8); theorem 4.6 prints no period")
+            return condition_found(excited, values, statement, "Hann 2014, (4.8); theorem 4.6 prints no period")
         longest = late.longest_period
-        return Condition(
+        return condition_found(
             excited and self.model.sample_period <= longest,
             values
             | {
                 "smallest_inverse_R": gain_bound(late.window, alpha0),
-                "period": self.model.sample_period,
-                "longest_period": longest,
+                "period [s]": self.model.sample_period,
+                "longest_period [s]": longest,
             },
             f"{statement}; period <= longest_period [s], sufficient and ten orders of magnitude too careful",
             "Hann 2014, (4.8), Lemma 4.3, (4.63)",
@@ -257,34 +248,27 @@ class AdaptiveObserver(GatedObserver, GapCertified, JudgedObserver):
 
     # -- limits -----------------------------------------------------------------------------------------------------
 
-    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """Between two samples: (4.63) beside the exact limit of the linear error equations, and trials."""
-        values = parameter_values(self, parameters, preset, "to judge")
-        mu = float(self.unpack_parameters(values).mu)
-        bounds = adaptive_bounds(self.model, mu)
-        trial = adaptive_trial(self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True)))
+    def limit_findings(self, values: np.ndarray) -> Iterator[Finding]:
+        """Between two samples: (4.63) beside the exact limit of the linear error equations, and runs.
+
+        Args:
+            values: of all parameters, shape (k,).
+        """
+        what, mu = "period of the samples", float(self.unpack_parameters(values).mu)
+        if self.predicts:
+            bounds = adaptive_bounds(self.model, mu)
+            text = f"tau_MASP for a vanishing rate, {bounds.explain()}; from time 0 on, later alpha0 is smaller"
+            yield as_printed(what, bounds.longest_period, text, "Hann 2014, (4.63)")
+        search = adaptive_search(self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True)))
         known = min(first_unstable_gap([self.known_error(mu)], _LONGEST_PERIOD), _LONGEST_PERIOD)
-        adapted = _adaptation_limit(self, values, known, trial.left)
-        return (
-            Limit(
-                "period of the samples",
-                printed=(
-                    PrintedBound(
-                        bounds.longest_period,
-                        f"tau_MASP for a vanishing rate, {bounds.explain()}; from time 0 on, later alpha0 is smaller",
-                        "Hann 2014, (4.63)",
-                    ),
-                )
-                if self.predicts
-                else (),
-                exact=adapted if known == _LONGEST_PERIOD else min(adapted, known),
-                searched_to=_LONGEST_PERIOD,
-                tried=_shortest_tried(known),
-                exact_test=f"the observer that knows the constants, its gain settled, unstable, or more than "
-                f"{trial.left:.2g} of the states' first error left by the adaptation after {_HORIZON:g} s, to 5 %",
-                trial=trial,
-            ),
+        adapted = _adaptation_limit(self, values, known, search.left)
+        exact = adapted if known == _LONGEST_PERIOD else min(adapted, known)
+        test = (
+            "the observer that knows the constants, its gain settled, unstable, or more than "
+            f"{search.left:.2g} of the states' first error left by the adaptation after {_HORIZON:g} s, to 5 %"
         )
+        yield limit_found(what, exact, _LONGEST_PERIOD, test, shortest=_shortest_tried(known))
+        yield to_simulate(search, what)
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.design.decoupling import SOURCE, decoupled_gain, decoupling, decoupling_condition, require_decoupling
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as
@@ -74,14 +74,14 @@ class DecouplingUio(ModelObserver):
         error = self.measured(u) - self.model.measured(estimate)
         return named_as(self.model.states, estimate) | residuals(self.model, error, p)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Existence by ranks and invariant zeros, and the abscissa of N for the gain in use."""
         existence = decoupling_condition(self._linear)
         K = np.asarray(as_matrix(p.gain, self.model.order, len(self.model.measurements)))
         found = errors_decay([self._decoupling.P @ A - K @ self.model.C for A in self.model.drifts])
-        return Condition(
-            holds=existence.holds and found.holds,
-            values={**existence.values, **found.values},
+        return condition_found(
+            holds=bool(existence.holds) and found.holds,
+            numbers={**existence.numbers, **found.values},
             statement=f"{existence.statement}; N = P A - K C {found.statement}",
             source=SOURCE,
         )

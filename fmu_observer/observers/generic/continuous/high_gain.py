@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.printed_bounds.high_gain_theta import (
     binomial_gain,
     chain_error,
@@ -51,19 +51,19 @@ class HighGain(ModelObserver):
         corrections = (p.theta ** (i + 1) * p.high_gain[i] * error for i in range(self.model.order))
         return self.named_estimates(rate - less for rate, less in zip(predicted, corrections, strict=True))
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """K makes the chain Hurwitz, and theta lies above the smallest one proven."""
         K = np.asarray(p.high_gain)
         bounds = theta_from_lipschitz(self.model, K), theta_from_slopes(self.model, K)
         smallest = min(bounds)
-        return Condition(
+        return condition_found(
             holds=bool(np.isfinite(smallest) and p.theta >= smallest),
-            values={
-                "theta": float(p.theta),
-                "smallest_theta": smallest,
-                "smallest_theta_lipschitz": bounds[0],
-                "smallest_theta_slopes": bounds[1],
-                "abscissa": float(np.linalg.eigvals(chain_error(K)).real.max()),
+            numbers={
+                "theta [1/s]": float(p.theta),
+                "smallest_theta [1/s]": smallest,
+                "smallest_theta_lipschitz [1/s]": bounds[0],
+                "smallest_theta_slopes [1/s]": bounds[1],
+                "abscissa [1/s]": float(np.linalg.eigvals(chain_error(K)).real.max()),
                 "lyapunov_size": lyapunov_size(K),
             },
             statement="A - K C is Hurwitz (abscissa < 0) and theta >= smallest_theta, enough by e' P e with Q = I; "

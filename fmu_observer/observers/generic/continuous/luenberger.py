@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.design.pole_placement import observability_matrix, observer_gain
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.linear_models import linear_part
@@ -53,18 +53,18 @@ class Luenberger(ModelObserver):
         """Gain L in use, shape (n, q)."""
         return as_matrix(p.gain, self.model.order, len(self.model.measurements))
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Observability of (A, C) by rank and smallest singular value of (1.2), and the abscissa of ``A - L C``."""
         A, C = linear_part(self.model), self.model.C
         matrix = observability_matrix(A, C)
         abscissa = float(np.linalg.eigvals(A - self.gain_matrix(p) @ C).real.max())
-        return Condition(
+        return condition_found(
             holds=abscissa < 0.0,
-            values={
+            numbers={
                 "rank": int(np.linalg.matrix_rank(matrix)),
                 "order": self.model.order,
                 "smallest_singular_value": float(np.linalg.svd(matrix)[1][-1]),
-                "abscissa": abscissa,
+                "abscissa [1/s]": abscissa,
             },
             statement="A - L C is Hurwitz (abscissa < 0); poles can be placed at will where rank = order",
             source="Bouchama 2024, (1.2)-(1.5)",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.design.extended_disturbance import check_rho, extended_gain, extended_matrices
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.models.known_models import MODELS, find_model
@@ -119,7 +119,7 @@ class ProportionalIntegralUio(ModelObserver):
         found = super().output(t, x, u, p) | {name: getattr(x, f"estimated_{name}") for name in self._disturbances}
         return found | residuals(self.model, self.measured(u) - self.C_e @ stacked_of(x, self.states), p)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Observability of the extended pair by rank and smallest singular value, and the abscissa of A_e - L C_e."""
         linear = linear_part(self.model)
         H, C, L = np.asarray(linear.H), linear.C, np.asarray(self._gain(p))
@@ -127,9 +127,9 @@ class ProportionalIntegralUio(ModelObserver):
         vertices = [extended_matrices(A, H, C, self.rho)[0] - L @ self.C_e for A in self.model.drifts]
         sizes = np.tile(np.linalg.norm(H, axis=0), self.rho)  # a force counts by the acceleration that it makes
         found = errors_decay(vertices, [*np.ones(linear.order), *sizes])
-        return Condition(
+        return condition_found(
             holds=found.holds,
-            values={
+            numbers={
                 "rank": int(np.linalg.matrix_rank(matrix)),
                 "order": len(self.A_e),
                 "smallest_singular_value": float(np.linalg.svd(matrix)[1][-1]),

@@ -6,13 +6,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.design.continuous_takagi_sugeno import placed_gains, vertex_decrease
 from fmu_observer.models.checks import checked_matrix
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
-from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, matrix_parameter, measured_inputs
 from plant_models.hybrid import Array, output_signal, state
 from plant_models.hybrid.option import require_chosen
@@ -22,7 +22,7 @@ PREMISES: tuple[Premise, ...] = ("measured", "estimated")
 SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, ... [ours]
 
 
-class TakagiSugenoLuenberger(JudgedObserver):
+class TakagiSugenoLuenberger(EvaluatedObserver):
     """Takagi-Sugeno Luenberger observer ``dxh = sum_i h_i [A_i xh + B_i u - K_i (C xh - y)]``: Bouchama 2024,
     (1.19)-(1.28).
 
@@ -92,17 +92,17 @@ class TakagiSugenoLuenberger(JudgedObserver):
         estimate = stacked_of(x, self.model.states, "estimated_")
         return named_as(self.model.states, estimate) | {"premise_outside_time": x.time_outside}
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Whether one quadratic Lyapunov function covers all vertices for the gains in use."""
         found = vertex_decrease(
             self.model, np.stack([np.asarray(self._gain_of(p, i)) for i in range(self.model.vertices)])
         )
         hidden = len(self.model.unmeasured) if self.premise == "measured" else len(self.model.premises)
-        return Condition(
+        return condition_found(
             holds=found.margin > 0.0 and not hidden,
-            values={
+            numbers={
                 "vertices": self.model.vertices,
-                "abscissa": found.abscissa,
+                "abscissa [1/s]": found.abscissa,
                 "margin": found.margin,
                 "premises_not_measured": hidden,
             },

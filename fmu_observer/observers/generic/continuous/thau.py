@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.lipschitz_condition import best_thau_bound, scaled_thau_bound
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.observer_model import ObserverModel
@@ -39,19 +39,19 @@ class Thau(Luenberger):
         poles = -SPEED * (1.0 + spread * np.arange(model.order))
         return observer_gain(model.A, model.C, poles, tuple(s.name for s in model.states), model.name)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """The valid bound against the Lipschitz constant, in the model's own and in the best scaled coordinates."""
         L = np.asarray(self.gain_matrix(p))
         plain, best = scaled_thau_bound(self.model, L), best_thau_bound(self.model, L)
-        return Condition(
+        return condition_found(
             holds=plain.holds or best.holds,
-            values={
-                "lipschitz": plain.lipschitz,
-                "bound": plain.valid,
-                "printed_bound": plain.printed,
+            numbers={
+                "lipschitz [1/s]": plain.lipschitz,
+                "bound [1/s]": plain.valid,
+                "printed_bound [1/s]": plain.printed,
                 "scale": best.scale,
-                "scaled_lipschitz": best.lipschitz,
-                "scaled_bound": best.valid,
+                "scaled_lipschitz [1/s]": best.lipschitz,
+                "scaled_bound [1/s]": best.valid,
             },
             statement="lipschitz < bound = 1 / (2 lmax(P)), or the same in scaled coordinates; printed_bound is not "
             "safe",

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, Literal, Self
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.observer_limits import Limit
 from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, network_bounds
 from fmu_observer.formulas.delay.delay_memory import at_age, integral_weights
 from fmu_observer.formulas.delay.finite_time_predictor import Prediction, moved_on
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as
+from fmu_observer.observers.generic.delayed.delayed_limits import delay_findings, packet_findings
 from fmu_observer.observers.generic.delayed.delayed_state_memory import declared_memory
-from fmu_observer.observers.generic.delayed.limits_by_trials import delay_limit, packet_limit
 from fmu_observer.observers.generic.delayed.measurement_nodes import nodes_of_measurements, turns_of_nodes
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.generic.sampled.sampled_observer import per_measurement
@@ -285,13 +284,13 @@ class DelayedStateObserver(HighGainSampled):
         packets = "all measurements in each packet" if rounds == 1 else f"{rounds} nodes that send in turn"
         return f"of the delayed state, {packets}; {super().remark()}"
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """(1.51) and (1.52) for the delayed state, and the delay within the declared memory."""
         found = super().condition_of(p)
         longest = self.total_places * float(p.memory_period)
-        return Condition(
-            holds=found.holds and float(p.delay) <= longest,
-            values={**found.values, "delay": float(p.delay), "declared_memory": longest},
+        return condition_found(
+            holds=bool(found.holds) and float(p.delay) <= longest,
+            numbers={**found.numbers, "delay [s]": float(p.delay), "declared_memory [s]": longest},
             statement=f"{found.statement}; delay <= declared_memory [s]",
             source=f"{found.source}; Hann 2014, (2.16)",
         )
@@ -307,31 +306,23 @@ class DelayedStateObserver(HighGainSampled):
         Raises:
             ValueError: a parameter or the preset is unknown, or the model gives no slopes.
         """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
-        return network_bounds(
-            self.model.drifts,
-            self.linearised_drift(),
-            self.gain_matrices(p)[0],
-            self.model.C,
-            len(self.turns),
-            self.predictors,
-        )
+        return self._network_bounds(self.unpack_parameters(parameter_values(self, parameters, preset)))
 
-    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+    def limit_findings(self, values: np.ndarray) -> Iterator[Finding]:
         """Between two packets and in delay: (2.17) and (2.59) beside exact tests of the model linearised at its start,
-        and trials.
+        and runs.
 
         Args:
-            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+            values: of all parameters, shape (k,).
 
         Raises:
-            ValueError: as `network_bounds`.
+            ValueError: the model gives no slopes.
         """
-        values = parameter_values(self, parameters, preset, "to judge")
         p, named = self.unpack_parameters(values), self.named_values(values)
-        bounds = self.network_bounds(parameters, preset)
-        packets = packet_limit(self, p, named, bounds)
-        return (packets, delay_limit(self, p, named, bounds)) if self.predictors else (packets,)
+        bounds = self._network_bounds(p)
+        yield from packet_findings(self, p, named, bounds)
+        if self.predictors:
+            yield from delay_findings(self, p, named, bounds)
 
     def remembering(self, memory_places: int) -> Self:
         """The same observer with another memory.
@@ -378,6 +369,16 @@ class DelayedStateObserver(HighGainSampled):
         return ()
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _network_bounds(self, p: Any) -> NetworkBounds:
+        return network_bounds(
+            self.model.drifts,
+            self.linearised_drift(),
+            self.gain_matrices(p)[0],
+            self.model.C,
+            len(self.turns),
+            self.predictors,
+        )
 
     def _events(self) -> tuple[Any, ...]:
         reading = PeriodicEvent("reading", "memory_period", description="Inputs and rates are read into the memory")

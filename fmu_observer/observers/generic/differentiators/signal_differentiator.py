@@ -8,16 +8,16 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, ClassVar
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
-from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from plant_models.hybrid import Array, Signal, discrete_output, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
 
 LARGEST = len(LEVANT_GAINS) - 1
 
 
-class SignalDifferentiator(JudgedObserver):
+class SignalDifferentiator(EvaluatedObserver):
     """Base of the differentiators of one scalar signal f with ``|f^(n+1)| <= L``.
 
     The contract: a subclass sets `discrete` where the estimates are memory, gives the filter states and further signals
@@ -78,7 +78,7 @@ class SignalDifferentiator(JudgedObserver):
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         return {s.name: getattr(x, f"estimated_{s.name}") for s in self.outputs}
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """What the differentiator asks of its signal, and how well it can do, for the parameters in use.
 
         The gains are tabulated ones, whose convergence in finite time is Levant's theorem; so the condition is one on
@@ -89,14 +89,14 @@ class SignalDifferentiator(JudgedObserver):
         """
         bound, h, n = float(p.bound), self.interval(p), self.order
         chatter = {f"chatter_{i}": bound * h ** (n + 1 - i) for i in range(n + 1)}
-        return Condition(
+        return condition_found(
             holds=bound > 0.0,
-            values={
+            numbers={
                 "order": n,
                 "filtering_order": self.filtering_order,
                 "bound": bound,
-                "interval": h,
-                "unit_sine_rate": max(bound, 0.0) ** (1.0 / (n + 1)),
+                "interval [s]": h,
+                "unit_sine_rate [rad/s]": max(bound, 0.0) ** (1.0 / (n + 1)),
                 **chatter,
             },
             statement="bound > 0, and the signal's derivative of order n + 1 stays within it",

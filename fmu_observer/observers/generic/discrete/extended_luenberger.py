@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, discrete_bound
 from fmu_observer.design.pole_placement import observability_matrix, observer_gain
 from fmu_observer.models.discrete_model import transition
@@ -66,16 +66,16 @@ class ExtendedLuenberger(ModelObserver):
 
         return at_sample(x, advance, correct)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """The small-gain condition at the sampling period in use."""
         L, T = as_matrix(np.asarray(p.gain), self.model.order, len(self.model.measurements)), float(p.sample_period)
         found, matrix = (
             discrete_bound(self.model, L, T),
             observability_matrix(scipy.linalg.expm(centre_of(self.model) * T), self.model.C),
         )
-        return Condition(
+        return condition_found(
             holds=found.holds,
-            values={
+            numbers={
                 "rank": int(np.linalg.matrix_rank(matrix)),
                 "order": self.model.order,
                 "spectral_radius": found.spectral_radius,

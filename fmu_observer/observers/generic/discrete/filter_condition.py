@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.formulas.filtering.kalman import through
 from fmu_observer.models.filter_models import FilterModel, Known
@@ -31,7 +31,7 @@ class _SteadyFilter:
     spectral_radius: float
 
 
-DOUBTED, WRONG = 1e-4, 1e-2  # differences at half the step: told, and too much for a filter to rest on [ours]
+DOUBTED, WRONG = 1e-4, 1e-2  # differences at half the step: reported, and too much for a filter to rest on [ours]
 _INACCURATE = (
     "its transition over a period is not accurate: steps of half the length change it by {error:.2g} of its size; set "
     "a shorter sample_period or more substeps (option `substeps`), or leave that out and give the option `period`"
@@ -40,7 +40,7 @@ _INACCURATE = (
 
 def steady_condition(
     model: FilterModel, x: np.ndarray, known: Known, period: float, noise: np.ndarray, readings: np.ndarray, source: str
-) -> Condition:
+) -> Finding:
     """Detectability, stabilisability by the noise, and the stationary Riccati equation, as numbers.
 
     Args:
@@ -58,20 +58,19 @@ def steady_condition(
     F, H, Q, R = (np.asarray(matrix) for matrix in (F, H, through(noise, W), through(readings, V)))
     steady, observed = _steady_filter(F, H, Q, R), observability_matrix(F, H)
     rank, reached = (int(np.linalg.matrix_rank(m)) for m in (observed, observability_matrix(F.T, Q)))
-    return Condition(
+    found = condition_found(
         holds=steady is not None and error <= WRONG,
-        values={
+        numbers={
             "rank": rank,
             "order": model.order,
             "driven": reached,
             "smallest_singular_value": float(np.linalg.svd(observed)[1][-1]),
             "spectral_radius": np.inf if steady is None else steady.spectral_radius,
-            "transition_error": error,
         },
         statement=_statement(model, rank, reached),
         source=source,
-        warnings=(_INACCURATE.format(error=error),) if error > DOUBTED else (),
     )
+    return replace(found, conditions=(*found.conditions, _of_transition(error)))
 
 
 def _statement(model: FilterModel, rank: int, driven: int) -> str:
@@ -103,10 +102,16 @@ def within_steps(model: FilterModel, p: Any) -> dict[str, Array]:
     return {text: np.where(p.sample_period <= model.longest_period, 1.0, 0.0)}
 
 
-def _inaccurate(error: float, source: str) -> Condition:
+def _inaccurate(error: float, source: str) -> Finding:
     """Of a transition that gives no numbers."""
     text = "the transition over a period is a number"
-    return Condition(False, {"transition_error": error}, text, source, (_INACCURATE.format(error=error),))
+    return replace(condition_found(False, {}, text, source), conditions=(_of_transition(error),))
+
+
+def _of_transition(error: float) -> Finding:
+    accurate = error <= DOUBTED
+    statement = "" if accurate else _INACCURATE.format(error=error)
+    return Finding("transition_error", error, "1", "exact", "steps of half the length", accurate, statement)
 
 
 def _steady_filter(A: np.ndarray, C: np.ndarray, QN: np.ndarray, RN: np.ndarray) -> _SteadyFilter | None:

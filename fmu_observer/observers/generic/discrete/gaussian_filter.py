@@ -12,13 +12,14 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.kalman import Corrected, log_likelihood, normalised_square
 from fmu_observer.models.filter_models import Known
 from fmu_observer.models.noise_over_period import noise_over
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
+from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
 from fmu_observer.observers.generic.discrete.arrivals import PERIODIC, Arrivals
 from fmu_observer.observers.generic.discrete.covariance_requirements import is_positive, positive
@@ -27,7 +28,6 @@ from fmu_observer.observers.generic.discrete.filter_signals import NOT_POSITIVE,
 from fmu_observer.observers.generic.discrete.gaussian_belief import Belief, chosen
 from fmu_observer.observers.generic.discrete.sample_step import INITIALISED
 from fmu_observer.observers.innovation_gate import known_accuracy
-from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import matrix_parameter
 from plant_models.hybrid import Array, Signal, parameter, vector
@@ -44,7 +44,7 @@ LEFT = 8.0 * float(np.finfo(np.float64).eps)  # of a variance, after a subtracti
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 
 
-class GaussianFilter(GatedObserver, JudgedObserver):
+class GaussianFilter(GatedObserver, EvaluatedObserver):
     """Base of the Kalman filters of any `FilterModel`.
 
     The contract:
@@ -288,7 +288,7 @@ class GaussianFilter(GatedObserver, JudgedObserver):
         text = f"{self._spread}: entries below {_LARGEST_ENTRY:g}, whose squares are numbers"
         return {text: np.where(np.max(np.abs(spread)) < _LARGEST_ENTRY, 1.0, 0.0)}
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Whether the filter linearised at the start of the estimates has a stable steady state."""
         start, period = self.model.start, float(p.sample_period)
         inputs = self.model.start_inputs

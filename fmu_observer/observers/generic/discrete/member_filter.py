@@ -9,17 +9,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.ensemble import drawn
 from fmu_observer.formulas.filtering.kalman import decoupled
 from fmu_observer.models.filter_models import Known
 from fmu_observer.models.noise_over_period import noise_over
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
+from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
 from fmu_observer.observers.generic.discrete.sample_step import INITIALISED
-from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import (
     LAST_NIS,
@@ -69,7 +69,7 @@ class CorrectedMembers(NamedTuple):
     more: Mapping[str, Array] = {}
 
 
-class MemberFilter(JudgedObserver):
+class MemberFilter(EvaluatedObserver):
     """Base of filters of any `FilterModel` whose belief is a number of members.
 
     The contract:
@@ -202,7 +202,7 @@ class MemberFilter(JudgedObserver):
         needed |= positive("start_covariance", p.start_covariance, n, definite=False)
         return needed | positive("measurement_covariance", p.measurement_covariance, q, definite=True)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Whether the Kalman filter of the model, linearised at the start, has a stable steady state; members add
         sampling errors of ``1 / sqrt(members)``.
         """

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.kalman import through
 from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.formulas.moving_horizon.real_time_iteration import (
@@ -186,20 +186,17 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
             needed[text] = np.where(legal, 1.0, 0.0)
         return needed
 
-    def condition_of(self, p: Any) -> Condition:
-        """That of the filter behind the arrival cost, and which states the rows of a window tell on their own."""
+    def condition_of(self, p: Any) -> Finding:
+        """That of the filter behind the arrival cost, and which states the rows of a window show on their own."""
         steady, model = super().condition_of(p), self.model
         inputs = stacked(tuple(float(s.start_values[0]) for s in model.inputs))
         known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))
         observed = window_observability(model, known, float(p.sample_period), self.window)
         rows = f"A window of {self.window} full row{'s' if self.window > 1 else ''}"
         rows = f"{rows} {observed.explain()}"
-        return replace(
-            steady,
-            values={**steady.values, "window_rank": observed.rank},
-            statement=f"{steady.statement}. {rows}",
-            warnings=(rows,) if observed.unseen.size else (),
-        )
+        complete = not observed.unseen.size
+        of_window = Finding("window_rank", observed.rank, "1", "exact", "", complete, "" if complete else rows)
+        return replace(steady, conditions=(*steady.conditions, of_window), statement=f"{steady.statement}. {rows}")
 
     @cached_property
     def problem(self) -> WindowProblem:

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
+from fmu_observer.certificates.finding import Finding, as_printed, condition_found
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
-from fmu_observer.certificates.observer_limits import PrintedBound
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DecayBounds, decay_bounds
 from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_parameters, innovation_left
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.held_innovation import HeldInnovation
+from fmu_observer.observers.generic.sampled.sampled_observer import PERIOD
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Array, Signal
 
@@ -79,31 +79,31 @@ class DecayingInnovation(HeldInnovation):
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
         return decay_bounds(model.A, K, model.C, float(p.theta), float(p.decay_rate), model.lipschitz)
 
-    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+    def printed_bounds(self, p: Any) -> tuple[Finding, ...]:
         """(3.109), and (3.105) with the factor that it leaves out."""
         bounds = self.bounds(p)
         enough, sigma = float(p.theta) > max(1.0, bounds.smallest_theta), 0.25 * bounds.alpha
         premise = "" if enough else f", if theta were above {bounds.smallest_theta:.3g} 1/s"
         strict = f"sigma = {sigma:.3g} 1/s, the factor exp(sigma T) left out of (3.109) kept{premise}"
         return (
-            PrintedBound(bounds.longest_gap, f"tau_MASP, sigma to zero{premise}", "Hann 2014, (3.109)"),
-            PrintedBound(bounds.strict_gap(sigma), f"gamma_0 < 1, {strict}", "Hann 2014, (3.105)"),
+            as_printed(PERIOD, bounds.longest_gap, f"tau_MASP, sigma to zero{premise}", "Hann 2014, (3.109)"),
+            as_printed(PERIOD, bounds.strict_gap(sigma), f"gamma_0 < 1, {strict}", "Hann 2014, (3.105)"),
         )
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Theorem 3.4: the smallest theta, and the longest gap, against the model's `sample_period`."""
         bounds, theta, gap = self.bounds(p), float(p.theta), self.model.sample_period
-        return Condition(
+        return condition_found(
             holds=theta > max(1.0, bounds.smallest_theta) and gap <= bounds.longest_gap,
-            values={
-                "theta": theta,
-                "smallest_theta": bounds.smallest_theta,
-                "printed_smallest_theta": bounds.printed_smallest_theta,
-                "gap": gap,
-                "longest_gap": bounds.longest_gap,
-                "lipschitz": self.model.lipschitz,
+            numbers={
+                "theta [1/s]": theta,
+                "smallest_theta [1/s]": bounds.smallest_theta,
+                "printed_smallest_theta [1/s]": bounds.printed_smallest_theta,
+                "gap [s]": gap,
+                "longest_gap [s]": bounds.longest_gap,
+                "lipschitz [1/s]": self.model.lipschitz,
             },
             statement="theta > smallest_theta [1/s], gap <= longest_gap [s]; sufficient, a thousand times too careful; "
-            "certify() is exact",
+            "the finding about gaps is exact",
             source="Hann 2014, Theorem 3.4, (3.109), theta_0 with the factor lmax/lmin that (3.89) needs",
         )

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
-from fmu_observer.certificates.observer_limits import PrintedBound
+from fmu_observer.certificates.finding import Finding, as_printed, condition_found
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DynamicThetaBounds, dynamic_theta_bounds
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.output_predictor import OutputPredictor
+from fmu_observer.observers.generic.sampled.sampled_observer import PERIOD
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Array, Signal, output_signal, parameter, state
 
@@ -89,30 +89,31 @@ class DynamicHighGain(OutputPredictor):
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
         return dynamic_theta_bounds(model.A, K, model.C, model.lipschitz, self.settled_theta(p))
 
-    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+    def printed_bounds(self, p: Any) -> tuple[Finding, ...]:
         """(3.8) with theta at its limit, and what it says at the limit that (3.7) prints."""
         bounds, source = self.bounds(p), "Hann 2014, (3.8)"
         model, printed = self.model, bounds.theta_limit
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
-        found = [PrintedBound(bounds.longest_gap, f"tau_MASP at theta = {self.settled_theta(p):.3g} 1/s", source)]
+        at_limit = f"tau_MASP at theta = {self.settled_theta(p):.3g} 1/s"
+        found = [as_printed(PERIOD, bounds.longest_gap, at_limit, source)]
         if np.isfinite(printed):
             settled = dynamic_theta_bounds(model.A, K, model.C, model.lipschitz, printed).longest_gap
-            found.append(PrintedBound(settled, f"tau_MASP at theta_inf = {printed:.4g} 1/s of (3.7)", source))
+            found.append(as_printed(PERIOD, settled, f"tau_MASP at theta_inf = {printed:.4g} 1/s of (3.7)", source))
         return tuple(found)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """(3.7) and (3.8): the limit of theta, and the longest gap at it, against the model's `sample_period`."""
         bounds, theta, gap = self.bounds(p), self.settled_theta(p), self.model.sample_period
-        return Condition(
+        return condition_found(
             holds=theta >= bounds.theta_limit and gap <= bounds.longest_gap,
-            values={
-                "theta_limit": theta,
-                "printed_theta_limit": bounds.theta_limit,
-                "gap": gap,
-                "longest_gap": bounds.longest_gap,
-                "lipschitz": self.model.lipschitz,
+            numbers={
+                "theta_limit [1/s]": theta,
+                "printed_theta_limit [1/s]": bounds.theta_limit,
+                "gap [s]": gap,
+                "longest_gap [s]": bounds.longest_gap,
+                "lipschitz [1/s]": self.model.lipschitz,
             },
             statement="theta_limit >= printed_theta_limit [1/s], gap <= longest_gap [s]; sufficient, ten thousand "
-            "times too careful; certify() is exact once theta has settled",
+            "times too careful; the finding about gaps is exact once theta has settled",
             source="Hann 2014, Theorem 3.1, (3.7)-(3.8), theta_max taken as the limit",
         )

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.gap_error import GapError
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
@@ -51,20 +52,20 @@ class HeldInnovation(HighGainSampled):
         gain, decay = self.gain_matrices(p)
         return ImpulsiveError.with_innovation(drift, gain, 0.0 * decay, self.model.C, self.levels())
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """``theta gap`` of the bare chain against its exact limits, constant and aperiodic, at the model's
         `sample_period`.
         """
         theta, gap = float(p.theta), self.model.sample_period
-        certificate = certify_sampled_error((self.vertex_error(self.model.A, p),), gap, "bare chain")
-        return Condition(
-            holds=certificate.holds,
-            values={
+        found = certify_sampled_error((self.vertex_error(self.model.A, p),), gap, "bare chain")
+        return condition_found(
+            holds=bool(found.holds),
+            numbers={
                 "theta_gap": theta * gap,
-                "constant_limit": theta * certificate.constant_limit,
-                "aperiodic_limit": theta * certificate.aperiodic_limit,
+                "constant_limit": theta * found.condition(CONSTANT_GAP).limit,
+                "aperiodic_limit": theta * found.limit,
             },
-            statement="theta_gap <= aperiodic_limit for the model without its nonlinear part; certify() takes that "
-            "into account",
+            statement="theta_gap <= aperiodic_limit for the model without its nonlinear part; the "
+            "finding about gaps takes that into account",
             source="exact transition over a gap; the thesis prints no condition",
         )

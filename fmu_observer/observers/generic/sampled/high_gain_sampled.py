@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel
@@ -79,7 +79,7 @@ class HighGainSampled(SampledObserver):
         powers = theta ** (np.asarray(self.levels()) + 1.0)
         return powers[:, None] * K, theta * K[:q]
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """(1.51) and (1.52) with mu = 1: the smallest theta, and the longest gap, against the model's
         `sample_period`.
         """
@@ -87,19 +87,19 @@ class HighGainSampled(SampledObserver):
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
         bounds = high_gain_bounds(model.A, K, model.C, float(p.theta), model.lipschitz)
         theta, gap = float(p.theta), model.sample_period
-        return Condition(
+        return condition_found(
             holds=theta >= bounds.smallest_theta and gap <= bounds.longest_gap,
-            values={
-                "theta": theta,
-                "smallest_theta": bounds.smallest_theta,
-                "gap": gap,
-                "longest_gap": bounds.longest_gap,
-                "lipschitz": model.lipschitz,
+            numbers={
+                "theta [1/s]": theta,
+                "smallest_theta [1/s]": bounds.smallest_theta,
+                "gap [s]": gap,
+                "longest_gap [s]": bounds.longest_gap,
+                "lipschitz [1/s]": model.lipschitz,
                 "largest_eigenvalue": bounds.largest,
                 "smallest_eigenvalue": bounds.smallest,
             },
-            statement="theta >= smallest_theta [1/s], gap <= longest_gap [s]; sufficient, very conservative; certify() "
-            "is exact",
+            statement="theta >= smallest_theta [1/s], gap <= longest_gap [s]; sufficient, very conservative; the "
+            "finding about gaps is exact",
             source="Bouchama 2024, (1.51)-(1.52)",
         )
 

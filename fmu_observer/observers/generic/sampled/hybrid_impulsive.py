@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel
@@ -79,22 +80,22 @@ class HybridImpulsive(SampledObserver):
         """The shortest gap covered, besides what is left out."""
         return f"gaps shorter than 1/2400 of the longest are left out, and {super().remark()}"
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """H Hurwitz, and the growth from sample to sample at the model's `sample_period`, its nonlinear part left
         out.
         """
         _, H, _ = self._gains(p)
         abscissa = float(np.linalg.eigvals(np.asarray(H, dtype=float)).real.max())
         error = self.vertex_error(self.model.A, p)
-        certificate = certify_sampled_error((error,), self.model.sample_period, "bare chain")
-        return Condition(
-            holds=abscissa < 0.0 and certificate.spectral_radius < 1.0,
-            values={
-                "abscissa": abscissa,
-                "gap": self.model.sample_period,
-                "spectral_radius": certificate.spectral_radius,
-                "constant_limit": certificate.constant_limit,
-                "aperiodic_limit": certificate.aperiodic_limit,
+        found = certify_sampled_error((error,), self.model.sample_period, "bare chain")
+        return condition_found(
+            holds=abscissa < 0.0 and found.numbers[GROWTH] < 1.0,
+            numbers={
+                "abscissa [1/s]": abscissa,
+                "gap [s]": self.model.sample_period,
+                "spectral_radius": found.numbers[GROWTH],
+                "constant_limit [s]": found.condition(CONSTANT_GAP).limit,
+                "aperiodic_limit [s]": found.limit,
             },
             statement="H is Hurwitz (abscissa < 0), the error of the linear part falls at a constant gap "
             "(spectral_radius < 1)",

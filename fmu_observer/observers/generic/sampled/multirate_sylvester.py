@@ -10,15 +10,13 @@ import numpy as np
 import scipy
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.exhibits.inverted_pendulum_on_cart import inverted_pendulum_cart
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
-from fmu_observer.observers.gap_certified import GapCertified
-from fmu_observer.observers.judged_observer import JudgedObserver
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import estimate_outputs, matrix_parameter, measured_inputs
 from plant_models.hybrid import Array, Signal, TriggeredEvent, state
@@ -45,7 +43,7 @@ SPEED = 2.0  # [1/s] of the poles of A, at -SPEED, -1.25 SPEED, ... [ours]
 RESIDUAL = 1e-9  # relative: above it (1.46) does not hold for the matrices in use
 
 
-class MultirateSylvester(GapCertified, JudgedObserver):
+class MultirateSylvester(GapCertified):
     """Observer of ``x = [x_R, x_c, x_d]``: x_c measured always, each component of x_d at its own event.
 
     Bouchama 2024, (1.42)-(1.46):
@@ -132,20 +130,20 @@ class MultirateSylvester(GapCertified, JudgedObserver):
         measured = np.hstack([always, sampled]) if self.always else sampled
         return np.hstack([np.linalg.solve(T[:, :r], x.filter - T[:, r:] @ measured), measured])
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """(1.46) by its residual, A Hurwitz by its abscissa, T_R invertible by its condition number."""
         r, A, B, T = self._numbers(p)
         residual = _sylvester_residual(self.model.A, A, B, T)
         abscissa, spread = float(np.linalg.eigvals(A).real.max()), float(np.linalg.cond(T[:, :r]))
-        return Condition(
+        return condition_found(
             holds=residual < RESIDUAL and abscissa < 0.0 and spread < 1.0 / RESIDUAL,
-            values={"residual": residual, "abscissa": abscissa, "condition_number": spread},
+            numbers={"residual": residual, "abscissa [1/s]": abscissa, "condition_number": spread},
             statement="T solves the Sylvester equation (residual = rounding), A is Hurwitz (abscissa < 0), T_R is "
             "invertible",
             source="Bouchama 2024, (1.46)",
         )
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate where all samples come together; where they do not, a small-gain condition in addition."""
         r, A, B, T = self._numbers(p)
         count = len(self.sampled)
@@ -155,9 +153,12 @@ class MultirateSylvester(GapCertified, JudgedObserver):
         residual = _sylvester_residual(self.model.A, A, B, T)
         left_out = "noise and model errors are left out"
         model = f"error equations of the model {self.model.name!r}, exact if it is linear; {left_out}"
-        found = certify_sampled_error((ImpulsiveError.of(generator, reset),), max_gap, model)
-        note = f"the Sylvester equation holds with the residual {residual:.1e}"
-        found = replace(found, holds=found.holds and residual < RESIDUAL, notes=(note,))
+        found = certify_sampled_error((ImpulsiveError.of(generator, reset),), gap, model)
+        text, what = (
+            f"the Sylvester equation holds with the residual {residual:.1e}",
+            "residual of the Sylvester equation",
+        )
+        found = found.also(Finding(what, residual, "1", "exact", "(1.46)", residual < RESIDUAL, text))
         return found if count == 1 else with_independent_samples(found, independent_gap_limit(A, B_d, read, own))
 
     def error_matrices(self, p: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

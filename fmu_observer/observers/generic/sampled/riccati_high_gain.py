@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.linear_models import linear_part
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observability import MeasuredSystem, require_observable
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.model_observer import ModelObserver
 from plant_models.hybrid import Array, parameter, state, vector
 from plant_models.hybrid.missing import is_there
@@ -78,7 +77,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         step = np.linalg.solve(S, C.T @ self.innovation(x, u))
         return self.named_estimates(self.estimates(x) - weight * step) | {"information": S}
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Observability of the sampled linear part at the start, and its closed growth from sample to sample, S
         settled.
         """
@@ -87,15 +86,15 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         gap = float(p.sample_period)
         matrix = observability_matrix(F, self.model.C)
         rank, radius = int(np.linalg.matrix_rank(matrix)), error.spectral_radius(gap)
-        return Condition(
+        return condition_found(
             holds=rank == self.model.order and radius < 1.0,
-            values={"rank": rank, "order": self.model.order, "gap": gap, "spectral_radius": radius},
+            numbers={"rank": rank, "order": self.model.order, "gap [s]": gap, "spectral_radius": radius},
             statement="the model is observable and, with S settled at the gap, its error falls from sample to sample; "
             "theorem 6 asks for a short gap and theta in a bounded range, without numbers",
             source="Bouchama 2024, theorem 6",
         )
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over every pair of vertices: the slope at the estimate, which S believes, and the slope of the
         error.
         """
@@ -107,7 +106,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
             "its nonlinear part for error and S, constant over a gap; the settling of S, noise and model errors are "
             "left out"
         )
-        return certify_sampled_error(vertices, max_gap, model)
+        return certify_sampled_error(vertices, gap, model)
 
     def vertex_error(self, drift: np.ndarray, believed: np.ndarray, p: Any) -> RiccatiError:
         """Error equations where the flow has the Jacobian `drift` and S is told `believed`, each of shape (n, n)."""

@@ -7,22 +7,24 @@ It knows models and certificates; the chain form that high-gain observers ask fo
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding, as_printed, to_simulate
 from fmu_observer.certificates.gap_error import GapError
-from fmu_observer.certificates.observer_limits import Limit, PrintedBound
+from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver
-from fmu_observer.observers.model_trial import model_trial
-from fmu_observer.observers.parameter_values import Value, parameter_values
+from fmu_observer.observers.model_search import model_search
 from plant_models.hybrid import Array, Signal, scalar_names, state, vector
+
+PERIOD = "period of the samples"
 
 
 class SampledObserver(ModelObserver, GatedObserver, GapCertified):
@@ -41,34 +43,33 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
     def vertex_error(self, drift: np.ndarray, p: Any) -> GapError:
         """Error equations where the model's flow has the Jacobian `drift`, shape (n, n)."""
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over the vertices of the model's Jacobian."""
         vertices = tuple(self.vertex_error(drift, p) for drift in self.model.drifts)
-        certificate = certify_sampled_error(vertices, max_gap, self.error_model())
+        certificate = certify_sampled_error(vertices, gap, self.error_model())
         return with_switching_noted(certificate, vertices, "slopes") if len(vertices) > 1 else certificate
 
-    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
-        """How long it may wait for a sample: printed bounds, the certificate, and a trial beside its model."""
-        values = parameter_values(self, parameters, preset, "to judge")
-        certificate = self.certify(self.model.sample_period, parameters, preset)
-        longest = certificate.constant_limit
-        high = 4.0 * longest if np.isfinite(longest) else certificate.horizon
-        return (
-            Limit(
-                "period of the samples",
-                printed=self.printed_bounds(self.unpack_parameters(values)),
-                exact=longest,
-                searched_to=certificate.horizon,
-                exact_test="first period at which the error grows from sample to sample, at an extreme slope",
-                trial=model_trial(self, "period", high / 50.0, high, self.named_values(values)) if high > 0.0 else None,
-            ),
-        )
+    @property
+    def usual_gap(self) -> float:
+        """The model's own period [s]."""
+        return self.model.sample_period
 
-    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+    def limit_findings(self, values: np.ndarray) -> Iterator[Finding]:
+        """How long it may wait for a sample: bounds as printed, the exact limit, and runs beside its model."""
+        p = self.unpack_parameters(values)
+        exact = self.gap_finding(self.usual_gap, p).condition(CONSTANT_GAP)
+        high = 4.0 * exact.limit if np.isfinite(exact.limit) else exact.value
+        yield from self.printed_bounds(p)
+        test = "first period at which the error grows from sample to sample, at an extreme slope"
+        yield replace(exact, what=PERIOD, source=test)
+        if high > 0.0:
+            yield to_simulate(model_search(self, "period", high / 50.0, high, self.named_values(values)), PERIOD)
+
+    def printed_bounds(self, p: Any) -> tuple[Finding, ...]:
         """Bounds of the sampling period that the source prints; by default that of the condition, where it has one."""
         condition = self.condition_of(p)
-        gap = condition.values.get("longest_gap")
-        return () if gap is None else (PrintedBound(float(gap), condition.statement, condition.source),)
+        gap = condition.numbers.get("longest_gap")
+        return () if gap is None else (as_printed(PERIOD, gap, condition.statement, condition.source),)
 
     def named_values(self, values: np.ndarray) -> dict[str, float]:
         """Parameters by scalar name, those that another program sets left out.

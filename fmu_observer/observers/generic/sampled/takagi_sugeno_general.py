@@ -10,17 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
-from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability import require_detectable_vertices
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import GAINS, TakagiSugenoGains
-from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, measured_inputs
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
@@ -40,7 +38,7 @@ Premise = Literal["estimated", "live", "frozen"]
 PREMISES: tuple[Premise, ...] = ("estimated", "live", "frozen")
 
 
-class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
+class GeneralTakagiSugenoCdo(GatedObserver, GapCertified):
     """Takagi-Sugeno observer with continuous and aperiodic sampled outputs: Bouchama 2024, (2.6).
 
     ``dxh = sum_i h_i [A_i xh + B_i u - K_i2 (C2 xh - y2) - K_i1 c]``, ``dc = -eta c``, ``c = C1 xh - y1`` at a sample.
@@ -160,7 +158,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
         p = self.unpack_parameters(parameter_values(self, parameters, preset))
         return tuple(self._error_at(h, p) for h in np.eye(self.model.vertices))
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over the vertices and halfway between every two, in the coordinates of the model."""
         N = self.model.vertices
         pairs = [0.5 * (np.eye(N)[i] + np.eye(N)[j]) for i, j in combinations(range(N), 2)]
@@ -169,7 +167,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
             f"error of {self.model.name} at its {N} vertices and halfway between them, weights constant over a gap; "
             "the change of the weights and their difference to the plant's, which act as inputs to it, are left out"
         )
-        found = certify_sampled_error(errors, max_gap, left_out)
+        found = certify_sampled_error(errors, gap, left_out)
         if self.premise != "frozen":
             found = with_switching_noted(found, errors, "weights")
         T = np.asarray(self.model.scaling)
@@ -178,13 +176,13 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified, JudgedObserver):
         )
         return replace(found, lyapunov_matrix=P)
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """Whether every vertex error decays for infinitely frequent samples: ``A_i - K_i1 C1 - K_i2 C2`` is Hurwitz."""
         limits = [self._error_at(h, p).continuous_limit for h in np.eye(self.model.vertices)]
         abscissas = [float(np.linalg.eigvals(limit).real.max()) for limit in limits if limit is not None]
-        return Condition(
+        return condition_found(
             holds=max(abscissas) < 0.0,
-            values={f"abscissa_{i + 1}": value for i, value in enumerate(abscissas)},
+            numbers={f"abscissa_{i + 1} [1/s]": value for i, value in enumerate(abscissas)},
             statement="A_i - K_i1 C1 - K_i2 C2 is Hurwitz at every vertex, necessary for any gap",
             source="Bouchama 2024, (2.9)",
         )

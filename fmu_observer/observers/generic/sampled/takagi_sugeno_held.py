@@ -13,8 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
-from fmu_observer.certificates.certificate import Certificate
-from fmu_observer.certificates.condition import Condition
+from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.quadratic import QuadraticCondition as Inequalities
 from fmu_observer.certificates.quadratic import common_quadratic_form, decrease, flow_condition
@@ -22,9 +21,8 @@ from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
-from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.judged_observer import JudgedObserver
 from fmu_observer.observers.model_signals import (
     arrival_event,
     estimate_outputs,
@@ -40,7 +38,7 @@ SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certi
 _SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
 
 
-class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
+class TakagiSugenoHeld(GatedObserver, GapCertified):
     """Base of ``dxh = sum_i h_i [A_i xh + B_i u - L_i eta]``, ``eta = C xh - y`` set at samples and held between them.
 
     All measurements of the model are sampled together, at the event of the model or, where `periodic` is set, at a
@@ -134,26 +132,26 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
         shape = (self.model.order, len(self.model.measurements))
         return tuple(np.reshape(p.gain[i * size : (i + 1) * size], shape) for i in range(self.model.vertices))
 
-    def condition_of(self, p: Any) -> Condition:
+    def condition_of(self, p: Any) -> Finding:
         """One quadratic function for all ``A_i - L_i C``, and the unknown slope it tolerates: samples without gaps."""
         closed = self._closed(p)
         inequalities = reduce(Inequalities.joined, (flow_condition(matrix) for matrix in closed))
         candidate = common_quadratic_form(inequalities)
         margin = -np.inf if candidate is None else -float(decrease(inequalities, candidate.P).max())
         largest = np.nan if candidate is None else float(np.linalg.eigvalsh(candidate.P)[-1])
-        return Condition(
+        return condition_found(
             holds=margin > 0.0,
-            values={
-                "abscissa": max(float(np.linalg.eigvals(matrix).real.max()) for matrix in closed),
+            numbers={
+                "abscissa [1/s]": max(float(np.linalg.eigvals(matrix).real.max()) for matrix in closed),
                 "margin": margin,
-                "tolerated_slope": max(0.0, 0.5 * margin / largest) if margin > 0.0 else 0.0,
+                "tolerated_slope [1/s]": max(0.0, 0.5 * margin / largest) if margin > 0.0 else 0.0,
             },
             statement="one P > 0 decreases for all A_i - L_i C (margin > 0) and an unknown f with |f| <= "
-            "tolerated_slope |e|; gaps are judged by certify()",
+            "tolerated_slope |e|; gaps have a finding of their own",
             source=self.source,
         )
 
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+    def gap_finding(self, gap: float, p: Any) -> Finding:
         """Certificate over the vertices and mixtures of every two: three mixtures if there are two vertices, else
         one.
         """
@@ -169,7 +167,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified, JudgedObserver):
             f"error equations of the Takagi-Sugeno model {self.model.name!r} at its vertices and mixtures of every "
             f"two, weights constant over a gap; {self.premise_remark()}, disturbances and noise are left out"
         )
-        certificate = certify_sampled_error(vertices, max_gap, model)
+        certificate = certify_sampled_error(vertices, gap, model)
         return certificate if self.weight_memory() else with_switching_noted(certificate, vertices, "weights")
 
     # -- internals --------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Gains for the balise gaps that a track and a range of speeds will bring: chosen by closed form, believed by
 certificate.
 
-Nothing here is needed at run time. The functions ask the observers' own `certify`; the rules of choice are ours, the
+Nothing here is needed at run time. The functions ask the observers' own `findings`; the rules of choice are ours, the
 families of gains are those of Bouchama 2024, (3.24)-(3.48).
 """
 
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import RATIOS, SHARES, Gains, balise_family, certified_gains, rounded_down
 from fmu_observer.observers.train.adaptive_gain_cdo import AdaptiveGainCdo
@@ -99,15 +99,15 @@ class GainDesign:
     observer: str
     parameters: Mapping[str, float]
     gaps: _BaliseGaps
-    certificate: Certificate
+    certificate: Finding
     margin: float
     noise: _NoiseAmplification
 
     def explain(self) -> str:
         """Two or three sentences for the user."""
         values = ", ".join(f"{name} = {value:.4g}" for name, value in self.parameters.items())
-        limit = self.certificate.aperiodic_limit
-        covered = f"{limit:.4g} s" if isfinite(limit) else f"{self.certificate.horizon:.4g} s and more"
+        found = self.certificate
+        covered = f"{found.value:.4g} s{'' if isfinite(found.limit) else ' and more'}"
         occur = f"Gaps up to {self.gaps.longest:.4g} s occur, certified are {covered}"
         return f"{self.observer}: {values}. {occur}. {self.noise.explain()}"
 
@@ -218,7 +218,7 @@ def design_adaptive(
     journey = {"expected_spacing": middle} | {f"assumed_{name}": value for name, value in assumed.items()}
     for ratio, share in product(RATIOS, SHARES):
         rule = _rule(ratio, share / longest, ratio * gaps.fastest / middle) | journey
-        if observer.certify(longest, rule).holds:
+        if next(observer.findings(longest, rule)).holds:
             return _design(observer, rule, gaps, _followed(rule))
     constant = design_high_gain(spacing, speeds, margin=margin).parameters["theta"]
     journeys = f"spacings of {gaps.nearest:g} to {gaps.farthest:g} m and accelerations up to {acceleration:g} m/s2"
@@ -249,7 +249,7 @@ def _followed(rule: Gains) -> Callable[[float], SampledError]:
 
 
 def _searched(observer: TrainObserver, family: Callable[[float], Gains], gap: float) -> Gains:
-    found = certified_gains(gap, family, lambda gains: observer.certify(gap, gains))
+    found = certified_gains(gap, family, lambda gains: next(observer.findings(gap, gains)))
     if found is None:
         raise ValueError(f"{observer.name}: no gain was found that is certified for gaps of {gap:.4g} s.")
     return found
@@ -263,12 +263,12 @@ def _design(
     odometer_gain: tuple[float, float] = (0.0, 0.0),
 ) -> GainDesign:
     """The design with its certificate; `error` gives the error equations at a gap."""
-    certificate = observer.certify(gaps.longest, parameters)
-    if not certificate.holds:
-        raise ValueError(f"{observer.name}: the gains of the design are not certified. {certificate.explain()}")
+    found = next(observer.findings(gaps.longest, parameters))
+    if not found.holds:
+        raise ValueError(f"{observer.name}: the gains of the design are not certified. {found.explain()}")
     judged = [(error(gap), gap) for gap in map(float, np.linspace(gaps.shortest, gaps.longest, 5))]
-    margin = certificate.aperiodic_limit / gaps.longest - 1.0
-    return GainDesign(observer.name, parameters, gaps, certificate, margin, _noise_amplification(judged, odometer_gain))
+    margin = found.limit / gaps.longest - 1.0
+    return GainDesign(observer.name, parameters, gaps, found, margin, _noise_amplification(judged, odometer_gain))
 
 
 def _with_margin(gaps: _BaliseGaps, margin: float) -> float:

@@ -24,7 +24,7 @@ def design_quasi_lpv_gains(
     """Gains of the observer `quasi_lpv_uio` with the least attenuation: Algorithm 3-2 of Aguiar Cota 2019, repaired.
 
     The disturbance of the design is an acceleration, D = e1. The error of a continuous speed decays at the rate asked
-    for; what the sampling of the odometer leaves of it is the observer's own `certify`.
+    for; what the sampling of the odometer leaves of it is the observer's own `findings`.
 
     Args:
         decay: rate at which the error is to fall [1/s]. alpha: bound of ``K' P K``; None for 2.2 M^2.

@@ -1,4 +1,4 @@
-"""Trials of an observer beside its own model: the true motion, what is measured of it, and the inputs."""
+"""Runs of an observer beside its own model, to find a limit: the true motion, its measurements, and the inputs."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.observer_limits import Trial, Varied
+from fmu_observer.certificates.limit_search import LimitSearch, Varied
 from fmu_observer.observers.model_observer import ModelObserver
 
 WRONG_START = 0.5  # of every estimate, in its own unit
 _DRIVE_SIZE, _DRIVE_FREQUENCY = 0.1, 1.0  # [1], [rad/s] of all inputs; Hann 2014, section 2.5
 
 
-def model_trial(
+def model_search(
     observer: ModelObserver,
     varied: Varied,
     low: float,
@@ -25,20 +25,20 @@ def model_trial(
     *,
     delayed: bool = False,
     **further: Any,
-) -> Trial:
-    """A trial in which the plant is the model, from its starts, and all estimates start 0.5 beside them; all inputs are
+) -> LimitSearch:
+    """Runs in which the plant is the model, from its starts, and all estimates start 0.5 beside them; all inputs are
     ``0.1 sin t`` in their units.
 
     Args:
-        observer: at the event of its model. varied, low, high, further: as for `Trial`. settings: parameters by scalar
-            name. delayed: whether the outputs ``delayed_...`` are compared, with the truth a delay ago.
+        observer: at the event of its model. varied, low, high, further: as for `LimitSearch`. settings: parameters by
+            scalar name. delayed: whether the outputs ``delayed_...`` are compared, with the truth a delay ago.
     """
     model, known = observer.model, np.ones(len(observer.model.inputs))
-    start, stop = model.start, float(further.get("stop", Trial.stop))
+    start, stop = model.start, float(further.get("stop", LimitSearch.stop))
     motion = solved_motion(lambda t, x: model.flow(x, known * _drive(t)), start, stop, rtol=1e-9, atol=1e-11)
     names = [f"delayed_{s.name}" if delayed else s.name for s in model.states]
     starts = {s.name: v + WRONG_START for s, v in zip(observer.states[: model.order], start, strict=True)}
-    return Trial(
+    return LimitSearch(
         system=observer,
         varied=varied,
         low=low,

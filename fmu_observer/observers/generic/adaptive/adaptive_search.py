@@ -1,4 +1,4 @@
-"""Trials of an adaptive observer beside its own model: the true motion with constants that it does not know."""
+"""Runs of an adaptive observer beside its own model: the true motion with constants that it does not know."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.observer_limits import Trial
+from fmu_observer.certificates.limit_search import LimitSearch
 from fmu_observer.models.state_affine import StateAffineModel
-from fmu_observer.observers.model_trial import solved_motion
+from fmu_observer.observers.model_search import solved_motion
 
 STOP = 35.0  # [s]; the error counts from 28 s on
 ALLOWED = 0.1  # error of state and first constant that may be left, in the units of the example
 LOW, HIGH = 0.02, 0.5  # [s]
 
 
-def adaptive_trial(observer: Any, settings: Mapping[str, float]) -> Trial:
+def adaptive_search(observer: Any, settings: Mapping[str, float]) -> LimitSearch:
     """Periods at which the observer finds states and its first constant; inputs are zero.
 
     Args:
@@ -34,7 +34,7 @@ def adaptive_trial(observer: Any, settings: Mapping[str, float]) -> Trial:
         return named | {model.unknowns[0].name: np.full(np.shape(t), start[n])}
 
     first = float(np.linalg.norm(start[: n + 1] - np.array(believed[: n + 1])))
-    return Trial(
+    return LimitSearch(
         system=observer,
         varied="period",
         low=LOW,
