@@ -6,14 +6,17 @@ import hashlib
 import json
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cosim.run.results_manifest import sha256
-from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.origin import ForeignFile
 from cosim.scenario.paths import map_paths
 from cosim.scenario.saving import plain
 from fmus.tables.plain_data import jsonable
 from fmus.versions import versions
+
+if TYPE_CHECKING:
+    from cosim.scenario.schema import ScenarioTable
 
 
 def digest(*texts: str) -> str:
@@ -25,18 +28,15 @@ def digest(*texts: str) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()
 
 
-def scenario_content(scenario: RunnableScenario) -> str:
+def table_content(table: ScenarioTable, folder: Path) -> str:
     """What a run of a scenario follows from, as one text: its tables, seed among them, with the content of each file in
     place of its path, and the versions of Python and the packages.
 
     Args:
-        scenario: resolved, with all settings in it.
-
-    Raises:
-        ScenarioError: something in the scenario cannot be.
+        table: of the scenario, with all settings in it. folder: start of its relative paths.
     """
-    tables = plain(scenario.table().model_dump(by_alias=True, exclude_unset=True))
-    moved = map_paths(tables, lambda path: file_content((scenario.folder / path).resolve()))
+    tables = plain(table.model_dump(by_alias=True, exclude_unset=True))
+    moved = map_paths(tables, lambda path: file_content((folder / path).resolve()))
     return f"{json.dumps(jsonable(moved), sort_keys=True)} {version_text()}"
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cosim.errors import CosimError
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.runs.job import Ended, Failure, Job
-from cosim.runs.keys import digest, scenario_content
+from cosim.runs.keys import digest, table_content
 from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.origin import ForeignFile, Origin, foreign_files
+
+if TYPE_CHECKING:
+    from cosim.scenario.schema import ScenarioTable
 
 
 def whole(outcome: Outcome) -> Outcome:
@@ -40,15 +43,21 @@ class Run(Job):
     take: Callable[[Outcome], Any] = whole
     rests_on: str = ""
 
-    @cached_property
+    @property
     def key(self) -> str:
-        """Digest of the resolved scenario, the content of its files, the seed, the versions, and what is taken."""
-        return digest(scenario_content(self._resolved()), self.rests_on)
+        """Digest of the scenario with its settings and seed, the contents of files, the versions, and `rests_on`."""
+        return self._identity[0]
 
     @property
     def seed(self) -> int | None:
         """Seed of the run."""
-        return int(self._resolved().table().seed)
+        return self._identity[1]
+
+    @cached_property
+    def _identity(self) -> tuple[str, int]:
+        """Key and seed: no more is kept of the table, for there are thousands of runs."""
+        table = self._table
+        return digest(table_content(table, self.scenario.folder), self.rests_on), int(table.seed)
 
     @property
     def apart(self) -> bool:
@@ -68,21 +77,19 @@ class Run(Job):
     def files(self) -> Sequence[ForeignFile]:
         """The files that the scenario names."""
         try:
-            scenario = self._resolved()
-            return foreign_files(scenario.table(), scenario.folder)
+            named = foreign_files(self._table, self.scenario.folder)
         except CosimError:  # the run says why it cannot be
             return ()
+        return [file for file in named if file.owner not in self._given]
 
     def code(self) -> Sequence[Callable[..., Any]]:
         """`take`, and the classes that a script put into the scenario."""
-        tables = self.scenario.table().components.values()
-        given = [getattr(table.model or table.observer, "given", None) for table in tables]
-        return [self.take, *(g if isinstance(g, type) else type(g) for g in given if g is not None)]
+        given = self._given.values()
+        return [self.take, *(model if isinstance(model, type) else type(model) for model in given)]
 
     def moved(self, places: Mapping[str, str]) -> Run:
         """The same run with its files at other places; a class in a file keeps its name."""
-        scenario = self._resolved()
-        tables = scenario.table().model_dump(by_alias=True)
+        scenario, tables = self._resolved(), self._table.model_dump(by_alias=True)
         for key, place in places.items():
             node: Any = tables
             for part in key.split("."):
@@ -95,9 +102,19 @@ class Run(Job):
         """An outcome names the files of this machine."""
         if not isinstance(ended.row, Outcome):
             return ended
-        scenario = self._resolved()
-        origin = Origin.of(scenario.table(), scenario.name, scenario.folder, scenario.where)
+        origin = Origin.of(self._table, self.scenario.name, self.scenario.folder, self.scenario.where)
         return replace(ended, row=replace(ended.row, origin=origin))
+
+    @property
+    def _table(self) -> ScenarioTable:
+        """The scenario with the settings in it."""
+        return self._resolved().table()
+
+    @property
+    def _given(self) -> dict[str, Any]:
+        """Classes and instances that a script put into the scenario, by component: they travel as they are."""
+        models = {name: table.model or table.observer for name, table in self._table.components.items()}
+        return {name: model.given for name, model in models.items() if model is not None and model.given is not None}
 
     def _resolved(self) -> RunnableScenario:
         """The scenario with the settings in it."""
@@ -107,8 +124,8 @@ class Run(Job):
         return scenario
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the key, which nobody needs elsewhere."""
-        return {name: value for name, value in self.__dict__.items() if name != "key"}
+        """Without what follows from the rest."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 def _silent(_text: str) -> None: ...

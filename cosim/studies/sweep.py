@@ -127,7 +127,7 @@ class Sweep:
         folder = None if directory is None else Path(directory)
         rows = _Rows(measures, measure or {}, keep, folder, folders)
         jobs = self._jobs(rows.take, f"{measures.__module__}.{measures.__qualname__}")
-        result = SweepResult(self.scenario, self.names, [], dict(units or {}))
+        result = SweepResult(self.varied(0), self.names, [], dict(units or {}))  # which is whole in any case
         done: dict[int, SweepRun] = {}
         with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
             journal = None if folder is None else Journal(folder, resume=resume, retry=retry)

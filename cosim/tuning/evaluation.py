@@ -21,7 +21,7 @@ from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.runs.executors import make_executor
 from cosim.runs.job import Job
 from cosim.runs.journal import read_lines, write_line
-from cosim.runs.keys import digest, scenario_content
+from cosim.runs.keys import digest, table_content
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
 from cosim.tuning.parameters import Tunable
@@ -253,7 +253,8 @@ class Evaluator:
     def _key(self, seed: int, candidate: Mapping[str, Any] | None) -> str:
         if seed not in self._keys:
             played = "recorded" if self.by_seed[seed].parts is not None else "whole"
-            content = scenario_content(self.by_seed[seed].whole)
+            whole = self.by_seed[seed].whole
+            content = table_content(whole.table(), whole.folder)
             self._keys[seed] = f"{digest(content)} {played} {self.cost.text} {self.cost.signals}"
         said = None if candidate is None else self.tunable.settings(candidate)
         return hashlib.sha256(f"{self._keys[seed]} {json.dumps(said, sort_keys=True)}".encode()).hexdigest()
