@@ -60,7 +60,7 @@ def _tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
     """Plain data of tolerances."""
     return {
         "default": asdict(tolerances.default),
-        "signals": {name: asdict(given) for name, given in tolerances.by_signal.items()},
+        "signals": {name: asdict(tolerance) for name, tolerance in tolerances.by_signal.items()},
         "ignore": list(tolerances.ignore),
     }
 

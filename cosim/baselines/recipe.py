@@ -68,10 +68,10 @@ class Recipe:
             BaselineError: it is none.
         """
         known = {entry.name for entry in fields(cls)}
-        given = {key: value for key, value in data.items() if key in known}
-        if given.get("kind") not in KINDS:
-            raise BaselineError(f"run.kind is {given.get('kind')!r}; expected one of {', '.join(KINDS)}.")
-        recipe = cls(**given)
+        entries = {key: value for key, value in data.items() if key in known}
+        if entries.get("kind") not in KINDS:
+            raise BaselineError(f"run.kind is {entries.get('kind')!r}; expected one of {', '.join(KINDS)}.")
+        recipe = cls(**entries)
         if isinstance(recipe.inputs, str):
             recipe = replace(recipe, inputs=_absolute(recipe.inputs, folder))
         return replace(recipe, source=_absolute(recipe.source, folder))

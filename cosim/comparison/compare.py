@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cosim.comparison.curve import Curve, check_time, looks_held
+from cosim.comparison.curve import Curve, check_time, is_held
 from cosim.comparison.curve_comparison import Task, compare_signal
 from cosim.comparison.event_comparison import Event, compare_events, compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
@@ -288,7 +288,7 @@ class _Pair:
         values = [np.asarray(side[name][rows], dtype=float) for side, rows in zip(self.results, self.rows, strict=True)]
         if (factor, offset) != (1.0, 0.0):
             values[1] = factor * values[1] + offset
-        held = "discrete" in (one.variability, two.variability) or all(map(looks_held, values))
+        held = "discrete" in (one.variability, two.variability) or all(map(is_held, values))
         reference, result = (Curve(time, v, held) for time, v in zip(self.times, values, strict=True))
         tolerance = self.tolerances.for_signal(name)
         return compare_signal(Task(name, one.unit, reference, result, tolerance, self.length, self.curves))

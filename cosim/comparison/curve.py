@@ -89,7 +89,7 @@ def check_time(time: np.ndarray, label: str) -> None:
         )
 
 
-def looks_held(values: np.ndarray) -> bool:
+def is_held(values: np.ndarray) -> bool:
     """Whether a signal that says it is continuous is an indicator: a few whole numbers, most steps without a change.
 
     Args:

@@ -54,25 +54,25 @@ class Tolerance:
 KEYS = tuple(entry.name for entry in fields(Tolerance))
 
 
-def tolerance(given: Tolerance | Mapping[str, Any] | float, base: Tolerance) -> Tolerance:
+def tolerance(stated: Tolerance | Mapping[str, Any] | float, base: Tolerance) -> Tolerance:
     """A tolerance as users write it.
 
     Args:
-        given: a tolerance, a mapping with some of its keys (the others as in `base`), or a number: the relative
+        stated: a tolerance, a mapping with some of its keys (the others as in `base`), or a number: the relative
             tolerance.
         base: what is not given.
 
     Raises:
         ComparisonError: unknown keys or impossible numbers.
     """
-    if isinstance(given, Tolerance):
-        return given
-    if isinstance(given, Mapping):
-        for key in given:
+    if isinstance(stated, Tolerance):
+        return stated
+    if isinstance(stated, Mapping):
+        for key in stated:
             if key not in KEYS:
                 raise ComparisonError(f"Unknown tolerance {key!r}; {nearest(str(key), KEYS)}")
-        return replace(base, **given)
-    return replace(base, relative=given)
+        return replace(base, **stated)
+    return replace(base, relative=stated)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Tolerances:
             ignore: names or patterns of what is not compared.
         """
         base = Tolerance() if default is None else tolerance(default, Tolerance())
-        return cls(base, {name: tolerance(given, base) for name, given in (by_signal or {}).items()}, tuple(ignore))
+        return cls(base, {name: tolerance(stated, base) for name, stated in (by_signal or {}).items()}, tuple(ignore))
 
     def for_signal(self, name: str) -> Tolerance:
         """The tolerance of a signal.
@@ -114,7 +114,7 @@ class Tolerances:
         """
         if name in self.by_signal:
             return self.by_signal[name]
-        return next((given for pattern, given in self.by_signal.items() if fnmatchcase(name, pattern)), self.default)
+        return next((stated for pattern, stated in self.by_signal.items() if fnmatchcase(name, pattern)), self.default)
 
     def ignores(self, name: str) -> bool:
         """Whether a signal is not compared.

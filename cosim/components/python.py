@@ -155,12 +155,12 @@ class _PythonSlave:
             fields = [signal.name.removeprefix(f"{EVENT}_") for signal in self._groups[3]]
             telegram = dict(zip(fields, self._values[self._ends[3] :].tolist(), strict=True))
             telegram["stamp"] = telegram.pop("time")
-            given = self.model.balise(self._made, telegram)
-            used = given is not False
+            returned = self.model.balise(self._made, telegram)
+            used = returned is not False
             self.counters = replace(
                 self.counters, accepted=self.counters.accepted + used, ignored=self.counters.ignored + (not used)
             )
-            self._take(None if isinstance(given, bool) else given, "balise")
+            self._take(None if isinstance(returned, bool) else returned, "balise")
         return False, False, False, False, False, 0.0
 
     def enterStepMode(self) -> None:
@@ -179,11 +179,11 @@ class _PythonSlave:
     def freeFMUState(self, state: Any) -> None:
         """Nothing to do."""
 
-    def _take(self, given: Any, call: str) -> None:
+    def _take(self, returned: Any, call: str) -> None:
         """The outputs after a call; those that a telegram's dict leaves out stay as they are."""
         place = slice(self._ends[1], self._ends[2])
         held = self._values[place] if call == "balise" else None
-        self._values[place] = self.model.output_values(self._made, given, call, held)
+        self._values[place] = self.model.output_values(self._made, returned, call, held)
 
     # -- values -----------------------------------------------------------------------------------------------------
 
@@ -240,7 +240,7 @@ class PythonComponent(FMI3Component):
 def _variable(signal: Signal, name: str, reference: int, model: PythonModel, clock: ModelVariable) -> ModelVariable:
     truth = model.kinds.get(signal.name) is bool
     start = signal.start_values[signal.scalar_names.index(name)]
-    told = signal.variability == "discrete" and signal.causality == "input"
+    clocked = signal.variability == "discrete" and signal.causality == "input"
     return AnnotatedVariable(
         marks=[mark for mark in MARKS if getattr(signal, mark)],
         name=name,
@@ -250,7 +250,7 @@ def _variable(signal: Signal, name: str, reference: int, model: PythonModel, clo
         variability=signal.variability,
         start=None if signal.causality == "output" else str(bool(start)).lower() if truth else repr(start),
         unit=None if signal.unit in (UNKNOWN_UNIT, "1") else signal.unit,
-        clocks=[clock] if told else None,
+        clocks=[clock] if clocked else None,
     )
 
 

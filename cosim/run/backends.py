@@ -33,7 +33,7 @@ FAULTS = (OSError, RuntimeError, ValueError, TracingError)
 written.
 """
 
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ def intended(table: ComponentTable, system: HybridSystem) -> Backend:
     return NATIVE if system.traceable and _missing_compiler() is None else _IN_PYTHON
 
 
-def realise(requests: Mapping[str, Request], tell: Tell) -> Realised:
+def realise(requests: Mapping[str, Request], notify: Notify) -> Realised:
     """Decide, and build the FMUs that are not in the cache, `_AT_A_TIME` at once.
 
     Args:
-        requests: by component. tell: told of each FMU that is built, and how long that took.
+        requests: by component. notify: called for each FMU that is built, and how long that took.
 
     Raises:
         FmuLoadError: an FMU that the scenario asks for by ``as`` cannot be built; where it does not ask, the model is a
@@ -85,7 +85,7 @@ def realise(requests: Mapping[str, Request], tell: Tell) -> Realised:
     """
     made = Realised({name: intended(request.table, request.system) for name, request in requests.items()})
     native = {name: request for name, request in requests.items() if made.kinds[name].startswith("fmu")}
-    found, faults = _build(native, made.kinds, tell)
+    found, faults = _build(native, made.kinds, notify)
     made.files |= found
     for name, fault in faults.items():
         if requests[name].table.backend is not None:
@@ -135,7 +135,7 @@ def _note(requests: Mapping[str, Request], made: Realised, faults: Mapping[str, 
 
 
 def _build(
-    requests: Mapping[str, Request], kinds: Mapping[str, Backend], tell: Tell
+    requests: Mapping[str, Request], kinds: Mapping[str, Backend], notify: Notify
 ) -> tuple[dict[str, Path], dict[str, Exception]]:
     """The FMUs by component, and what went wrong with the others. Systems are traced here, one after the other, while
     compilers work on those that were traced before.
@@ -143,7 +143,7 @@ def _build(
     entries: dict[str, CacheEntry] = {}
     faults: dict[str, Exception] = {}
     with ThreadPoolExecutor(_AT_A_TIME) as pool:
-        building = _Building(pool, tell)
+        building = _Building(pool, notify)
         try:
             for name, request in requests.items():
                 version: Any = int(kinds[name][-1])
@@ -164,8 +164,8 @@ def _build(
 class _Building:
     """FMUs that are being compiled, each once."""
 
-    def __init__(self, pool: ThreadPoolExecutor, tell: Tell) -> None:
-        self._pool, self._tell = pool, tell
+    def __init__(self, pool: ThreadPoolExecutor, notify: Notify) -> None:
+        self._pool, self._notify = pool, notify
         self._working: dict[Path, tuple[CacheEntry, Future[tuple[dict[Platform, bytes], float]]]] = {}
 
     def begin(self, entry: CacheEntry) -> None:
@@ -173,7 +173,7 @@ class _Building:
         if entry.draft is None or entry.path in self._working:
             return
         if not self._working:
-            self._tell("building FMUs of shipped models, kept for later runs")
+            self._notify("building FMUs of shipped models, kept for later runs")
         self._working[entry.path] = entry, self._pool.submit(_timed, entry.draft)
 
     def finish(self) -> dict[Path, Exception]:
@@ -188,7 +188,7 @@ class _Building:
             except FAULTS as error:
                 faults[entry.path] = error
             else:
-                self._tell(f"building {entry.path.stem} ... {seconds:.1f} s")
+                self._notify(f"building {entry.path.stem} ... {seconds:.1f} s")
         return faults
 
 

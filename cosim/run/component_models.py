@@ -19,7 +19,7 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.run.backends import FAULTS, Realised, Request, Tell, cannot_build, realise
+from cosim.run.backends import FAULTS, Notify, Realised, Request, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.paths import absolute, move_option_files
 from cosim.scenario.scenario_tables import Backend, ComponentTable
@@ -101,7 +101,7 @@ def component_factories(
     tables: Mapping[str, ComponentTable],
     folder: Path,
     where: str,
-    tell: Tell,
+    notify: Notify,
     span: tuple[float, float],
     tolerance: float | str | None = None,
 ) -> tuple[dict[str, Callable[[], Component]], list[str]]:
@@ -110,7 +110,7 @@ def component_factories(
 
     Args:
         tables: of the components. folder: paths are relative to it. where: place for messages.
-        tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
+        notify: called for each FMU that is built. span: start and stop of the run [s], which recordings must cover.
         tolerance: of the FMUs whose table says nothing else; see
             `cosim.components.described.Described.choose_tolerance`.
 
@@ -119,7 +119,7 @@ def component_factories(
     """
     places = {name: f"{where}: components.{name}" for name in tables}
     systems = {name: system for name in tables if (system := make_system(tables[name], places[name])) is not None}
-    made = realise({n: Request(tables[n], _lasting(tables[n], s), places[n]) for n, s in systems.items()}, tell)
+    made = realise({n: Request(tables[n], _lasting(tables[n], s), places[n]) for n, s in systems.items()}, notify)
     factories: dict[str, Callable[[], Component]] = {}
     for name, table in tables.items():
         if table.recording is not None:

@@ -57,9 +57,9 @@ def inferred_roles(
         f"{name}.{REFERENCE}" for name, component in components.items() if REFERENCE in component.names("output")
     )
     listening = {(name, ODOMETER) for name, component in table.components.items() if component.observer is not None}
-    heard = {".".join(connection.source) for connection in connections if connection.target in listening}
-    told = of_the_plant | {REFERENCE: _only(references), ODOMETER: _only(heard)} | roles_of_balises(table.balises)
-    free = {role: name for role, name in told.items() if name is not None and getattr(table.report, role) is None}
+    received = {".".join(connection.source) for connection in connections if connection.target in listening}
+    known = of_the_plant | {REFERENCE: _only(references), ODOMETER: _only(received)} | roles_of_balises(table.balises)
+    free = {role: name for role, name in known.items() if name is not None and getattr(table.report, role) is None}
     return {role: name for role, name in free.items() if _fits(name, role, components)}
 
 

@@ -42,7 +42,7 @@ class FmuAlone:
     interpolation: Chosen = None
 
 
-def single_tables(path: Path, name: str, run: FmuAlone) -> tuple[dict[str, Any], list[str]]:
+def tables_of_fmu(path: Path, name: str, run: FmuAlone) -> tuple[dict[str, Any], list[str]]:
     """The tables of a scenario of one FMU, and what is doubtful about it.
 
     Args:

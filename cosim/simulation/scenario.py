@@ -17,7 +17,7 @@ from cosim.run.scenario_run import run_scenario
 from cosim.run.scenario_structure import scenario_structure
 from cosim.run.streaming import ending, where_to
 from cosim.run.task import RunTask
-from cosim.scenario.fmu_alone import FmuAlone, single_tables
+from cosim.scenario.fmu_alone import FmuAlone, tables_of_fmu
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.origin import Origin
 from cosim.scenario.override import case_values, component_from_script, override, value_from_script
@@ -145,7 +145,7 @@ class Scenario:
             ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
         """
         run = FmuAlone(start, stop, step, inputs, parameters, record, interpolation)
-        tables, warnings = single_tables(Path(path), name, run)
+        tables, warnings = tables_of_fmu(Path(path), name, run)
         scenario = cls(where=Path(path).name, **tables)
         scenario._warnings = warnings
         return scenario

@@ -30,7 +30,7 @@ from cosim.ssp.document import VERSIONS, Node
 from cosim.ssp.elements_of_data import TOOL, Definitions, add_connector, add_parameter, child, root_of, text_of
 from cosim.ssp.interfaces import Interface
 from cosim.ssp.package import DEFAULT_VARIANT
-from cosim.ssp.reader import READS_BALISES, Reader, is_told_by_counts, make_reader
+from cosim.ssp.reader import READS_BALISES, Reader, is_notified_by_counts, make_reader
 from fmu_observer.event_protocol import EventProtocol
 from fmus.pack import check_target, pack_fmu
 from plant_models.hybrid.noise import RUN_SEED
@@ -160,7 +160,7 @@ class _Exporter:
             (
                 3
                 for interface in interfaces.values()
-                if is_told_by_counts(interface) and interface.description.fmiVersion[0] == "3"
+                if is_notified_by_counts(interface) and interface.description.fmiVersion[0] == "3"
             ),
             default=2,
         )

@@ -21,7 +21,7 @@ from plant_models.railway.track.balise_layout import UNUSED
 NAME = "balise_reader"
 READS_BALISES = "reads_balises"
 """Key of the annotation of the reader: it was added for other tools, and goes when the system is read back."""
-TOLD = ("count", "time", "position")
+NOTIFIED = ("count", "time", "position")
 PAGE = 16
 _PARALLEL = 0
 """Tools that read SSP step all components with the outputs of the step before (OMSimulator, libcosim)."""
@@ -52,16 +52,16 @@ def make_reader(
     listeners = [
         n
         for n, interface in interfaces.items()
-        if is_told_by_counts(interface) and (table.receivers is None or n in table.receivers)
+        if is_notified_by_counts(interface) and (table.receivers is None or n in table.receivers)
     ]
-    listeners = [n for n in listeners if not {f"{n}.{BALISE_EVENT}_{field}" for field in TOLD} & taken]
+    listeners = [n for n in listeners if not {f"{n}.{BALISE_EVENT}_{field}" for field in NOTIFIED} & taken]
     if not listeners or table.position is None or table.speed is None:
         return None
     name = NAME
     while name in interfaces:
         name += "_"
     links = [f"{table.position} -> {name}.position", f"{table.speed} -> {name}.speed"]
-    links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in listeners for field in TOLD]
+    links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in listeners for field in NOTIFIED]
     options, parameters = _track(table, [float(position) for position in layout.positions])
     component: dict[str, Any] = {"model": "balise_reader", "as": f"fmu{version}", "options": options}
     component["parameters"] = {"input_instant": _PARALLEL, **parameters}
@@ -78,12 +78,12 @@ def _track(table: BalisesTable, places: list[float]) -> tuple[dict[str, Any], di
     }
 
 
-def is_told_by_counts(interface: Interface) -> bool:
+def is_notified_by_counts(interface: Interface) -> bool:
     """Whether an FMU takes balises as a count, an instant and a position.
 
     Args:
         interface: of a component's FMU.
     """
     inputs = {v.name: FAMILIES[str(v.type)] for v in interface.variables.values() if v.causality == "input"}
-    fields = [f"{BALISE_EVENT}_{field}" for field in TOLD]
+    fields = [f"{BALISE_EVENT}_{field}" for field in NOTIFIED]
     return all(field in inputs for field in fields) and inputs[fields[0]] == INTEGER

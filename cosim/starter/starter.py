@@ -1,4 +1,4 @@
-"""Writing a starter scenario: look into an FMU, guess, write a file that loads. Touches the file it is given."""
+"""Writing a starter scenario: inspect an FMU, guess, write a file that loads. Touches that file only."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cosim.scenario.paths import move_file, relative
 from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
 from cosim.starter.guess import Guess
-from cosim.starter.look import Look, look_into, number
+from cosim.starter.inspected_fmu import InspectedFmu, inspect_fmu, number
 from cosim.starter.starter_roles import ObserverRoles, PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.toml_lines import LISTED, GuessedLink, comment, entry, guessed, inline, listing, one_line
 from cosim.starter.train_starter import DEFAULT_OBSERVER, declared_observer, train, train_times
@@ -32,62 +32,62 @@ STOP, STEP, STEPS = 10.0, 0.01, 1000
 _COLUMNS_NAMED = 6
 
 
-def _observer_beside(look: Look, roles: ObserverRoles) -> dict[str, Any]:
+def _observer_beside(inspected: InspectedFmu, roles: ObserverRoles) -> dict[str, Any]:
     """What the template of this starter inserts."""
-    stop, step, source = train_times(look)
+    stop, step, source = train_times(inspected)
     links = [
         GuessedLink("driver.effort", ["plant.effort"]),
         GuessedLink("plant.wheel_speed", ["odometer.wheel_speed"]),
         GuessedLink("odometer.reading", ["driver.odometer"]),
-        *_told("driver.effort", roles.effort),
-        *_told("odometer.reading", roles.odometer),
+        *_to_observer("driver.effort", roles.effort),
+        *_to_observer("odometer.reading", roles.odometer),
     ]
-    title = f"{one_line(look.path.name)} beside the shipped locomotive"
+    title = f"{one_line(inspected.path.name)} beside the shipped locomotive"
     return {"title": title, "stop": stop, "step": step, "source": source, "links": links}
 
 
-def _told(source: str, found: Guess | None) -> list[GuessedLink]:
+def _to_observer(source: str, found: Guess | None) -> list[GuessedLink]:
     if found is None:
         return []
     factor = None if found.signal.readable else 1.0
     return [GuessedLink(source, [f"observer.{found.signal.name}"], guessed(found), factor)]
 
 
-def alone(look: Look) -> dict[str, Any]:
+def alone(inspected: InspectedFmu) -> dict[str, Any]:
     """What the template of this starter inserts.
 
     Args:
-        look: what the FMU says.
+        inspected: what the FMU says.
 
     Returns:
         Values by name.
     """
-    stop, step, source = times(look)
-    inputs = [v for v in look.component.variables.values() if v.causality == "input"]
-    hidden = look.component.event_references()
+    stop, step, source = times(inspected)
+    inputs = [v for v in inspected.component.variables.values() if v.causality == "input"]
+    hidden = inspected.component.event_references()
     names = [v.name for v in inputs if v.type in NUMERIC_TYPES and v.valueReference not in hidden]
     return {
-        "title": f"{one_line(look.path.name)} alone",
+        "title": f"{one_line(inspected.path.name)} alone",
         "stop": stop,
         "step": step,
         "source": source,
         "has_inputs": bool(inputs),
-        "inputs": [_input(look, v) for v in inputs[:LISTED] if v.valueReference not in hidden],
+        "inputs": [_input(inspected, v) for v in inputs[:LISTED] if v.valueReference not in hidden],
         "columns": ["time", *map(one_line, names[:_COLUMNS_NAMED]), *(["..."] if len(names) > _COLUMNS_NAMED else [])],
         "first": names[0] if names else "NAME",
     }
 
 
-def times(look: Look) -> tuple[float, float, str]:
+def times(inspected: InspectedFmu) -> tuple[float, float, str]:
     """When the run stops and how long its steps are.
 
     Args:
-        look: what the FMU says.
+        inspected: what the FMU says.
 
     Returns:
         Stop and step [s], and where they come from.
     """
-    advised = look.description.defaultExperiment or DefaultExperiment()
+    advised = inspected.description.defaultExperiment or DefaultExperiment()
     stop, length = number(advised.stopTime), number(advised.stepSize)
     start = number(advised.startTime) or 0.0
     if stop is None or start != 0.0 or stop <= 0.0:
@@ -99,16 +99,16 @@ def times(look: Look) -> tuple[float, float, str]:
     return stop, length or stop / STEPS, "from the FMU's default experiment"
 
 
-def _input(look: Look, variable: ModelVariable) -> str:
+def _input(inspected: InspectedFmu, variable: ModelVariable) -> str:
     """An input's start value, as a comment where it has none or the master would not take it."""
-    unit, said = look.component.unit_name(variable.name) or "-", one_line(variable.description or "")
+    unit, said = inspected.component.unit_name(variable.name) or "-", one_line(variable.description or "")
     remark = f"  # [{one_line(unit)}] {said}".rstrip()
     value = declared_start(variable)
     if value is None:
         kind = f"{variable.type} array" if variable.shape else str(variable.type)
         return f"# {entry(variable.name, 0.0).rpartition(' = ')[0]} = ...{remark} ({kind})"
     try:
-        start_values(look.component, {variable.name: value})
+        start_values(inspected.component, {variable.name: value})
     except CosimError as error:
         return (
             f"# {entry(variable.name, value)}{remark} - its own start value does not fit it: "
@@ -158,22 +158,22 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     """
     _check_observer(observer)
     path, target = Path(fmu), Path(target)
-    look = look_into(path)
+    inspected = inspect_fmu(path)
     place = relative(path, target.parent)
     written = move_file(observer or DEFAULT_OBSERVER, lambda file: relative(file, target.parent))
-    roles, beside = plant_roles(look), observer or DEFAULT_OBSERVER
-    if is_observer(look):
-        kind, values = "observer", _observer_beside(look, observer_roles(look))
+    roles, beside = plant_roles(inspected), observer or DEFAULT_OBSERVER
+    if is_observer(inspected):
+        kind, values = "observer", _observer_beside(inspected, observer_roles(inspected))
     elif roles.is_train:
         kind, values = (
             "train",
-            train(look, roles, beside, written),
+            train(inspected, roles, beside, written),
         )
     else:
-        kind, values = "alone", alone(look)
-    known = {"look": look, "fmu": place, "target": target.name, "about": _about(look), "listed": LISTED}
+        kind, values = "alone", alone(inspected)
+    known = {"look": inspected, "fmu": place, "target": target.name, "about": _about(inspected), "listed": LISTED}
     text = _render(kind, guesses=kind != "alone", **known, **values)
-    return Starter(text, kind, list(_remarks(look, kind, roles, observer)))
+    return Starter(text, kind, list(_remarks(inspected, kind, roles, observer)))
 
 
 def write_starter(fmu: str | Path, target: str | Path, observer: str | None = None, *, force: bool = False) -> Starter:
@@ -237,16 +237,16 @@ def _listens(name: str) -> bool:
         return False
 
 
-def _about(look: Look) -> str:
+def _about(inspected: InspectedFmu) -> str:
     """What the FMU is, on one line."""
-    description = look.description
-    about = f"{one_line(look.path.name)}: {one_line(str(description.modelName))}, FMI {description.fmiVersion}"
+    description = inspected.description
+    about = f"{one_line(inspected.path.name)}: {one_line(str(description.modelName))}, FMI {description.fmiVersion}"
     return about + (f", made with {one_line(description.generationTool)}" if description.generationTool else "")
 
 
-def _remarks(look: Look, kind: str, roles: PlantRoles, observer: str | None) -> Iterator[str]:
-    if not look.runs_here:
-        yield f"{look.path.name} has no library for this platform: the scenario will not run here."
+def _remarks(inspected: InspectedFmu, kind: str, roles: PlantRoles, observer: str | None) -> Iterator[str]:
+    if not inspected.runs_here:
+        yield f"{inspected.path.name} has no library for this platform: the scenario will not run here."
     if kind == "alone":
         yield "Nothing in the FMU looks like the position or speed of a train: the scenario runs it alone."
     if kind != "train" and observer is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.starter.guess import Guess, Quantity, guess
-from cosim.starter.look import Look
+from cosim.starter.inspected_fmu import InspectedFmu
 
 
 @dataclass(frozen=True)
@@ -43,53 +43,55 @@ class ObserverRoles:
     odometer: Guess | None
 
 
-def plant_roles(look: Look) -> PlantRoles:
+def plant_roles(inspected: InspectedFmu) -> PlantRoles:
     """Guesses for an FMU as a plant.
 
     Args:
-        look: what the FMU says of itself.
+        inspected: what the FMU says of itself.
     """
-    wheel = _seen("wheel_speed", look)
+    wheel = _seen("wheel_speed", inspected)
     taken = [] if wheel is None else [wheel.signal.name]
-    effort = guess("effort", look.inputs)
-    speed = _seen("speed", look, taken)
+    effort = guess("effort", inspected.inputs)
+    speed = _seen("speed", inspected, taken)
     part = "" if speed is None else speed.signal.name.rpartition(".")[0]
     return PlantRoles(
-        position=_seen("position", look, part=part),
+        position=_seen("position", inspected, part=part),
         speed=speed,
         wheel_speed=wheel,
         effort=effort,
-        applied=None if effort is not None else guess("effort", look.outputs),
-        slip=guess("slip", look.outputs),
-        adhesion=guess("adhesion_force", look.outputs),
-        mass=guess("mass", look.parameters),
+        applied=None if effort is not None else guess("effort", inspected.outputs),
+        slip=guess("slip", inspected.outputs),
+        adhesion=guess("adhesion_force", inspected.outputs),
+        mass=guess("mass", inspected.parameters),
     )
 
 
-def _seen(quantity: Quantity, look: Look, taken: Sequence[str] = (), part: str = "") -> Guess | None:
+def _seen(quantity: Quantity, inspected: InspectedFmu, taken: Sequence[str] = (), part: str = "") -> Guess | None:
     """A guess among the outputs or, where none fits, among the local variables: sealed FMUs hide what others need."""
-    found = guess(quantity, look.outputs, taken, part)
+    found = guess(quantity, inspected.outputs, taken, part)
     if found is not None and found.sureness != "a guess":
         return found
-    hidden = guess(quantity, [s for s in look.hidden if s.meaning is not None], taken, part)
+    hidden = guess(quantity, [s for s in inspected.hidden if s.meaning is not None], taken, part)
     if hidden is None or hidden.sureness == "a guess":
         return found
     return replace(hidden, reason=f"{hidden.reason}; a local variable, read like an output")
 
 
-def is_observer(look: Look) -> bool:
+def is_observer(inspected: InspectedFmu) -> bool:
     """Whether the FMU is notified of balises, as observers are.
 
     Args:
-        look: what the FMU says of itself.
+        inspected: what the FMU says of itself.
     """
-    return BALISE_EVENT in look.component.events
+    return BALISE_EVENT in inspected.component.events
 
 
-def observer_roles(look: Look) -> ObserverRoles:
+def observer_roles(inspected: InspectedFmu) -> ObserverRoles:
     """Guesses for an FMU as an observer: its odometer may be called that, or just speed.
 
     Args:
-        look: what the FMU says of itself.
+        inspected: what the FMU says of itself.
     """
-    return ObserverRoles(guess("effort", look.inputs), guess("wheel_speed", look.inputs) or guess("speed", look.inputs))
+    return ObserverRoles(
+        guess("effort", inspected.inputs), guess("wheel_speed", inspected.inputs) or guess("speed", inspected.inputs)
+    )

@@ -8,7 +8,7 @@ from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import step_count
 from cosim.starter.guess import Guess, fits
-from cosim.starter.look import Look, number
+from cosim.starter.inspected_fmu import InspectedFmu, number
 from cosim.starter.starter_roles import PlantRoles
 from cosim.starter.toml_lines import GuessedLink, guessed, one_line
 from fmus.fmi.capabilities import read_capabilities
@@ -23,30 +23,30 @@ unstable.
 """
 
 
-def train(look: Look, roles: PlantRoles, observer: str, place: str) -> dict[str, Any]:
+def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str) -> dict[str, Any]:
     """What the template of this starter inserts.
 
     Args:
-        look: what the FMU says.
+        inspected: what the FMU says.
         roles: what its signals were guessed to be.
         observer: name of the observer, or ``file.py:Class``. place: the same as the scenario file says it.
 
     Returns:
         Values by name.
     """
-    stop, step, source = train_times(look)
+    stop, step, source = train_times(inspected)
     declared = declared_observer(observer)
     driven = roles.effort.signal.name if roles.effort else None
     needed = {"position": roles.position, "speed": roles.speed}
     return {
-        "title": f"{one_line(look.path.name)} beside one observer",
+        "title": f"{one_line(inspected.path.name)} beside one observer",
         "stop": stop,
         "step": step,
         "source": source,
         "links": _links(roles),
         "roles": roles,
-        "others": [s for s in look.inputs if s.name != driven],
-        "settings": [s for s in look.parameters if s.start is not None and not s.name.endswith("]")],
+        "others": [s for s in inspected.inputs if s.name != driven],
+        "settings": [s for s in inspected.parameters if s.start is not None and not s.name.endswith("]")],
         "observer": place,
         "preset": PRESETS.get(observer),
         "known": {s.name: s.start for s in (*declared.parameter_signals, *getattr(declared, "states", ()))},
@@ -66,17 +66,17 @@ def declared_observer(name: str) -> Any:
     return make_declared(ComponentTable.model_validate({"observer": name}), "observer")
 
 
-def train_times(look: Look) -> tuple[float, float, str]:
+def train_times(inspected: InspectedFmu) -> tuple[float, float, str]:
     """When the run stops and how long its steps are: the FMU's own where it names one to communicate at.
 
     Args:
-        look: what the FMU says.
+        inspected: what the FMU says.
 
     Returns:
         Stop and step [s], and where the step comes from.
     """
-    fixed = read_capabilities(look.description).fixedInternalStepSize
-    advised = look.description.defaultExperiment
+    fixed = read_capabilities(inspected.description).fixedInternalStepSize
+    advised = inspected.description.defaultExperiment
     for length, source in (
         (fixed, "the FMU's own step"),
         (number(advised.stepSize) if advised else None, "from the FMU's default experiment"),

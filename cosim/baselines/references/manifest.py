@@ -251,8 +251,8 @@ def experiments_text(experiment: Experiment) -> bytes:
     """
     root = etree.Element("Experiments", name=experiment.name, description=experiment.description)
     times = (experiment.start, experiment.stop, experiment.step)
-    given = {key: repr(value) for key, value in zip(TIMES, times, strict=True) if value is not None}
-    node = etree.SubElement(root, "Experiment", name=experiment.name, description=experiment.description, **given)
+    instants = {key: repr(value) for key, value in zip(TIMES, times, strict=True) if value is not None}
+    node = etree.SubElement(root, "Experiment", name=experiment.name, description=experiment.description, **instants)
     files = (experiment.parameters, experiment.stimuli, experiment.references)
     for tag, member in zip(("Parameters", "Stimuli", "References"), files, strict=True):
         if member:

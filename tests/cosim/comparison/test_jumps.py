@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_results import compared, kinds, made, signal
 
-from cosim.comparison.curve import Curve, looks_held
+from cosim.comparison.curve import Curve, is_held
 from cosim.comparison.jumps import Jumps, find_jumps, shifts
 from cosim.comparison.points import UNMATCHED, _match_jumps
 from cosim.comparison.tolerance import Tolerance
@@ -59,10 +59,10 @@ def test_jumps_of_the_three_kinds() -> None:
 
 
 def test_indicators_are_held() -> None:
-    assert looks_held(step_at(100, 1.0) + 1.0)
-    assert not looks_held(step_at(100, 0.5))
-    assert not looks_held(np.arange(10.0))
-    assert not looks_held(np.append(np.zeros(100), np.arange(40.0)))
+    assert is_held(step_at(100, 1.0) + 1.0)
+    assert not is_held(step_at(100, 0.5))
+    assert not is_held(np.arange(10.0))
+    assert not is_held(np.append(np.zeros(100), np.arange(40.0)))
 
 
 def jumps_at(times: list[float], before: list[float], after: list[float]) -> Jumps:

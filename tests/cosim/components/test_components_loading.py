@@ -19,7 +19,7 @@ from cosim.components.description import read_description
 from cosim.components.loading import load_fmu
 from cosim.components.unpacking import forget_all
 from cosim.errors import FmuLoadError
-from cosim.starter.look import look_into
+from cosim.starter.inspected_fmu import inspect_fmu
 from fmus.cli import main as fmus_main
 from fmus.fmu_report import describe_file
 
@@ -117,7 +117,7 @@ def test_a_library_under_another_name_is_named(tmp_path: Path, version: str, cap
     refused(path, words)
     assert cosim_main(["info", str(path)]) == 0
     assert re.search(rf"runs here +no, .*{words}", capfd.readouterr().out)
-    assert not look_into(path).runs_here
+    assert not inspect_fmu(path).runs_here
     if version == "1.0":
         return
     assert re.search(rf"this machine .*: no, .*{words}", "\n".join(f"{k}: {v}" for k, v in describe_file(path).items()))

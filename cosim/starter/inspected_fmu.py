@@ -1,4 +1,4 @@
-"""A look into an FMU: its variables as signals to guess from. Reads the model description; nothing is unpacked or
+"""An FMU inspected: its variables as signals to guess from. Reads the model description; nothing is unpacked or
 executed.
 """
 
@@ -22,11 +22,11 @@ from plant_models.hybrid.units import UnitError
 
 NAME = "fmu"
 _LARGEST_ARRAY = 16
-"""Elements of longer arrays are not looked at one by one."""
+"""Elements of longer arrays are not inspected one by one."""
 
 
 @dataclass(frozen=True)
-class Look:
+class InspectedFmu:
     """What an FMU says of itself.
 
     Args:
@@ -52,8 +52,8 @@ class Look:
         return self.component.description
 
 
-def look_into(path: Path) -> Look:
-    """Look into an FMU.
+def inspect_fmu(path: Path) -> InspectedFmu:
+    """Inspect an FMU.
 
     Args:
         path: of the FMU.
@@ -74,7 +74,9 @@ def look_into(path: Path) -> Look:
         if not signals and variable.causality in ("input", "output"):
             unread.append(_unread(variable))
     here = runs_here(path) == "yes"
-    return Look(path, component, found["input"], found["output"], found["parameter"], found["local"], unread, here)
+    return InspectedFmu(
+        path, component, found["input"], found["output"], found["parameter"], found["local"], unread, here
+    )
 
 
 def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
