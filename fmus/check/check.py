@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, Finding, Verdict
+from fmus.check.findings import CheckOutcome, Finding, Verdict, skipped
 from fmus.fmi.standard import CO_SIMULATION
 
 NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
@@ -25,6 +25,10 @@ SLOW = "it hangs or is slow there: a longer --timeout tells which"
 MISSING = "do not use the capabilities whose functions are missing"
 NO_REDOING = "do not redo steps: the master finds crossings by shorter steps or interpolation, and iterates nothing"
 FIXED_STEP = "keep to one communication step; an event inside it can only be interpolated"
+VARIABLE_STEP, STATES = ("canHandleVariableCommunicationStepSize",), ("canGetAndSetFMUstate",)
+BYTES, DERIVATIVES = ("canSerializeFMUstate", *STATES), ("providesDirectionalDerivative",)
+"""Capabilities that checks need."""
+
 NO_BYTES = "do not store its states or take them to another instance"
 
 
@@ -37,7 +41,8 @@ class Check(ABC):
         failing: what a failure means. advice: what to do then.
         basis: where it is distrusted, the FMU cannot be run at all and the rest is skipped.
         compares: compares two runs, which says nothing where equal runs differ anyway.
-        interface: that it is about. place: when it is made, from small to large.
+        declares: capabilities, as fmpy calls them, without which it is skipped. several: it needs several instances
+            in one process. interface: that it is about. place: when it is made, from small to large.
     """
 
     name: ClassVar[str]
@@ -45,6 +50,8 @@ class Check(ABC):
     advice: ClassVar[str] = ""
     basis: ClassVar[bool] = False
     compares: ClassVar[bool] = False
+    declares: ClassVar[tuple[str, ...]] = ()
+    several: ClassVar[bool] = False
     interface: ClassVar[str] = CO_SIMULATION
     place: ClassVar[float] = 100.0
 
@@ -66,6 +73,20 @@ class Check(ABC):
         Raises:
             SlaveError: the FMU refuses or throws, which is a failure.
         """
+
+    @classmethod
+    def outcome(cls, context: Context) -> CheckOutcome:
+        """What `run` says, where the FMU declares what it needs.
+
+        Args:
+            context: the FMU, and what was seen of it so far.
+        """
+        if cls.several and context.only_once:
+            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+        for capability in cls.declares:
+            if not getattr(getattr(context.description, cls.interface), capability):
+                return skipped(f"does not declare {capability}")
+        return cls.run(context)
 
     @classmethod
     def finding(cls, outcome: CheckOutcome) -> Finding:

@@ -188,11 +188,8 @@ def _drift(runner: Runner) -> np.ndarray:
         component.tolerance = _FINER * (component.tolerance or solver_tolerance(runner))
         return component
 
-    other = runner.twin(make)
-    try:
+    with runner.twin(make) as other:
         other.begin()
         fine = np.array(other.steps(pattern))
-    finally:
-        other.put_away()
     elapsed = runner.h * np.arange(1, _DRIFT_STEPS + 1)[:, None]
     return np.asarray(np.max((np.abs(coarse - fine) / elapsed)[_DRIFT_STEPS // 2 :], axis=0))

@@ -79,6 +79,12 @@ class Runner:
         self.component.terminate()
         self.component.free()
 
+    def __enter__(self) -> Runner:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.put_away()
+
     @property
     def output_names(self) -> list[str]:
         """Names of the outputs, elements of arrays included; where there are none, of the first local variables."""

@@ -104,7 +104,7 @@ def unrun(name: str, basis: str) -> Finding:
 def _outcome(check: type[Check], context: Context) -> CheckOutcome:
     """What a check says; what an FMU raises is its failure, what a mistake in the check raises is the check's own."""
     try:
-        outcome = check.run(context)
+        outcome = check.outcome(context)
         if not isinstance(outcome, CheckOutcome):
             raise TypeError(f"run() returned {type(outcome).__name__}; expected a CheckOutcome")
         return outcome

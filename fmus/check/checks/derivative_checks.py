@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmus.check.check import LIMIT, Check
+from fmus.check.check import DERIVATIVES, LIMIT, Check
 from fmus.check.checks.life_checks import real_names
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, skipped
@@ -14,15 +14,15 @@ from fmus.check.finite_differences import compare, nominal_of
 from fmus.check.runner import WARM_UP_STEPS
 
 
-class DirectionalDerivativesCheck(Check, failing=LIMIT, advice="do not use its derivatives", place=18):
+class DirectionalDerivativesCheck(
+    Check, failing=LIMIT, advice="do not use its derivatives", place=18, declares=DERIVATIVES
+):
     """Directional derivatives of the outputs along the inputs between two steps."""
 
     name = "directional derivatives"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if not context.description.coSimulation.providesDirectionalDerivative:
-            return skipped("does not declare providesDirectionalDerivative")
         runner = context.runner
         runner.begin()
         runner.steps((runner.h,) * WARM_UP_STEPS)

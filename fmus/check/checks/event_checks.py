@@ -29,16 +29,13 @@ def _no_event_mode(clocks: Sequence[str]) -> CheckOutcome:
 
 def _clocks(context: Context, clocks: Sequence[str]) -> CheckOutcome:
     """Each clock ticks once, with the values its inputs have."""
-    runner = context.fresh_runner()
-    try:
+    with context.fresh_runner() as runner:
         runner.begin()
         for clock in clocks:
             runner.steps((runner.h,))
             assert isinstance(runner.component, FMI3Slave)
             runner.component.activate(clock)
         rows = runner.steps((runner.h,) * WARM_UP_STEPS)
-    finally:
-        runner.put_away()
     bad = not_finite(runner.output_names, np.sum(rows, axis=0), runner.component.variables)
     if bad:
         return limited(f"not finite after a tick with the start values of its inputs: {listed(bad)}", PAYLOAD)

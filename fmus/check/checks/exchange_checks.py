@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from fmus.check.check import DISTRUST, LIMIT, Check
+from fmus.check.check import DERIVATIVES, DISTRUST, LIMIT, STATES, Check
 from fmus.check.checks.life_checks import ExportedSymbolsCheck, LoadingCheck, by, listed, not_finite, real_names
 from fmus.check.context import Context
 from fmus.check.exchange_model import FmuModel
@@ -171,7 +171,12 @@ class ModelExchangeResetAndReRunCheck(
 
 
 class ModelExchangeStateRoundTripCheck(
-    Check, failing=LIMIT, advice="do not rely on saved states", interface=MODEL_EXCHANGE, place=7
+    Check,
+    failing=LIMIT,
+    advice="do not rely on saved states",
+    interface=MODEL_EXCHANGE,
+    place=7,
+    declares=STATES,
 ):
     """Save, integrate on, restore, integrate again: bit-identical."""
 
@@ -180,8 +185,6 @@ class ModelExchangeStateRoundTripCheck(
     @staticmethod
     def run(context: Context) -> CheckOutcome:
         with started(context) as model:
-            if not model.can_save:
-                return skipped("does not declare canGetAndSetFMUstate")
             if not model.state_count:
                 return skipped(_NO_STATES)
             state = model.save()
@@ -195,7 +198,12 @@ class ModelExchangeStateRoundTripCheck(
 
 
 class ModelExchangeDirectionalDerivativesCheck(
-    Check, failing=LIMIT, advice="do not use its derivatives", interface=MODEL_EXCHANGE, place=8
+    Check,
+    failing=LIMIT,
+    advice="do not use its derivatives",
+    interface=MODEL_EXCHANGE,
+    place=8,
+    declares=DERIVATIVES,
 ):
     """Directional derivatives of derivatives and outputs along states and inputs."""
 
@@ -203,8 +211,6 @@ class ModelExchangeDirectionalDerivativesCheck(
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if not context.description.modelExchange.providesDirectionalDerivative:
-            return skipped("does not declare providesDirectionalDerivative")
         with started(context) as model:
             found = [(u.variable, getattr(u.variable, "derivative", None)) for u in model.description.derivatives]
             scalar = [(rate.name, of.name) for rate, of in found if of is not None and not rate.shape]

@@ -62,19 +62,17 @@ def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | No
     return passed(f"{last[0]} instances, {', '.join(said)}")
 
 
-class TwoInstancesCheck(Check, failing=LIMIT, advice=ONE_INSTANCE, compares=True, place=14):
+class TwoInstancesCheck(Check, failing=LIMIT, advice=ONE_INSTANCE, compares=True, place=14, several=True):
     """Two instances at once, under different inputs, step by step in turn: the first one must not notice."""
 
     name = "two instances"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if context.only_once:
-            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
-        runner, other = context.runner, context.fresh_runner()
-        runner.begin()
-        alone = runner.steps((runner.h,) * (2 * WARM_UP_STEPS))
-        try:
+        with context.fresh_runner() as other:
+            runner = context.runner
+            runner.begin()
+            alone = runner.steps((runner.h,) * (2 * WARM_UP_STEPS))
             runner.begin()
             other.begin()
             other.set_inputs(elsewhere(runner.amplitude))
@@ -82,22 +80,20 @@ class TwoInstancesCheck(Check, failing=LIMIT, advice=ONE_INSTANCE, compares=True
             for _ in alone:
                 other.steps((runner.h,))
                 beside += runner.steps((runner.h,))
-        finally:
-            other.put_away()
         return compared(
             runner, (alone, beside), "beside a second instance", "a second instance changes nothing in the first"
         )
 
 
-class RepeatedInstantiationCheck(Check, failing=LIMIT, advice="do not make many instances in one process", place=15):
+class RepeatedInstantiationCheck(
+    Check, failing=LIMIT, advice="do not make many instances in one process", place=15, several=True
+):
     """Many instances, one after the other: memory and open files must not grow."""
 
     name = "repeated instantiation"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if context.only_once:
-            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         slave = context.slave()
         since, marks = perf_counter(), []
         try:

@@ -15,7 +15,7 @@ from fmus.check.behaviour import difference, repeatable
 from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
 from fmus.check.checked_instance import SlaveError
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, Verdict, failed, limited, noted, passed, skipped
+from fmus.check.findings import CheckOutcome, Verdict, failed, limited, noted, passed
 from fmus.check.runner import SLOW_STEPS, WARM_UP_STEPS, Runner
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import functions_of_capabilities
@@ -165,11 +165,8 @@ class InitialiseCheck(Check, failing=DISTRUST, advice="give start values, if it 
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        runner = context.quiet_runner()
-        try:
+        with context.quiet_runner() as runner:
             runner.begin(excited=False)
-        finally:
-            runner.put_away()
         return passed("instantiates, initialises, terminates and is freed")
 
 
@@ -182,15 +179,12 @@ class ValuesAtStartCheck(
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        runner = context.quiet_runner()
-        try:
+        with context.quiet_runner() as runner:
             runner.begin(excited=False)
             slave = runner.component
             outputs, locals_ = slave.names("output"), slave.names("local")
             bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
             bad_locals = not_finite(locals_, slave.read(locals_))
-        finally:
-            runner.put_away()
         if bad_outputs:
             return failed(f"not finite after initialisation: {listed(bad_outputs)}")
         if bad_locals:
@@ -205,15 +199,12 @@ class GettersCheck(Check, failing=LIMIT, advice="leave these variables out of co
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        runner = context.quiet_runner()
-        try:
+        with context.quiet_runner() as runner:
             runner.begin(excited=False)
             slave = runner.component
             own = [v for v in slave.description.modelVariables if v.alias is None]
             readable = [v for v in own if v.type != "Clock" and not v.clocks]
             problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
-        finally:
-            runner.put_away()
         left_out = len(own) - len(readable)
         note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
         if problems:
@@ -272,24 +263,19 @@ class ResetAndReRunCheck(Check, failing=LIMIT, advice="make a new instance for e
         return by(repeatable(context.runner), "the same run after a reset is identical")
 
 
-class LoggingCheck(Check, failing=LIMIT, advice="leave its logging off", compares=True, place=16):
+class LoggingCheck(Check, failing=LIMIT, advice="leave its logging off", compares=True, place=16, several=True):
     """The outputs must not depend on whether the FMU is asked to log."""
 
     name = "logging"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if context.only_once:
-            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         runner = context.runner
         runner.begin()
         quiet = runner.steps((runner.h,) * WARM_UP_STEPS)
-        talking = runner.twin(lambda: context.slave(logging=True))
-        try:
+        with runner.twin(lambda: context.slave(logging=True)) as talking:
             talking.begin()
             loud = talking.steps((runner.h,) * WARM_UP_STEPS)
-        finally:
-            talking.put_away()
         return compared(runner, (quiet, loud), "with logging on", "logging changes no output")
 
 

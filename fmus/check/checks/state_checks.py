@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from fmus.check.behaviour import again, continuation, difference, go_elsewhere
-from fmus.check.check import LIMIT, NO_BYTES, NO_REDOING, Check
+from fmus.check.check import BYTES, LIMIT, NO_BYTES, NO_REDOING, STATES, Check
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, failed, limited, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, limited, passed
 from fmus.check.restoring import near, restoring
 from fmus.check.runner import WARM_UP_STEPS
 from fmus.fmi.slave import Slave
 
-_NO_STATE = "does not declare canGetAndSetFMUstate"
 WITHIN = "steps may be redone, and what is redone differs by as much; the master tells it in its bounds"
-_NOT_SERIALISED = "does not declare canSerializeFMUstate"
 
 
 def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
     runner = context.runner
-    slave = runner.component
-    if not slave.can_save or not slave.capabilities.canSerializeFMUState:
-        return skipped(_NOT_SERIALISED)
     path = continuation(runner)
     runner.begin()
     runner.steps((runner.h,) * WARM_UP_STEPS)
@@ -61,15 +56,13 @@ def _restore(slave: Slave, content: bytes) -> None:
         slave.release(state)
 
 
-class StateRoundTripCheck(Check, failing=LIMIT, advice=NO_REDOING, compares=True, place=11):
+class StateRoundTripCheck(Check, failing=LIMIT, advice=NO_REDOING, compares=True, place=11, declares=STATES):
     """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else."""
 
     name = "state round trip"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if not context.runner.component.can_save:
-            return skipped(_NO_STATE)
         found = restoring(context.runner)
         if found.restores == "exact":
             return passed("what follows a restored state is identical, bit for bit")
@@ -80,7 +73,7 @@ class StateRoundTripCheck(Check, failing=LIMIT, advice=NO_REDOING, compares=True
         return failed(f"not restored: {found.problem}")
 
 
-class SerialisedStateCheck(Check, failing=LIMIT, advice=NO_BYTES, compares=True, place=12):
+class SerialisedStateCheck(Check, failing=LIMIT, advice=NO_BYTES, compares=True, place=12, declares=BYTES):
     """The same through bytes, in the same instance."""
 
     name = "serialised state"
@@ -90,13 +83,13 @@ class SerialisedStateCheck(Check, failing=LIMIT, advice=NO_BYTES, compares=True,
         return _through_bytes(context, elsewhere=False)
 
 
-class StateInAnotherInstanceCheck(Check, failing=LIMIT, advice=NO_BYTES, compares=True, place=13):
+class StateInAnotherInstanceCheck(
+    Check, failing=LIMIT, advice=NO_BYTES, compares=True, place=13, several=True, declares=BYTES
+):
     """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from."""
 
     name = "state in another instance"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if context.only_once:
-            return skipped("declares canBeInstantiatedOnlyOncePerProcess")
         return _through_bytes(context, elsewhere=True)

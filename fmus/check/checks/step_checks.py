@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from fmus.check.behaviour import divided_steps, short_step
-from fmus.check.check import FIXED_STEP, LIMIT, NOTE, Check
+from fmus.check.check import FIXED_STEP, LIMIT, NOTE, VARIABLE_STEP, Check
 from fmus.check.checks.life_checks import by, listed, not_finite
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, failed, noted, passed, skipped
+from fmus.check.findings import CheckOutcome, failed, noted, passed
 from fmus.fmi.slave import RawStep
 
 SCALES = (1.0, 0.37, 3.0)
@@ -18,7 +18,6 @@ TINY = 1e-9
 HUGE = 1000.0
 _BEFORE = 3
 """Ordinary steps before an odd one."""
-_NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
 
 
 _Evaluate = Callable[[str, bool, str], CheckOutcome]
@@ -31,8 +30,7 @@ def _odd(
     shift: Callable[[float], float] = lambda _h: 0.0,
 ) -> CheckOutcome:
     """One odd step on an instance of its own after three ordinary ones; its outcome is evaluated."""
-    runner = context.fresh_runner()
-    try:
+    with context.fresh_runner() as runner:
         runner.begin()
         before = runner.steps((runner.h,) * _BEFORE)[-1]
         slave = runner.component
@@ -45,8 +43,6 @@ def _odd(
         moved = not np.array_equal(before, after, equal_nan=True)
         what = f"a step of {size(runner.h):g} s" + (f" from {shift(runner.h):g} s too late" if shift(runner.h) else "")
         return evaluate(what, moved, listed(bad))
-    finally:
-        runner.put_away()
 
 
 def _refusal(said: RawStep) -> CheckOutcome:
@@ -72,7 +68,7 @@ def _must_refuse(what: str, moved: bool, bad: str) -> CheckOutcome:
     return noted(f"accepts {what} instead of refusing it; {effect}")
 
 
-class DividedStepsCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, place=9):
+class DividedStepsCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, place=9, declares=VARIABLE_STEP):
     """A step of h against 2 x h/2 and an uneven split, for several h."""
 
     name = "divided steps"
@@ -80,8 +76,6 @@ class DividedStepsCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
         runner = context.runner
-        if not runner.component.can_vary_step:
-            return skipped(_NO_VARIABLE_STEP)
         for scale in SCALES:
             problem = divided_steps(runner, scale)
             if problem:
@@ -89,27 +83,25 @@ class DividedStepsCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, 
         return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * runner.h:g}' for s in SCALES)} s")
 
 
-class ShortStepCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, place=10):
+class ShortStepCheck(Check, failing=LIMIT, advice=FIXED_STEP, compares=True, place=10, declares=VARIABLE_STEP):
     """The first change after a short step."""
 
     name = "short step"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if not context.runner.component.can_vary_step:
-            return skipped(_NO_VARIABLE_STEP)
         return by(short_step(context.runner), "tiny steps after a short one move the outputs by their share")
 
 
-class TinyStepCheck(Check, failing=LIMIT, advice="use no step far below its communication step", place=19):
+class TinyStepCheck(
+    Check, failing=LIMIT, advice="use no step far below its communication step", place=19, declares=VARIABLE_STEP
+):
     """A step of a billionth of a second."""
 
     name = "tiny step"
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        if not context.runner.component.can_vary_step:
-            return skipped(_NO_VARIABLE_STEP)
         return _odd(context, lambda _h: TINY, _done_or_refused)
 
 
