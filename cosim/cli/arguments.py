@@ -13,7 +13,6 @@ OVERRIDES = (
     "others win over case"
 )
 QUIET = argument("--quiet", action="store_true", help="no progress bar")
-JSON_NOT_TABLE = argument("--json", action="store_true", help="print the data as JSON instead of the table")
 PARAMETERS_FILE = argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
 
 

@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
 from cosim.errors import OutputError
 from fmus.plain import plain
-from fmus.tables.plain_data import jsonable
-
-
-def print_json(data: Any) -> None:
-    """Print plain data as JSON; NaN becomes null.
-
-    Args:
-        data: what to print.
-    """
-    print(json.dumps(jsonable(data), indent=2))
 
 
 def print_notice(text: str) -> None:

@@ -150,8 +150,7 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
 def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None) -> None:
     _add_arguments(parser, arguments)
     if execute is not None:
-        if "--json" not in parser.format_help():
-            parser.add_argument("--json", action="store_true", help="print the data as JSON instead of text")
+        parser.add_argument("--json", action="store_true", help="print the data as JSON instead of text")
         parser.set_defaults(execute=execute)
 
 
@@ -187,7 +186,7 @@ class Program:
             self.parser(words).parse_args(words, options)
             with self.within():
                 output: Output = options.execute(options)
-                code = output if isinstance(output, int) else output.show(self.name, as_json=options.json)
+                code = output.show(self.name, as_json=options.json)
             sys.stdout.flush()
             return code
         except BrokenPipeError:  # whoever read has seen enough, as `head` does
