@@ -19,7 +19,7 @@ from fmus.content.names import check_names
 from fmus.content.resources import resource_files
 from fmus.content.xml import build_description_xml, model_description_xml
 from fmus.documentation.page import documentation_files
-from fmus.pack import check_target, pack_fmu
+from fmus.pack import check_target, fmu_path, pack_fmu
 from fmus.toolchain.compile import header_folder
 from fmus.toolchain.platforms import HOST, Platform, binary_files
 from fmus.toolchain.targets import Progress, Target, choose_targets, compile_targets
@@ -121,18 +121,12 @@ def build_fmu(
         CompilationError: the compiler refused the sources.
         OSError: the target cannot be written.
     """
-    path = fmu_path(system, target)
+    path = fmu_path(system.name, target)
     check_names(system)
     check_target(path)
     targets = choose_targets(platforms)
     draft = BuildDraft.of(plan_fmu(system, fmi_version, preset, protocol), targets)
     return draft.pack(draft.compile(progress), path)
-
-
-def fmu_path(system: HybridSystem, target: Path | str) -> Path:
-    """Where the FMU of a system goes: `target` itself where it ends in ``.fmu``, else into that folder."""
-    path = Path(target)
-    return path if path.suffix.lower() == ".fmu" else path / f"{system.name}.fmu"
 
 
 @dataclass(frozen=True)

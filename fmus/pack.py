@@ -13,6 +13,12 @@ _TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Of every file in an FMU: the earliest a zip file can hold."""
 
 
+def fmu_path(name: str, target: Path | str) -> Path:
+    """Where an FMU goes: `target` itself where it ends in ``.fmu``, else the file of this name in that folder."""
+    path = Path(target)
+    return path if path.suffix.lower() == ".fmu" else path / f"{name}.fmu"
+
+
 def check_target(target: Path) -> None:
     """Find out before the work whether an FMU can be written; changes nothing.
 

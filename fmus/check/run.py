@@ -116,18 +116,29 @@ def check_fmu(
     begin = perf_counter()
     archive = open_archive(Path(path))
     archive.demand_this_platform()
-    description = archive.description
-    size = _default_step(description) if step is None else step
-    if not 0.0 < size < math.inf or not 0.0 < timeout < math.inf:
-        raise ValueError(
-            f"The communication step ({size:g} s) and the time limit ({timeout:g} s) must be positive and finite."
-        )
-    chosen = dict(starts or {})
-    _demand_settable(description, chosen)
-    count = _steps(description, size, steps, until)
-    job = Job("", "", (), size, _start_time(description), timeout, count, chosen)
+    size = _default_step(archive.description) if step is None else step
+    job = _job(archive.description, size, dict(starts or {}), timeout, steps, until)
     found = _merged([*_static_findings(archive, progress), *_run_findings(archive, job, progress)])
-    return CheckReport(archive, size, chosen, found, tuple(what_to_trust(found)), perf_counter() - begin, count)
+    seconds = perf_counter() - begin
+    return CheckReport(archive, size, job.starts, found, tuple(what_to_trust(found)), seconds, job.steps)
+
+
+def _job(
+    description: ModelDescription,
+    step: float,
+    starts: dict[str, float],
+    timeout: float,
+    steps: int | None,
+    until: float | None,
+) -> Job:
+    """What is the same for all interfaces, of arguments that `check_fmu` was given."""
+    if not 0.0 < step < math.inf or not 0.0 < timeout < math.inf:
+        raise ValueError(
+            f"The communication step ({step:g} s) and the time limit ({timeout:g} s) must be positive and finite."
+        )
+    _demand_settable(description, starts)
+    count = _steps(description, step, steps, until)
+    return Job("", "", (), step, _start_time(description), timeout, count, starts)
 
 
 def _static_findings(archive: Archive, progress: Callable[[str], None]) -> Iterator[Finding]:

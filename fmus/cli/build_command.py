@@ -13,14 +13,14 @@ from typing import Any, Literal
 
 from fmu_observer import OBSERVERS
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
-from fmus.build import build_fmu, fmu_path
+from fmus.build import build_fmu
 from fmus.cli.commands import argument
 from fmus.cli.failures import EXPECTED
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
 from fmus.hosted import build_hosted_fmu
-from fmus.pack import check_target
+from fmus.pack import check_target, fmu_path
 from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
 from fmus.toolchain.targets import choose_targets
 from plant_models import PLANTS
@@ -92,7 +92,7 @@ def execute(options: argparse.Namespace) -> Output:
     jobs, protocol = _jobs(options), EventProtocol(options.events, options.late_policy)
     for job in jobs:
         protocol.counts(job.fmi_version)  # refuses clocks in FMI 2 before anything is built
-        check_target(fmu_path(job.system, job.target))
+        check_target(fmu_path(job.system.name, job.target))
     return _all_built(lambda: _native(jobs, protocol, options))
 
 

@@ -26,7 +26,7 @@ from fmus.documentation.page import render
 from fmus.hosted.host import HostError, make_hosted_block, package_version
 from fmus.hosted.hosted_licences import hosted_licences
 from fmus.hosted.source import HostedExportError, Model, Source, find_source
-from fmus.pack import check_target, pack_fmu
+from fmus.pack import check_target, fmu_path, pack_fmu
 from fmus.toolchain.compile import compile_library, find_compiler, library_name
 from fmus.toolchain.platforms import Platform, host_platform
 
@@ -86,17 +86,22 @@ def build_hosted_fmu(
     slave = f"hosted_{_digest(source, recipe)[:16]}"
     recipe["module"] = recipe["module"] if source.file is None else f"{slave}_model"
     resources = _resources(source, recipe, slave, library)
-    with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as name:
-        folder = Path(name)
-        _write(resources, folder)
-        description = _describe(recipe, folder, _digest(source, recipe))
-        _try_alone(folder, slave)
-    path = Path(target)
-    path = path if path.suffix.lower() == ".fmu" else path / f"{description.coSimulation.modelIdentifier}.fmu"
+    description = _tried(resources, recipe, slave, _digest(source, recipe))
+    path = fmu_path(description.coSimulation.modelIdentifier, target)
     check_target(path)
     content = {f"resources/{inner}": text for inner, text in resources.items()}
     content |= _papers(description, source)  # first: a text that XML cannot hold is refused before anything is compiled
     return pack_fmu(content | _front(description), path)
+
+
+def _tried(resources: Mapping[str, bytes], recipe: Mapping[str, Any], slave: str, digest: str) -> ModelDescription:
+    """The description of a model that has run in a process of its own, from the files that go into the FMU."""
+    with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as name:
+        folder = Path(name)
+        _write(resources, folder)
+        description = _describe(recipe, folder, digest)
+        _try_alone(folder, slave)
+    return description
 
 
 # -- parts of the file ------------------------------------------------------------------------------------------------
