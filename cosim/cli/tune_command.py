@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cosim.cli.arguments import QUIET, positive, scenario_arguments
+from cosim.cli.arguments import MANY_RUNS, QUIET, positive, scenario_arguments
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import check_writable
@@ -17,7 +17,7 @@ from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 
-DONE, _NOT_BETTER = 0, 1
+_DONE, _NOT_BETTER = 0, 1
 
 
 def _seeds(text: str) -> list[int]:
@@ -76,16 +76,19 @@ ARGUMENTS = (
     argument(
         "--searches", type=positive, default=1, metavar="N", help="searches, each with another seed of the method"
     ),
-    argument("--workers", type=positive, default=1, metavar="W", help="processes at a time (default: 1)"),
     argument("--out", metavar="DIR", help="folder for history and results (default: results/NAME_tuned)"),
-    argument("--resume", action="store_true", help="take over the evaluations that are in the folder already"),
+    *MANY_RUNS,
     argument("--whole-runs", action="store_true", help="run the whole scenario, also where a recording would do"),
     QUIET,
 )
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """Search and write, as the options ask."""
+    """What the search found, as it is written in the folder.
+
+    Raises:
+        CosimError: nothing can be tuned.
+    """
     scenario = load_scenario(options)
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"
@@ -95,7 +98,7 @@ def execute(options: argparse.Namespace) -> Output:
         found.parts(),
         found.to_data(),
         {"tuned": directory / "tuned.toml"},
-        _NOT_BETTER if found.judged and not found.gain.low > 0.0 else DONE,
+        code=_NOT_BETTER if found.judged and not found.gain.low > 0.0 else _DONE,
         error=KeyboardInterrupt() if found.interrupted else None,
     )
 
@@ -114,8 +117,10 @@ def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> 
             searches=options.searches,
             options=dict(parse_setting(text) for text in options.option),
             workers=options.workers,
+            scheduler=options.scheduler,
             directory=directory,
             resume=options.resume,
+            retry=options.retry,
             whole_runs=options.whole_runs,
             progress=bar,
         )

@@ -1,38 +1,35 @@
-"""Costs of candidates over seeds: run here or in worker processes, each written to a journal as soon as it is there,
-and taken from it where it stands there already.
-"""
+"""Costs of candidates over seeds: jobs of the one engine of runs, done as members of a batch where that can be."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from math import inf, isfinite, nan
+import pickle
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.errors import CosimError, RunError, ScenarioError
+from cosim.errors import RunError, ScenarioError
 from cosim.results.results_folder import write_results
-from cosim.run.outcome import INTERRUPTED, Outcome
-from cosim.runs.executors import make_executor
-from cosim.runs.job import Job
-from cosim.runs.journal import read_lines, write_line
+from cosim.run.outcome import Outcome
+from cosim.runs.engine import Done, run_jobs
+from cosim.runs.executors import Executor, make_executor
+from cosim.runs.job import Ended, Failure, Job
+from cosim.runs.journal import Journal
 from cosim.runs.keys import digest, table_content
+from cosim.runs.run import Run
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
 from cosim.tuning.parameters import Tunable
 from cosim.tuning.replays import Replays, make_replays
 from cosim.tuning.seeded_scenarios import Seeded
 
-JOURNAL = "evaluations.jsonl"
-EARLIER = "evaluations.earlier.jsonl"
-"""Those of the search before, which was not resumed."""
-ROWS = 500
-"""Of a run, for the directions that change nothing: so many tell enough."""
+_ROWS = 500
+"""Of a run, for the directions that change nothing: so many show enough."""
 
 
 @dataclass(frozen=True)
@@ -40,50 +37,73 @@ class Evaluated:
     """The cost of one candidate with one seed.
 
     Args:
-        cost: infinite where the run failed. failure: why, or None. estimates: of the observer at some instants, in
-            units of their own sizes, where they were asked for.
-        unreadable: whether a run that ended does not show the cost: no other candidate will.
+        cost: infinite where the run failed, or shows no finite one. why: the reason for that, or None.
+        instant: from when on something is no finite number [s]; None where that is not the reason.
+        signals: that the cost depends on, at some instants, in units of their own sizes, where they were asked for.
+        missing: what a run that ended does not show, although the cost needs it: no other candidate will.
     """
 
-    cost: float
-    failure: str | None = None
-    estimates: np.ndarray | None = None
-    unreadable: bool = False
+    cost: float = inf
+    why: str | None = None
+    instant: float | None = None
+    signals: Sequence[float] | None = None
+    missing: str | None = None
 
 
 @dataclass(frozen=True)
-class _Job(Job):
-    """One run: recorded to a folder, or judged."""
+class _Evaluate:
+    """What is taken of the outcome of a candidate.
 
-    scenario: Scenario
-    settings: Mapping[str, Any]
-    cost: Cost | None = None
-    folder: Path | None = None
-    observed: str | None = None
-    number: int | None = None
+    Args:
+        cost: of a run. observer: component that is tuned, or None. with_signals: whether signals are wanted too.
+    """
+
+    cost: Cost
+    observer: str | None = None
+    with_signals: bool = False
+
+    def __call__(self, outcome: Outcome) -> Evaluated | None:
+        if outcome.failure is not None:
+            return None
+        signals = _signals(outcome, self.observer, self.cost).tolist() if self.with_signals else None
+        try:
+            cost = self.cost.of(outcome)
+        except ScenarioError as error:
+            return Evaluated(missing=str(error))
+        if isfinite(cost):
+            return Evaluated(cost, signals=signals)
+        return Evaluated(inf, *_not_finite(outcome, self.cost, cost), signals)
+
+
+@dataclass(frozen=True)
+class _Evaluation(Run):
+    """The run of a candidate with one seed.
+
+    Args:
+        number: of the seed. candidate: values by name; None for the scenario as it is.
+    """
+
+    number: int = 0
+    candidate: Mapping[str, float] | None = None
 
     @property
     def key(self) -> str:
-        """The evaluator keeps keys and journal itself."""
-        return ""
+        """Digest of what the run follows from, recordings apart: they follow from the scenario too."""
+        return digest(self.rests_on, json.dumps(dict(self.settings), sort_keys=True))
 
     @property
     def seed(self) -> int | None:
-        """Seed of the run."""
+        """Number of the seed, by which that of the scenario is moved."""
         return self.number
 
-    def do(self) -> Evaluated:
-        """Record it, or say what it costs."""
-        return _do(self)
 
-
-class Evaluator:
+class Evaluator(AbstractContextManager["Evaluator"]):
     """Evaluates candidates.
 
     Args:
         by_seed: the scenario with each seed. tunable: what is tuned. cost: of a run. directory: of recordings and
-            journal. workers: processes at a time, 1 for this one. resume: whether the journal of an earlier search is
-            taken over.
+            journal. observer: component that is tuned, or None.
+        workers, scheduler: see `make_executor`. resume, retry: see `Journal`.
     """
 
     def __init__(
@@ -93,49 +113,22 @@ class Evaluator:
         cost: Cost,
         directory: Path,
         *,
+        observer: str | None = None,
         workers: int = 1,
+        scheduler: str | None = None,
         resume: bool = False,
+        retry: bool = False,
     ) -> None:
-        self.by_seed, self.tunable, self.cost, self.directory = by_seed, tunable, cost, directory
-        self.runs = 0
-        self.failures: dict[str, int] = {}
-        self._executor = make_executor(workers)
-        self._journal = directory / JOURNAL
-        self._known = {entry["key"]: entry for entry in read_lines(self._journal)} if resume else {}
-        directory.mkdir(parents=True, exist_ok=True)
-        if not resume and self._journal.is_file() and self._journal.stat().st_size:
-            self._journal.replace(directory / EARLIER)  # whoever forgot to resume has lost nothing
-        self._journal.touch()
-        self._keys: dict[int, str] = {}
+        self.by_seed, self.tunable, self.cost, self.observer = by_seed, tunable, cost, observer
+        self.directory, self.runs, self.replayed = directory, 0, False
+        self.failures: dict[str, list[str]] = {}
+        self._journal = Journal(directory, resume=resume, retry=retry)
+        self._known: dict[str, Evaluated] = {}
+        self._contents: dict[int, str] = {}
         self._bases: dict[int, Scenario] = {}
         self._replays: dict[int, Replays] = {}
-        self.replayed = False
-
-    def prepare(self, seeds: Sequence[int], progress: Callable[[int, int], None] | None = None) -> None:
-        """Record the plant side with these seeds, as far as it has not been.
-
-        Args:
-            seeds: of those prepared. progress: called with the number done and the number in all.
-
-        Raises:
-            RunError: a recording failed.
-        """
-        new = [seed for seed in seeds if seed not in self._bases]
-        folders = {seed: self.directory / "recordings" / f"seed_{seed}" for seed in new}
-        wanted = {seed: self.by_seed[seed].recording() for seed in new}
-        jobs = [(s, _Job(scenario, {}, folder=folders[s])) for s, scenario in wanted.items() if scenario is not None]
-        for done, (place, answer) in enumerate(self._answers([job for _, job in jobs]), start=1):
-            if answer.failure is not None:
-                raise RunError(f"The plant side with seed {jobs[place][0]} could not be recorded: {answer.failure}")
-            if progress is not None:
-                progress(done, len(jobs))
-        self._bases |= {seed: self.by_seed[seed].base(folders[seed], self.cost) for seed in new}
-        for seed in new:
-            if self.by_seed[seed].candidate is not None and (self.replayed or not self._replays):
-                found = self._make_replays(seed)
-                self.replayed = found is not None
-                if found is not None:
-                    self._replays[seed] = found
+        some = [self._job(None, seed) for seed in list(by_seed)[:1]]  # candidates differ from it in numbers only
+        self._executor = make_executor(workers, scheduler, apart=any(map(_apart, some)))
 
     def costs(
         self,
@@ -144,7 +137,7 @@ class Evaluator:
         label: Mapping[str, Any],
         step: Callable[[], None] = lambda: None,
     ) -> np.ndarray:
-        """Costs of candidates with each seed, shape (m, seeds); infinite where a run failed.
+        """Costs of candidates with each seed, shape (m, seeds); infinite where a run failed or shows no finite one.
 
         Args:
             candidates: values by name; None for the scenario as it is. seeds: of those prepared.
@@ -154,55 +147,23 @@ class Evaluator:
         Raises:
             ScenarioError: a run that ended does not show the cost.
         """
-        found = np.full((len(candidates), len(seeds)), nan)
-        unknown = self._take_known(candidates, seeds, found, step)
-        if unknown:
-            self.prepare(sorted({seeds[places[0][1]] for places in unknown.values()}))
-        keys = list(unknown)
-        jobs = [self._job(candidates[i], seeds[j]) for (i, j), *_ in unknown.values()]
-        for number, answer in self._answers(jobs):
-            key = keys[number]
-            i, j = unknown[key][0]
-            if answer.unreadable:
-                raise ScenarioError(f"cost: {answer.failure}")
-            for place in unknown[key]:
-                found[place] = answer.cost
-                step()
-            self._note(answer.failure)
-            entry = {**label, "candidate": i, "seed": seeds[j], "values": candidates[i], "cost": answer.cost}
-            self._known[key] = entry | {"failure": answer.failure, "key": key}
-            write_line(self._journal, self._known[key])
-        return found
+        jobs = [self._job(candidate, seed) for candidate in candidates for seed in seeds]
+        found = [one.cost for one in self._evaluated(jobs, label, step)]
+        return np.array(found).reshape(len(candidates), len(seeds))
 
-    def _take_known(
-        self,
-        candidates: Sequence[Mapping[str, Any] | None],
-        seeds: Sequence[int],
-        found: np.ndarray,
-        step: Callable[[], None],
-    ) -> dict[str, list[tuple[int, int]]]:
-        """Fill in costs that the journal holds; places of the others by key, for equal candidates are run once."""
-        unknown: dict[str, list[tuple[int, int]]] = {}
-        for i, candidate in enumerate(candidates):
-            for j, seed in enumerate(seeds):
-                key = self._key(seed, candidate)
-                if key in self._known:
-                    found[i, j] = self._taken(self._known[key])
-                    step()
-                else:
-                    unknown.setdefault(key, []).append((i, j))
-        return unknown
+    def effects(self, candidates: Sequence[Mapping[str, Any]], seed: int) -> list[np.ndarray | None]:
+        """What the cost depends on with each candidate, shape (k,); None where a run failed.
 
-    def estimates(self, candidates: Sequence[Mapping[str, Any]], seed: int, observed: str) -> list[Evaluated]:
-        """What the observer estimates with each candidate.
+        Of an observer these are its outputs, else all signals and the cost itself, which may depend on more.
 
         Args:
-            candidates: values by name. seed: of those prepared. observed: component whose outputs are compared.
+            candidates: values by name. seed: of those prepared.
         """
-        self.prepare([seed])
-        jobs = [self._job(candidate, seed, observed) for candidate in candidates]
-        answers = dict(self._answers(jobs))
-        return [answers[place] for place in range(len(jobs))]
+        jobs = [self._job(candidate, seed, with_signals=True) for candidate in candidates]
+        found = self._evaluated(jobs, {"search": "directions"})
+        unit = abs(found[0].cost) or 1.0
+        ends = [[] if self.observer is not None else [one.cost / unit] for one in found]
+        return [None if o.signals is None else np.append(o.signals, end) for o, end in zip(found, ends, strict=True)]
 
     def replays(self, seeds: Sequence[int]) -> list[Replays]:
         """The observer beside the recordings of these seeds; none where candidates are not replayed.
@@ -210,109 +171,162 @@ class Evaluator:
         Args:
             seeds: of those prepared.
         """
-        self.prepare(seeds)
+        self._prepare(seeds)
         return [self._replays[seed] for seed in seeds] if self.replayed else []
 
-    def close(self) -> None:
+    def __exit__(self, *_: object) -> None:
         """Let the worker processes end."""
         self._executor.__exit__(None, None, None)
 
-    def _job(self, candidate: Mapping[str, Any] | None, seed: int, observed: str | None = None) -> _Job:
+    def _job(self, candidate: Mapping[str, Any] | None, seed: int, *, with_signals: bool = False) -> _Evaluation:
         settings = {} if candidate is None else self.tunable.settings(candidate)
-        return _Job(self._bases[seed], settings, self.cost, observed=observed, number=seed)
+        take = _Evaluate(self.cost, self.observer, with_signals)
+        rests_on = f"{self._content(seed)} {'signals' if with_signals else ''}"
+        return _Evaluation(self.by_seed[seed].whole, settings, take, rests_on, seed, candidate)
+
+    def _content(self, seed: int) -> str:
+        if seed not in self._contents:
+            played = "recorded" if self.by_seed[seed].parts is not None else "whole"
+            whole = self.by_seed[seed].whole
+            content = table_content(whole.table(), whole.folder)
+            self._contents[seed] = f"{digest(content)} {played} {self.cost.text} {self.cost.signals}"
+        return self._contents[seed]
+
+    def _evaluated(
+        self, jobs: Sequence[_Evaluation], label: Mapping[str, Any], step: Callable[[], None] = lambda: None
+    ) -> list[Evaluated]:
+        """What became of each job, those that are alike done once; they are in the journal as soon as they are done."""
+        alike = dict[str, int]()
+        for job in jobs:
+            alike[job.key] = alike.get(job.key, 0) + 1
+        new = {job.key: job for job in jobs if job.key not in self._known}
+        if any(self._journal.taken(job) is None for job in new.values()):
+            self._prepare(sorted({job.number for job in new.values()}))
+        wanted = [replace(job, scenario=self._bases.get(job.number, job.scenario)) for job in new.values()]
+        for _ in range(sum(count for key, count in alike.items() if key not in new)):
+            step()
+        executor = _Members(self._replays, self._executor)
+        for done in run_jobs(wanted, executor, self._journal, reduce=lambda _, _job, ended: _row(ended, label)):
+            self._note(done)
+            for _ in range(alike[done.job.key]):
+                step()
+        return [self._known[job.key] for job in jobs]
+
+    def _note(self, done: Done) -> None:
+        """Keep what a job left, and of one without a cost which candidate it was."""
+        job, row = done.job, done.row
+        assert isinstance(job, _Evaluation)
+        self.runs += not done.resumed
+        found = Evaluated(inf, done.failure.reason) if done.failure is not None else Evaluated(**row["evaluated"])
+        self._known[job.key] = found if found.cost is not None else replace(found, cost=inf)
+        if found.why is not None:
+            values = ", ".join(f"{name} = {value:.6g}" for name, value in (job.candidate or {}).items())
+            since = "" if found.instant is None else f" from t = {found.instant:g} s on"
+            text = f"{values or 'the scenario as it is'}, seed {job.number}{since}"
+            self.failures.setdefault(found.why, []).append(text)
+
+    def _prepare(self, seeds: Sequence[int]) -> None:
+        """Record the plant side with these seeds, as far as it has not been.
+
+        Raises:
+            RunError: a recording failed.
+        """
+        new = [seed for seed in seeds if seed not in self._bases]
+        folders = {seed: self.directory / "recordings" / f"seed_{seed}" for seed in new}
+        wanted = {seed: scenario for seed in new if (scenario := self.by_seed[seed].recording()) is not None}
+        for done in run_jobs([Run(scenario) for scenario in wanted.values()], self._executor):
+            seed = list(wanted)[done.number]
+            if done.failure is not None:
+                raise RunError(f"The plant side with seed {seed} could not be recorded: {done.failure.reason}")
+            self.runs += 1
+            write_results(done.row.result, folders[seed], ("npy",))
+        self._bases |= {seed: self.by_seed[seed].base(folders[seed], self.cost) for seed in new}
+        for seed in new:
+            if self.by_seed[seed].candidate is not None and (self.replayed or not self._replays):
+                found = self._make_replays(seed)
+                self.replayed = found is not None
+                if found is not None:
+                    self._replays[seed] = found
 
     def _make_replays(self, seed: int) -> Replays | None:
         candidate = self.by_seed[seed].candidate
         names = list(self.tunable.settings(self.tunable.start))
         return None if candidate is None else make_replays(self._bases[seed], candidate.name, self.cost, names)
 
-    def _answers(self, jobs: Sequence[_Job]) -> Iterator[tuple[int, Evaluated]]:
-        """Answers as they come: of replays first, all candidates of a seed together."""
-        others = list(range(len(jobs)))
-        for seed, replays in self._replays.items():
-            mine = [n for n in others if jobs[n].seed == seed]
-            others = [n for n in others if n not in set(mine)]
-            for place, outcome in zip(mine, replays.outcomes([jobs[n].settings for n in mine]), strict=True):
-                self.runs += 1
-                yield place, Evaluated(inf, outcome) if isinstance(outcome, str) else _judged(outcome, jobs[place])
-        for place, answer in self._in_runs([jobs[n] for n in others]):
-            yield others[place], answer
 
-    def _in_runs(self, jobs: Sequence[_Job]) -> Iterator[tuple[int, Evaluated]]:
-        places = {id(job): place for place, job in enumerate(jobs)}
-        for job, ended in self._executor.each(jobs):
-            self.runs += 1
-            place, answer = places[id(job)], ended.row
-            if ended.failure is not None:
-                yield place, Evaluated(inf, ended.failure.reason)
-                continue
-            if answer.failure == INTERRUPTED:  # who interrupts a run means the search
-                raise KeyboardInterrupt
-            yield place, answer
-
-    def _key(self, seed: int, candidate: Mapping[str, Any] | None) -> str:
-        if seed not in self._keys:
-            played = "recorded" if self.by_seed[seed].parts is not None else "whole"
-            whole = self.by_seed[seed].whole
-            content = table_content(whole.table(), whole.folder)
-            self._keys[seed] = f"{digest(content)} {played} {self.cost.text} {self.cost.signals}"
-        said = None if candidate is None else self.tunable.settings(candidate)
-        return hashlib.sha256(f"{self._keys[seed]} {json.dumps(said, sort_keys=True)}".encode()).hexdigest()
-
-    def _taken(self, entry: Mapping[str, Any]) -> float:
-        self._note(entry["failure"])
-        return inf if entry["cost"] is None else float(entry["cost"])
-
-    def _note(self, failure: str | None) -> None:
-        if failure is not None:
-            self.failures[failure] = self.failures.get(failure, 0) + 1
-
-
-@contextmanager
-def closing(evaluator: Evaluator) -> Iterator[Evaluator]:
-    """The evaluator, closed at the end.
+class _Members(AbstractContextManager["_Members"]):
+    """Does candidates as members of a batch, all those of a seed together, and the other jobs elsewhere.
 
     Args:
-        evaluator: whose workers end then.
+        replays: by seed. others: where jobs of other seeds are done.
     """
+
+    def __init__(self, replays: Mapping[int, Replays], others: Executor) -> None:
+        self._replays, self._others = replays, others
+
+    def each(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Ended]]:
+        """One round, see `Executor.each`."""
+        rest = list(jobs)
+        for seed, replays in self._replays.items():
+            mine = [job for job in rest if isinstance(job, _Evaluation) and job.number == seed]
+            rest = [job for job in rest if job.seed != seed]
+            for job, outcome in zip(mine, replays.outcomes([job.settings for job in mine]), strict=True):
+                if isinstance(outcome, str):
+                    yield job, Ended(failure=Failure(outcome))
+                else:
+                    yield job, Ended(job.take(outcome))
+        yield from self._others.each(rest)
+
+    def __exit__(self, *_: object) -> None:
+        """The other executor is freed by whoever made it."""
+
+
+def _apart(job: Run) -> bool:
+    """Whether a run is done in a process of its own; a cost that cannot go there keeps it here."""
     try:
-        yield evaluator
-    finally:
-        evaluator.close()
+        return job.apart
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return False
 
 
-def _do(job: _Job) -> Evaluated:
-    """One run, here or in a worker."""
-    try:
-        outcome = job.scenario.run(overrides=job.settings, warn=_silent)
-    except CosimError as error:
-        return Evaluated(inf, str(error))
-    if outcome.failure is not None:
-        return Evaluated(inf, outcome.failure)
-    if job.folder is not None:
-        write_results(outcome.result, job.folder, ("npy",))
-        return Evaluated(nan)
-    return _judged(outcome, job)
+def _row(ended: Ended, label: Mapping[str, Any]) -> dict[str, Any]:
+    """What the journal keeps of a candidate.
+
+    Raises:
+        ScenarioError: a run that ended does not show the cost.
+    """
+    found = ended.row
+    if found is None:
+        return dict(label)
+    if found.missing is not None:
+        raise ScenarioError(f"cost: {found.missing}")
+    return {**label, "evaluated": {name: value for name, value in vars(found).items() if name != "missing"}}
 
 
-def _judged(outcome: Outcome, job: _Job) -> Evaluated:
-    assert job.cost is not None
-    estimates = None if job.observed is None else _estimates(outcome, job.observed, job.cost)
-    try:
-        cost = job.cost.of(outcome)
-    except ScenarioError as error:
-        return Evaluated(inf, str(error), estimates, unreadable=True)
-    return Evaluated(cost, None, estimates) if isfinite(cost) else Evaluated(inf, "the cost is not finite", estimates)
+def _not_finite(outcome: Outcome, cost: Cost, value: float) -> tuple[str, float | None]:
+    """Why the cost of a run that ended is no finite number, and from when on [s]: of the signals that it names the one
+    that is none first, for some can be missing.
+    """
+    known = outcome.result.table.dtype.names or ()
+    columns = {name: outcome.result[name] for name in (*cost.signals, *cost.seen) if name in known}
+    first = {name: int(np.argmin(np.isfinite(c))) for name, c in columns.items() if not np.isfinite(c).all()}
+    if not first:
+        return f"the cost is {value:g}, although all signals that it names are finite", None
+    name = min(first, key=first.__getitem__)
+    return f"the cost is not finite, for {name} is not", float(outcome.result.time[first[name]])
 
 
-def _estimates(outcome: Outcome, observed: str, cost: Cost) -> np.ndarray:
-    """What the cost sees of an observer at some rows, one signal after the other, each in units of its own spread."""
-    table = outcome.result.table
-    rows = np.unique(np.linspace(0, len(table) - 1, ROWS).astype(int))
-    mine = [name for name in table.dtype.names or () if name.startswith(f"{observed}.")]
+def _signals(outcome: Outcome, observer: str | None, cost: Cost) -> np.ndarray:
+    """What the cost depends on at some rows, one signal after the other, each in units of its own spread: signals that
+    the cost names, outputs of the observer, or all.
+    """
+    table, time = outcome.result.table, outcome.result.time
+    mine = [n for n in table.dtype.names or () if n != "time" and (observer is None or n.startswith(f"{observer}."))]
     names = [name for name in mine if name in cost.seen] or [name for name in mine if not name.endswith("_std")]
-    columns = [np.asarray(table[name][rows], float) for name in names]
+    if observer is None:  # events, and so rows, may differ between candidates
+        instants = np.linspace(float(time[0]), float(time[-1]), _ROWS)
+        columns = [np.interp(instants, time, np.asarray(table[name], float)) for name in names]
+    else:
+        rows = np.unique(np.linspace(0, len(table) - 1, _ROWS).astype(int))
+        columns = [np.asarray(table[name][rows], float) for name in names]
     return np.concatenate([column / (np.std(column) or 1.0) for column in columns]) if columns else np.empty(0)
-
-
-def _silent(_text: str) -> None: ...

@@ -1,4 +1,4 @@
-"""Which directions of the parameters a run shows: singular values of what the observer estimates. Runs nothing."""
+"""Which directions of the parameters a run shows: singular values of what its cost depends on. Runs nothing."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ COVARIANCE = "variance"  # `process_covariance`, `measurement_variance`
 
 @dataclass(frozen=True)
 class Directions:
-    """What moves the estimates, at one candidate.
+    """What moves what the cost depends on, at one candidate.
 
     Args:
-        names: of the parameters, d of them. sizes: how much each moves the estimates, relative to the most, shape (d,).
+        names: of the parameters, d of them. sizes: how much each moves it, relative to the most, shape (d,).
         singular_values: relative to the largest, falling, shape (d,). directions: of them, rows in relative changes of
             the parameters, shape (d, d).
-        scale: how much a common factor of all covariances moves the estimates, relative to the largest singular value;
+        scale: how much a common factor of all covariances moves it, relative to the largest singular value;
             NaN where not all of process and measurement noise is tuned.
     """
 
@@ -46,7 +46,8 @@ class Directions:
     def warnings(self) -> list[str]:
         """What the user should know, in words."""
         texts = [
-            f"{name} changes nothing in the estimates of this run: it cannot be tuned by it." for name in self.idle
+            f"{name} changes nothing that the cost of this run depends on: it cannot be tuned by it."
+            for name in self.idle
         ]
         if self.scale_invariant:
             texts.append(
@@ -85,21 +86,21 @@ def covariances(space: SearchSpace) -> list[str]:
     return found if len({name.partition("[")[0] for name in found}) > 1 else []
 
 
-def directions(space: SearchSpace, estimates: Sequence[np.ndarray | None]) -> Directions | None:
-    """What moves the estimates.
+def directions(space: SearchSpace, effects: Sequence[np.ndarray | None]) -> Directions | None:
+    """What moves what the cost depends on.
 
     Args:
-        space: of the search. estimates: of the candidates of `neighbours`, each of one shape.
+        space: of the search. effects: what it is with the candidates of `neighbours`, each of one shape.
 
     Returns:
         None where one of them has none, or nothing moves at all.
     """
-    first = estimates[0]
-    if first is None or any(e is None or e.shape != first.shape or not np.isfinite(e).all() for e in estimates):
+    first = effects[0]
+    if first is None or any(e is None or e.shape != first.shape or not np.isfinite(e).all() for e in effects):
         return None
     if not first.size:
         return None
-    moves = np.stack([e - first for e in estimates[1:] if e is not None])
+    moves = np.stack([e - first for e in effects[1:] if e is not None])
     count = len(space.parameters)
     _, values, rows = np.linalg.svd(moves[:count].T, full_matrices=False)
     sizes = np.linalg.norm(moves[:count], axis=1)

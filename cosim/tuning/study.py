@@ -31,7 +31,7 @@ class Study:
 
     Args:
         scenario: that is tuned. asked: what is tuned. evaluator: gives costs. training, judging: seeds.
-        observer: component that is tuned, or None. method: of the search. options: of the method.
+        method: of the search. options: of the method.
         iterations: populations after the first one. progress: see `tune`.
 
     Raises:
@@ -46,13 +46,12 @@ class Study:
         training: Sequence[int],
         judging: Sequence[int],
         *,
-        observer: str | None,
         method: str,
         options: Mapping[str, Any],
         iterations: int,
         progress: Progress | None,
     ) -> None:
-        self.scenario, self.asked, self.evaluator, self.observer = scenario, asked, evaluator, observer
+        self.scenario, self.asked, self.evaluator = scenario, asked, evaluator
         self.training, self.judging = training, judging
         self.method, self.iterations = method, iterations
         self.options = {name: value for name, value in options.items() if name != "gradients"}  # found out here
@@ -177,12 +176,9 @@ class Study:
         return {p.name: start[p.name] if p.low <= start[p.name] <= p.high else middle[p.name] for p in space.parameters}
 
     def _directions(self, values: Mapping[str, float]) -> Directions | None:
-        """What moves the estimates at a candidate; None where there is no observer, or a run fails."""
-        if self.observer is None:
-            return None
-        around = neighbours(self.asked.space, values)
-        found = self.evaluator.estimates(around, self.training[0], self.observer)
-        return directions(self.asked.space, [e.estimates for e in found])
+        """What moves what the cost depends on, at a candidate; None where a run fails."""
+        effects = self.evaluator.effects(neighbours(self.asked.space, values), self.training[0])
+        return directions(self.asked.space, effects)
 
     def _held(self, shown: Directions | None) -> tuple[dict[str, float], dict[str, str]]:
         """Parameters that are not searched, with the reasons: those that change nothing, and one covariance where only
@@ -196,7 +192,7 @@ class Study:
         values = self._inside()
         if set(shown.idle) == set(self.asked.space.names):
             raise ScenarioError(
-                f"None of {', '.join(self.asked.space.names)} changes anything that the observer says in this run; "
+                f"None of {', '.join(self.asked.space.names)} changes anything that the cost of this run depends on; "
                 "there is nothing to tune."
             )
         fixed = {name: values[name] for name in shown.idle}
@@ -211,7 +207,7 @@ class Study:
         texts = [*self.asked.notes, *([] if shown is None else shown.warnings())]
         later = [] if at_best is None else at_best.warnings()
         texts += [f"At the best candidate: {text}" for text in later if text not in texts]
-        return texts + [f"{count} runs failed: {reason}" for reason, count in self.evaluator.failures.items()]
+        return texts + [f"{len(runs)} runs failed: {why}; {runs[0]}" for why, runs in self.evaluator.failures.items()]
 
 
 def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, str]) -> list[str]:
@@ -262,9 +258,9 @@ def _demand_options(method: str, options: Mapping[str, Any]) -> None:
             raise ScenarioError(f"method {method}: no option {name!r}; {nearest(name, known)}")
 
 
-def _never_finite(count: int, failures: Mapping[str, int]) -> str:
-    reasons = "; ".join(f"{reason} ({times} times)" for reason, times in list(failures.items())[:3])
+def _never_finite(count: int, failures: Mapping[str, Sequence[str]]) -> str:
+    reasons = "; ".join(f"{why} ({len(runs)} times, first with {runs[0]})" for why, runs in list(failures.items())[:3])
     return (
-        f"None of the {count} candidates of the first population has a finite cost: "
-        f"{reasons or 'the cost is never finite'}. Look at the bounds, and run the scenario with one of these values."
+        f"None of the {count} candidates of the first population has a finite cost: {reasons}. Change the bounds, or "
+        "run the scenario with one of these values."
     )

@@ -14,7 +14,7 @@ from cosim.run.described_components import describe_component
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost, make_cost
-from cosim.tuning.evaluation import Evaluator, closing
+from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.parameters import Bounds, Tunable, tunable
 from cosim.tuning.search_progress import Progress
 from cosim.tuning.seeded_scenarios import Seeded, seeded, why_whole, with_observer
@@ -39,6 +39,8 @@ def tune(
     workers: int = 1,
     directory: str | Path | None = None,
     resume: bool = False,
+    retry: bool = False,
+    scheduler: str | None = None,
     whole_runs: bool = False,
     progress: Progress | None = None,
 ) -> Tuning:
@@ -55,11 +57,13 @@ def tune(
         seeds: for training; each moves the seed of the scenario by so much, 0 is the scenario as it is.
         judge: seeds that compare before and after at the end.
         iterations: populations after the first one. options: of the optimiser, such as ``{"population": 30}``.
-        searches: how many times it is searched, with optimiser seeds 0, 1, ...; the best counts, all are told.
-        workers: processes at a time; a script that uses more than 1 needs ``if __name__ == "__main__":``.
-        directory: where history and results are written as they come; None writes nothing. resume: take over the
-            evaluations of an earlier search there, as far as they are of this one. whole_runs: run the whole scenario
-            for each candidate, also where a recording would do.
+        searches: how many times it is searched, with optimiser seeds 0, 1, ...; the best counts, all are reported.
+        workers: processes at a time; a script whose own classes run in them needs ``if __name__ == "__main__":``.
+        scheduler: address of a scheduler of `dask.distributed` whose workers do the runs: ``tcp://host:8786``.
+        directory: where history and results are written as they come; None writes nothing.
+        resume: take over the evaluations of an earlier search there, as far as they are of this one. retry: with
+            `resume`, run all again that failed.
+        whole_runs: run the whole scenario for each candidate, also where a recording would do.
         progress: called with runs done, runs in all as far as known, and what is done.
 
     Returns:
@@ -74,10 +78,10 @@ def tune(
     judged_by = make_cost(cost, observer, _outputs(scenario, observer))
     with _folder(directory, resume) as folder:
         by_seed, how = _by_seed(scenario, observer, asked, (*training, *judging), whole_runs)
-        evaluator = Evaluator(by_seed, asked, judged_by, folder, workers=workers, resume=resume)
+        where: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "resume": resume, "retry": retry}
         more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": progress}
-        with closing(evaluator):
-            study = Study(scenario, asked, evaluator, training, judging, observer=observer, method=method, **more)
+        with Evaluator(by_seed, asked, judged_by, folder, observer=observer, **where) as evaluator:
+            study = Study(scenario, asked, evaluator, training, judging, method=method, **more)
             found = study.run(searches, how)
         if directory is not None:
             write_tuning(found, asked.settings(found.best), folder)

@@ -10,6 +10,7 @@ import pytest
 from cosim import Scenario
 from cosim.cli import main
 from cosim.cli.tune_command import _seeds
+from cosim.runs.journal import JOURNAL
 
 RUNNING = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 5e4}
 
@@ -35,10 +36,10 @@ def test_it_searches_writes_and_goes_on(file: Path, capsys: pytest.CaptureFixtur
     data = json.loads((folder / "tuning.json").read_text())
     assert data["best"] == {"train.mass": 60e3}
     assert Scenario.load(folder / "tuned.toml").table().components["train"].parameters["mass"] == 60e3
-    before = (folder / "evaluations.jsonl").read_text()
+    before = (folder / JOURNAL).read_text()
     assert main([*words, "--resume", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["runs"] == 0
-    assert (folder / "evaluations.jsonl").read_text() == before
+    assert (folder / JOURNAL).read_text() == before
 
 
 def test_two_workers_find_what_one_does(file: Path, capsys: pytest.CaptureFixture[str]) -> None:

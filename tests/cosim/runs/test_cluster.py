@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_scenarios import small
 from test_fmus.events import DEEDS, hostile_fmu
 from worker_tasks import Task, square
 
@@ -23,6 +24,7 @@ from cosim.runs.engine import run_jobs
 from cosim.runs.executors import make_executor
 from cosim.runs.journal import JOURNAL, Journal, read_lines
 from cosim.studies.seed_runs import seed_study
+from cosim.tuning.tune import tune
 
 distributed = pytest.importorskip("distributed")
 cluster = pytest.importorskip("cosim.runs.cluster")
@@ -139,3 +141,29 @@ def test_other_versions_and_nobody_are_refused_in_words(
         worker.kill()
     with pytest.raises(RunError, match="has no workers"):
         make_executor(scheduler=address)
+
+
+def test_a_tuning_finds_on_a_cluster_what_it_finds_here(
+    tmp_path: Path, workers: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    """A plant's values, and an observer's beside a recording that the workers have to be given."""
+    train = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 5e4}
+    plant = Scenario(stop=0.1, step=0.01).add("train", model="locomotive", **{"as": "block3"}, parameters=train)
+    plant.expect("signal", name="it is fast", signal="train.speed", start=0.05, min=10.1)
+    studies: list[tuple[Scenario, dict[str, Any]]] = [
+        (plant, {"parameters": {"train.mass": (60e3, 120e3)}, "cost": "-expectation:fast"}),
+        (
+            small(),
+            {
+                "parameters": {"balise_gain_position[1]": (0.1, 1.0)},
+                "observer": "observer",
+                "cost": "position_error_rms",
+                "seeds": [0, 3],
+            },
+        ),
+    ]
+    for n, (scenario, asked) in enumerate(studies):
+        more: dict[str, Any] = {"method": "hand", "iterations": 2}
+        here = tune(scenario, **asked, **more)
+        there = tune(scenario, **asked, **more, scheduler=workers[0], directory=tmp_path / str(n))
+        assert there.to_data() == here.to_data()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,13 @@ from small_scenarios import small
 from test_fmus.build import linear_fmu
 
 from cosim import Scenario
-from cosim.errors import ScenarioError
+from cosim.errors import OutputError, ScenarioError
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
+from cosim.runs.journal import EARLIER, JOURNAL
 from cosim.tuning.costs import LikelihoodCost, make_cost
-from cosim.tuning.evaluation import EARLIER, JOURNAL, Evaluator
+from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.parameters import tunable
 from cosim.tuning.replays import Replays
 from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
@@ -27,7 +29,7 @@ from cosim.tuning.tuning_files import convergence_figure
 from cosim.tuning.tuning_result import Tuning
 from fmu_observer import OBSERVERS
 from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
-from plant_models.hybrid import scalar_names
+from plant_models.hybrid import HybridSystem, output_signal, parameter, scalar_names, state
 
 CURRENTS = "state:current_d=motor.current_d,current_q=motor.current_q"
 VARIANCES = {
@@ -165,7 +167,7 @@ def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, f
     assert whole.searches == found.searches
     assert whole.judged_after == found.judged_after
     assert whole.runs < found.runs
-    evaluations = [json.loads(line) for line in (tmp_path / "evaluations.jsonl").read_text().splitlines()]
+    evaluations = [json.loads(line) for line in (tmp_path / JOURNAL).read_text().splitlines()]
     assert len({entry["key"] for entry in evaluations}) == len(evaluations)  # none was done twice
     again = Scenario.load(tmp_path / "tuned.toml")
     assert again.run(overrides={"seed": 5}).failure is None
@@ -218,6 +220,30 @@ def test_slopes_are_those_of_differences() -> None:
 
 class Twin(LikelihoodCost):
     """The same cost of another kind."""
+
+
+class Logarithm(HybridSystem):
+    """``y = log(1 - rate t)``, which is no number from 1 / rate on."""
+
+    name = "logarithm"
+    description = "An output that leaves the numbers"
+    source = "a test"
+    states = (state("x", "1", 1.0),)
+    outputs = (output_signal("y", "1"),)
+    parameters = (parameter("rate", "1/s", 1.0),)
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"x": -p.rate}
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"y": np.log(x.x)}
+
+
+class LogarithmOrNothing(Logarithm):
+    """Its output can be missing."""
+
+    name = "logarithm_or_nothing"
+    outputs = (output_signal("y", "1", can_be_missing=True),)
 
 
 def test_an_observer_with_balises_runs_beside_recordings() -> None:
@@ -295,6 +321,51 @@ def test_a_search_that_is_not_resumed_keeps_the_one_before(tmp_path: Path) -> No
     Evaluator({}, tunable(drive(), "filter", VARIANCES), LikelihoodCost("filter"), tmp_path)
     assert (tmp_path / EARLIER).read_text() == '{"key": "one"}\n'
     assert not (tmp_path / JOURNAL).read_text()
+
+
+def grew(outcome: Outcome) -> float:
+    """A cost that is no finite number where a train is light."""
+    return float(np.nan if outcome["train.speed"][-1] > 10.1 else outcome["train.speed"][-1])
+
+
+def light_train() -> Scenario:
+    scenario = Scenario(stop=0.1, step=0.01)
+    values = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 5e4}
+    return scenario.add("train", model="locomotive", **{"as": "block3"}, parameters=values)
+
+
+def test_what_changes_nothing_of_a_plant_is_held_and_said() -> None:
+    """A gradient behind the end of the journey; masses and efforts do change what the cost depends on."""
+    bounds = {"train.mass": (60e3, 120e3), "train.gradient[4]": (0.0, 0.01)}
+    scenario = light_train().set("train.gradient_position", [0.0, 1e5, 2e5, 3e5])
+    found = tune(scenario, bounds, cost=lambda o: -float(o["train.speed"][-1]), method="hand", iterations=1)
+    assert list(found.fixed) == ["train.gradient[4]"]
+    assert found.best["train.mass"] < found.start["train.mass"]
+    with pytest.raises(ScenarioError, match="there is nothing to tune"):
+        tune(scenario, {"train.gradient[4]": (0.0, 0.01)}, cost=grew, iterations=0)
+
+
+def test_a_cost_that_is_not_finite_is_said_with_signal_instant_and_candidate() -> None:
+    """A signal that can be missing, one that may not be, and a cost that is none although all signals are finite."""
+    texts = []
+    for model in (LogarithmOrNothing, Logarithm):
+        scenario = light_train().add("wave", model=model, **{"as": "block3"})
+        cost = make_cost("state:wave.y=train.speed", "wave")
+        with pytest.raises(ScenarioError) as caught:
+            tune(scenario, {"wave.rate": (20.0, 30.0)}, cost=cost, iterations=0, options={"population": 3})
+        texts.append(str(caught.value))
+    assert "the cost is not finite, for wave.y is not (" in texts[0]
+    assert "wave.y became no finite number first, at t = 0.0" in texts[1]
+    assert re.search(r"first with wave.rate = 2[\d.]+, seed 0 from t = 0\.0[45] s on", texts[0])
+    assert "first with wave.rate = " in texts[1]
+    with pytest.raises(ScenarioError, match="the cost is nan, although all signals that it names are finite"):
+        tune(light_train(), {"train.mass": (1e3, 2e3)}, cost=grew, iterations=0, options={"population": 3})
+
+
+def test_a_journal_of_version_0_1_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "evaluations.jsonl").write_text('{"key": "one", "cost": 1.0}\n')
+    with pytest.raises(OutputError, match=r"evaluations\.jsonl was written by version 0\.1"):
+        tune(light_train(), {"train.mass": (60e3, 120e3)}, cost=grew, directory=tmp_path, resume=True)
 
 
 def test_the_picture_says_what_the_cost_is(found: Tuning) -> None:
