@@ -11,7 +11,7 @@ import pickle
 import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path, PurePosixPath
@@ -148,12 +148,13 @@ class Cluster(AbstractContextManager["Cluster"]):
 
     def _compare_versions(self) -> None:
         """Refuse workers whose numbers may be others."""
-        try:
+        with suppress(TimeoutError):
             self._client.wait_for_workers(1, timeout=_PATIENCE)
-            found = self._client.run(version_text, on_error="return")
-        except TimeoutError as error:
-            raise RunError(f"The scheduler {self.address} has no workers; start some: dask worker ADDRESS.") from error
-        for worker, text in found.items():
+        found = self._client.run(version_text, on_error="return")
+        there = {worker: text for worker, text in found.items() if not isinstance(text, OSError)}  # others are lost
+        if not there:
+            raise RunError(f"The scheduler {self.address} has no workers; start some: dask worker {self.address}")
+        for worker, text in there.items():
             if text != version_text():
                 raise RunError(f"Worker {worker} of {self.address} cannot be used: {_unlike(text)}")
 

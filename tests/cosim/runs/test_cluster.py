@@ -74,6 +74,14 @@ class Growing:
 """
 
 
+WHERE = """
+class Where:
+    inputs, outputs = (), ("shipped",)
+    def step(self, t, inputs, dt):
+        return {"shipped": float("cosim-files" in __file__)}
+"""
+
+
 def studied(fmu: Path, folder: Path) -> Scenario:
     """An FMU that may crash, a model in a file that imports another one, and chance."""
     (folder / "model.py").write_text(MODEL)
@@ -119,6 +127,12 @@ def test_functions_of_the_users_travel_and_seeds_are_the_same(
     assert reasons[1] == "KeyError: 'nothing here'"
     assert reasons[3] == "its process ended with exit code 3"
     assert "cannot be passed between processes" in reasons[4]
+    (tmp_path / "where.py").write_text(WHERE)
+    sweep = (
+        Scenario(folder=tmp_path, stop=0.1, step=0.1).add("where", model="where.py:Where").vary({"stop": [0.1, 0.2]})
+    )
+    places = [[run.outcome["where.shipped"][-1] for run in sweep.run(scheduler=at).runs] for at in (address, None)]  # type: ignore[index]
+    assert places == [[1.0, 1.0], [0.0, 0.0]]  # a worker reads its own copy
     scenario = Scenario.load("freight_profile_d").set("stop", 5.0)
     assert seed_study(scenario, range(3), scheduler=address).each == seed_study(scenario, range(3)).each
 

@@ -61,6 +61,7 @@ def test_the_table_does_not_depend_on_workers_order_and_sittings(data: Any, argu
             file.write('{"key": "cut o')
         resumed = table(arguments, team, Journal(Path(folder), resume=True))
         assert resumed == whole
+        assert not (Path(folder) / EARLIER).exists()  # gone on with, and not begun anew
         assert len(read_lines(Path(folder) / JOURNAL)) == len(arguments)
 
 

@@ -83,13 +83,14 @@ class Mine(Job):
     def do(self):
         return "done"
 """
+BOTH = f"from worker_tasks import Task, square\n{OWN}"
 
 
 @pytest.mark.parametrize(
     ("script", "words"),
     [
         ({"class_": "from worker_tasks import Task, square", "job": "Task(square, 2)", "guard": "if True:"}, "[4]"),
-        ({"class_": OWN, "job": "Mine()", "guard": "if __name__ == '__main__':"}, "['done']"),
+        ({"class_": BOTH, "job": "Task(square, 2), Mine()", "guard": "if __name__ == '__main__':"}, "[4, 'done']"),
         ({"class_": OWN, "job": "Mine()", "guard": "if True:"}, "if __name__ == '__main__':"),
     ],
     ids=["classes of modules need no guard", "of a script with one", "of a script without"],
