@@ -7,8 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.detection.maximum_adhesion import MAP_SPEEDS, AdhesionMap, degraded_map, nominal_map, published_map
-from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL
-from fmu_observer.detection.slip_ratio import speed_slip_from_odometer_slip
+from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL, speed_slip_from_odometer_slip
 from plant_models.hybrid import (
     Array,
     HybridSystem,

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.diagnosis.isolation_table import largest
-from fmu_observer.formulas.diagnosis.windowed_residual import windowed_square
+from fmu_observer.formulas.diagnosis.window_inversion import windowed_square
 from plant_models.hybrid import Array, vector
 
 ABSENT = -1e9

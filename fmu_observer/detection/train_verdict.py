@@ -24,7 +24,7 @@ from fmu_observer.detection.train_isolation import (
 )
 from fmu_observer.detection.train_residuals import Readings, tolerance
 from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable, IsolationVerdict, largest
-from fmu_observer.formulas.diagnosis.windowed_residual import Alarm, judge
+from fmu_observer.formulas.diagnosis.window_inversion import Alarm, judge
 from plant_models.hybrid import Array, vector
 
 _GROUPS = (MOTION, BRAKE, TRACTION)

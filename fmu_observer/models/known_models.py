@@ -10,21 +10,17 @@ from typing import Any, TypeVar
 
 from fmu_observer.models.exhibits.cart_double_pendulum_model import cart_double_pendulum
 from fmu_observer.models.exhibits.cart_pendulum_model import cart_pendulum
-from fmu_observer.models.exhibits.five_state_example import non_triangularisable_example
 from fmu_observer.models.exhibits.flexible_joint_arm_model import flexible_joint_arm, flexible_joint_arm_as_printed
-from fmu_observer.models.exhibits.four_state_example import triangularisable_example
-from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
+from fmu_observer.models.exhibits.four_state_example import non_triangularisable_example, triangularisable_example
 from fmu_observer.models.exhibits.oscillator_models import time_varying_oscillator
-from fmu_observer.models.exhibits.pendulum_model import pendulum
-from fmu_observer.models.exhibits.takagi_sugeno_pendulum_model import takagi_sugeno_pendulum
+from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum, takagi_sugeno_pendulum
 from fmu_observer.models.exhibits.tanh_model import tanh_system
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.models.train.braked_train_model import braked_train
 from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
-from fmu_observer.models.train.freight_train_model import freight_train
-from fmu_observer.models.train.networked_train_model import networked_train
+from fmu_observer.models.train.freight_train_model import freight_train, networked_train
 from fmu_observer.models.train.takagi_sugeno_train_model import takagi_sugeno_train
 
 Model = TypeVar("Model", ObserverModel, StateAffineModel, TakagiSugenoModel)

@@ -17,8 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmu_observer.models.train.freight_train_model import MASS
-from fmu_observer.models.train.networked_train_model import networked_train
+from fmu_observer.models.train.freight_train_model import MASS, networked_train
 from fmu_observer.observers.train import DelayedTrainObserver
 from fmus import Batch
 from plant_models.hybrid import Runtime, scalar_names

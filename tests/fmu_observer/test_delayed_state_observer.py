@@ -20,7 +20,7 @@ from fmu_observer.certificates.printed_bounds.network_bounds import (
 from fmu_observer.formulas.delay.delay_memory import at_age, integral_weights, weighted
 from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
-from fmu_observer.observers.generic.sampled.output_predictor import OutputPredictor
+from fmu_observer.observers.generic.sampled.dynamic_high_gain import OutputPredictor
 from plant_models.exhibits.flexible_joint_arm import FlexibleJointArm
 from plant_models.hybrid import Runtime, scalar_names
 

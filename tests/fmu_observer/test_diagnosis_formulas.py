@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 import scipy
 
-from fmu_observer.formulas.diagnosis.actuator_identification import _ActuatorParameters, identified_actuator
+from fmu_observer.formulas.diagnosis.actuator import _ActuatorParameters, identified_actuator
 from fmu_observer.formulas.diagnosis.redundancy import larger
 from fmu_observer.formulas.diagnosis.residual_filters import filtered, residual_filter, settled
-from fmu_observer.formulas.diagnosis.window_inversion import grid_around, invert, smoothed
-from fmu_observer.formulas.diagnosis.windowed_residual import Alarm, judge, windowed_square
+from fmu_observer.formulas.diagnosis.window_inversion import (
+    Alarm,
+    grid_around,
+    invert,
+    judge,
+    smoothed,
+    windowed_square,
+)
 
 ROUNDING = 1e-12  # relative, of some tens of operations
 

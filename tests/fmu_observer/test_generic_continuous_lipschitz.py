@@ -19,8 +19,7 @@ from fmu_observer.certificates.printed_bounds.high_gain_theta import (
     theta_from_slopes,
 )
 from fmu_observer.design.pole_placement import observer_gain
-from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
-from fmu_observer.models.exhibits.pendulum_model import pendulum
+from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum
 from fmu_observer.models.scaled_slopes import scaled
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.continuous import HighGain, Luenberger, Thau

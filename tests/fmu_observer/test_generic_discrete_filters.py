@@ -13,8 +13,7 @@ from scipy.linalg import expm
 
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, circle_distance, transition_lipschitz
 from fmu_observer.models.discrete_model import _zero_order_hold, transition
-from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
-from fmu_observer.models.exhibits.pendulum_model import pendulum
+from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.scaled_slopes import powers, scaled
 from fmu_observer.models.train.freight_train_model import freight_train

@@ -13,8 +13,7 @@ from scipy.signal import cont2discrete
 
 from fmu_observer.design.noise_covariance import process_covariance
 from fmu_observer.models.discrete_model import _zero_order_hold, transition
-from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
-from fmu_observer.models.exhibits.pendulum_model import pendulum
+from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum
 from fmu_observer.models.train.freight_train_model import freight_train
 
 

@@ -12,12 +12,11 @@ from block_systems import Driven
 from own_condition import own_condition
 
 from fmu_observer.models.exhibits.cart_pendulum_model import cart_pendulum
-from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
+from fmu_observer.models.exhibits.pendulum_model import linear_pendulum
 from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.models.traced_system_model import Steps, find_filter_model, system_model
-from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
+from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter, KalmanFilter
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
-from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.motors.motor_ekf import MotorEkf
 from fmu_observer.observers.train.balise_odometer_ekf import BaliseOdometerEkf

@@ -9,7 +9,7 @@ from fmu_observer.formulas.filtering import ensemble, particles
 from fmu_observer.formulas.filtering.covariance_consistency import judge
 from fmu_observer.formulas.filtering.smoothing import extended_pass
 from fmu_observer.models.discrete_model import _zero_order_hold
-from fmu_observer.models.exhibits.linear_pendulum_model import linear_pendulum
+from fmu_observer.models.exhibits.pendulum_model import linear_pendulum
 from fmu_observer.models.traced_system_model import system_model
 from fmu_observer.observers.generic.discrete import EnsembleKalmanFilter, ParticleFilter
 from plant_models.exhibits import Pendulum

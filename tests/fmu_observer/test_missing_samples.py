@@ -15,8 +15,8 @@ from shipped import shipped
 
 from fmu_observer import OBSERVERS
 from fmu_observer.models.filter_models import FilterModel, Known
+from fmu_observer.observers.generic.discrete.extended_kalman_filter import KalmanFilter
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
-from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.generic.discrete.member_filter import MemberFilter
 from fmus import Batch
 from plant_models.hybrid import Runtime, TracedSystem, input_signal, scalar_names, state

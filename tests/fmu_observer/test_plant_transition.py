@@ -18,8 +18,7 @@ from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.models.known_models import MODELS
 from fmu_observer.models.traced_system_model import UNROLLED, Steps, find_filter_model, system_model
 from fmu_observer.observers.generic.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
-from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
-from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
+from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter, KalmanFilter
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem, Runtime, input_signal, output_signal, scalar_names, state

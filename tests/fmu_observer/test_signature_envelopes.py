@@ -11,8 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmu_observer.formulas.signatures.envelope import best_envelope, envelope, envelope_areas, rotated
-from fmu_observer.formulas.signatures.envelope_distance import envelope_distance, line_distance
+from fmu_observer.formulas.signatures.envelope import (
+    best_envelope,
+    envelope,
+    envelope_areas,
+    envelope_distance,
+    line_distance,
+    rotated,
+)
 
 LENGTH, THICKNESS, GAP = 4.0, 0.2, 0.5
 

@@ -13,8 +13,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.formulas.signatures import inversion
 from fmu_observer.formulas.signatures.class_distance import class_distance, envelope_numbers, line_slopes
 from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
-from fmu_observer.formulas.signatures.envelope import best_envelope
-from fmu_observer.formulas.signatures.envelope_distance import line_distance
+from fmu_observer.formulas.signatures.envelope import best_envelope, line_distance
 from fmu_observer.observers.exhibits import CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature
 from fmu_observer.observers.generic.signature.signature_observer import SignatureObserver, _blended
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names

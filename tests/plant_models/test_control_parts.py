@@ -10,8 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models.railway.control import MdpeController
-from plant_models.railway.control.brake_blending import air_brake_demand, electric_part
-from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
+from plant_models.railway.control.effort_limits import (
+    air_brake_demand,
+    electric_brake_limit,
+    electric_part,
+    traction_limit,
+)
 from plant_models.railway.control.mdpe_controller import (
     _built_up_after,
     _coupler_headroom,

@@ -7,8 +7,15 @@ import numpy as np
 from matplotlib.patches import Polygon
 from shared.sheet import Sheet
 
-from fmu_observer.formulas.signatures.envelope import ANGLES, Envelope, best_envelope, envelope, envelope_areas
-from fmu_observer.formulas.signatures.envelope_distance import envelope_distance, line_distance
+from fmu_observer.formulas.signatures.envelope import (
+    ANGLES,
+    Envelope,
+    best_envelope,
+    envelope,
+    envelope_areas,
+    envelope_distance,
+    line_distance,
+)
 
 SLABS = 30  # printed
 ANGLES_SHOWN = {"0": 0.0, "pi / 3": np.pi / 3.0, "pi / 2": np.pi / 2.0, "2 pi / 3": 2.0 * np.pi / 3.0}

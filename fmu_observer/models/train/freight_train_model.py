@@ -1,4 +1,6 @@
-"""The single-mass train as observers with balises see it: position and speed from an effort. Data only."""
+"""The single-mass train as observers see it: position and speed from an effort, measured at balises, or both by nodes
+of a network. Data only.
+"""
 
 from __future__ import annotations
 
@@ -45,3 +47,37 @@ def _remainder(x: Array, u: Array) -> Array:
     forward = np.clip(speed / _REST, -1.0, 1.0)
     resistance = _DAVIS_A * forward + DAVIS_B * speed + DAVIS_C * speed * np.abs(speed)
     return vector(0.0, -(resistance + (1.0 - forward) * np.minimum(u[0], 0.0)) / MASS)
+
+
+def networked_train() -> ObserverModel:
+    """`freight_train` with an odometer as a second measurement: position and speed, each on a node of its own [ours].
+
+    Both states are measured, so the model is a chain of one block: A is zero, and the equations stand in phi.
+    """
+    train = freight_train()
+    turned = np.array([[0.0, 1.0], [0.0, 0.0]])
+    slopes = tuple(turned + slope for slope in train.slopes)
+
+    def remainder(x: Array, u: Array) -> Array:
+        (_, speed), (_, acceleration) = x, train.remainder(x, u)
+        return vector(speed, acceleration)
+
+    return ObserverModel(
+        name="networked_train",
+        description="Single-mass train, position and speed measured by two nodes",
+        source="Bouchama 2024, (3.24)-(3.25), behind the network of Hann 2014, chapter 2",
+        states=train.states,
+        inputs=train.inputs,
+        measurements=(
+            *train.measurements,
+            input_signal("speed", "m/s", 0.0, "Speed told by the odometer"),
+        ),
+        A=np.zeros((2, 2)),
+        B=np.array([[0.0], [1.0 / MASS]]),
+        C=np.eye(2),
+        phi=remainder,
+        lipschitz=max(float(np.linalg.norm(slope, 2)) for slope in slopes),
+        slopes=slopes,
+        event="packet",
+        sample_period=0.1,
+    )

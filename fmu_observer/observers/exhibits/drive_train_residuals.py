@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.formulas.diagnosis.actuator_residual import centred, first_order_residual, rate_residual
+from fmu_observer.formulas.diagnosis.actuator import centred, first_order_residual, rate_residual
 from fmu_observer.formulas.diagnosis.finite_window_observer import finite_window_observer, sampled
 from fmu_observer.formulas.diagnosis.redundancy import disagreement
 from fmu_observer.formulas.diagnosis.residual_filters import residual_filter
-from fmu_observer.formulas.diagnosis.windowed_residual import windowed_square
+from fmu_observer.formulas.diagnosis.window_inversion import windowed_square
 from fmu_observer.observers.exhibits.pitch_residuals import BLOCKS
 from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
 from plant_models.hybrid import Array, matrix, memory, parameter, vector

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.formulas.diagnosis.actuator_residual import centred, second_order_residual
+from fmu_observer.formulas.diagnosis.actuator import centred, second_order_residual
 from fmu_observer.formulas.diagnosis.redundancy import disagreement
 from fmu_observer.formulas.diagnosis.residual_filters import residual_filter
-from fmu_observer.formulas.diagnosis.windowed_residual import windowed_square
+from fmu_observer.formulas.diagnosis.window_inversion import windowed_square
 from plant_models.hybrid import Array, matrix, memory, parameter, vector
 
 BLADES, SENSORS = 3, 6

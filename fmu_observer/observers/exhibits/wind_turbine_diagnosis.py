@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.diagnosis.redundancy import larger
-from fmu_observer.formulas.diagnosis.windowed_residual import Alarm, judge
+from fmu_observer.formulas.diagnosis.window_inversion import Alarm, judge
 from fmu_observer.observers.exhibits.drive_train_residuals import (
     DRIVE_MEMORY,
     DRIVE_PARAMETERS,

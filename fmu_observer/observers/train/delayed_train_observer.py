@@ -6,7 +6,7 @@ from typing import Any, Self
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.small_gain import independent_gap_limit, with_independent_samples
-from fmu_observer.models.train.networked_train_model import networked_train
+from fmu_observer.models.train.freight_train_model import networked_train
 from fmu_observer.observers.generic.delayed.delayed_state_observer import (
     BETWEEN,
     MEMORY_PLACES,

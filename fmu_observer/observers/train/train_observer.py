@@ -15,9 +15,9 @@ from fmu_observer.detection.slip_indicator import (
     SLIP_OUTPUTS,
     SLIP_PARAMETERS,
     indicator_level,
+    odometer_slip,
     slip_filter_derivative,
 )
-from fmu_observer.detection.slip_ratio import odometer_slip
 from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back

@@ -11,9 +11,13 @@ import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.railway.control.brake_blending import air_brake_demand, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
-from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
+from plant_models.railway.control.effort_limits import (
+    air_brake_demand,
+    electric_brake_limit,
+    electric_part,
+    traction_limit,
+)
 from plant_models.railway.control.logic import either, every, holds
 
 Drive = Literal["immediate", "ramped"]

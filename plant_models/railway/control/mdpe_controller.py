@@ -11,9 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
-from plant_models.railway.control.brake_blending import air_brake_demand, electric_part
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
-from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
+from plant_models.railway.control.effort_limits import (
+    air_brake_demand,
+    electric_brake_limit,
+    electric_part,
+    traction_limit,
+)
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.mode_switch import (
     COMBINED,

@@ -14,7 +14,7 @@ import fmus
 from cosim.errors import CosimError, CouplingError
 from cosim.results.results_folder import write_results
 from fmu_observer.annotated_variable import can_be_missing
-from fmu_observer.observers.generic.discrete.kalman_filter import KalmanFilter
+from fmu_observer.observers.generic.discrete.extended_kalman_filter import KalmanFilter
 from fmus import cached_fmu
 from fmus.check.run import check_fmu
 from fmus.fmi.description import read_description

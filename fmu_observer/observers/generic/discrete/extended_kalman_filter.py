@@ -1,4 +1,4 @@
-"""O11: the extended Kalman filter with exact Jacobians."""
+"""The extended Kalman filter with exact Jacobians, and that of linear models."""
 
 from __future__ import annotations
 
@@ -77,3 +77,31 @@ class ExtendedKalmanFilter(GaussianFilter):
         own = noise[chosen][:, chosen] if V is None else kalman.through(noise, V[chosen])
         own = kalman.decoupled(own, there)
         return kalman.correct(belief.estimate, belief.spread, innovation, H, own, None, self.form), innovation
+
+
+class KalmanFilter(ExtendedKalmanFilter):
+    """Kalman filter: Allaoui 2024, (2.1)-(2.24); Bouchama 2024, (1.33) and figure 1.1.
+
+    Prediction ``xh(k|k-1) = A_d xh + B_d u``, ``P(k|k-1) = A_d P A_d' + QN``; correction with P(k|k) in the chosen
+    form. Of an observer model A_d and B_d are the exact zero-order-hold discretisation at `sample_period`. The signals
+    are those of the extended filter, whose Jacobian is A_d here. Its condition is exact: with a stabilising solution of
+    the Riccati equation P converges to it from any start.
+
+    Args:
+        model: name of an observer model or of a plant, or one itself. options: those of `GaussianFilter`.
+
+    Raises:
+        ValueError: the model is nonlinear, or a mode of it does not decay and is not measured.
+    """
+
+    name = "kalman_filter"
+    description = "Kalman filter of a linear model"
+    source = "Allaoui 2024, (2.1)-(2.24); Bouchama 2024, (1.33)"
+
+    def __init__(self, model: Source = "linear_pendulum", **options: Any) -> None:
+        super().__init__(model, **options)
+        if not self.model.linear:
+            raise ValueError(
+                f"{self.name}: model {self.model.name!r} is nonlinear: its transition or its measurements are not "
+                "affine in the state. Use 'extended_kalman_filter', or linearise it."
+            )

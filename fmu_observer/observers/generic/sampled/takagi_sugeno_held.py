@@ -31,7 +31,7 @@ from fmu_observer.observers.model_signals import (
     measured_inputs,
     sampling_event,
 )
-from plant_models.hybrid import Array, Signal, memory
+from plant_models.hybrid import Array, Signal, memory, parameter, vector
 
 SPEED, _SPEED_GAP = 2.0, 0.4  # default poles from -min(SPEED [1/s], _SPEED_GAP / longest gap) on [ours]
 SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certified
@@ -186,3 +186,65 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         gains = np.concatenate([observer_gain(A, model.C, poles, states, who).ravel() for A in model.A])
         text = "Gains L_i, vertex after vertex, each row by row"
         return matrix_parameter("gain", gains, text)
+
+
+class TakagiSugenoAperiodic(TakagiSugenoHeld):
+    """Takagi-Sugeno observer at aperiodic samples, innovation and weights held: Bouchama 2024, (1.55).
+
+    ``dxh = sum_i h_i(z(t_k)) [A_i xh + B_i u + L_i (y(t_k) - C xh(t_k))]`` on ``[t_k, t_k+1)``. Weights and innovation
+    are frozen at the sample; the premises are read from the measurements there, and from the estimate where these do
+    not give them. Printed with damaged brackets; repaired.
+
+    Frozen weights leave an error of the order of what the premises change within a gap: it does not die out while the
+    plant moves.
+    """
+
+    name = "takagi_sugeno_aperiodic"
+    description = "Takagi-Sugeno observer at aperiodic samples, innovation and weights held"
+    source = "Bouchama 2024, (1.55)"
+
+    def weight_memory(self) -> tuple[Signal, ...]:
+        """The weights, until the first sample those of the start."""
+        start = self.model.weights(self.model.premise_values(self.model.start, np.zeros(len(self.model.inputs))))
+        weights = tuple(map(float, start))
+        return (memory("weight", "1", weights, "Weights h_i of the vertices at the last sample", size=len(weights)),)
+
+    def held_weights(self, estimate: Array, u: Any) -> dict[str, Array]:
+        """Weights at the sample."""
+        measured, count = self.measured(u), len(self.model.sampled)
+        best = self.model.informed(estimate, measured[:count], measured[count:] if self.model.continuous else None)
+        return {"weight": vector(*self.model.weights(self.model.premise_values(best, self.known(u))))}
+
+    def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
+        """Weights of the last sample."""
+        return tuple(x.weight)
+
+    def premise_remark(self) -> str:
+        """The weights are those of the last sample."""
+        return "what the premises change within a gap, an input to the error"
+
+
+class TakagiSugenoPeriodic(TakagiSugenoHeld):
+    """Takagi-Sugeno observer at periodic samples, innovation held: Bouchama 2024, (1.38)-(1.41).
+
+    ``dxh = sum_i h_i(zh) [A_i xh + B_i u + L_i (y(kT) - C xh(kT))]`` on ``[kT, (k+1) T)``. The printed bracket is
+    damaged; repaired to the held innovation with the sign that corrects. The weights follow the estimate. The unknown f
+    of (1.38) with ``|f| <= alpha |F x|`` is met by `condition`, as the slope it tolerates.
+    """
+
+    name = "takagi_sugeno_periodic"
+    description = "Takagi-Sugeno observer at periodic samples, innovation held"
+    source = "Bouchama 2024, (1.38)-(1.41)"
+    periodic = True
+
+    def timing_parameters(self) -> tuple[Signal, ...]:
+        """The sampling period."""
+        return (parameter("sample_period", "s", self.model.max_gap, "Sampling period of the measurements", min=1e-6),)
+
+    def weights(self, x: Any, u: Any) -> tuple[Array, ...]:
+        """Weights at the estimate."""
+        return self.model.weights(self.model.premise_values(self.estimates(x), self.known(u)))
+
+    def premise_remark(self) -> str:
+        """The weights are those of the estimate."""
+        return "their change within a gap, the difference between the weights of estimate and truth"

@@ -1,4 +1,4 @@
-"""First academic plant of chapter 2: four states, one nonlinear damping. Knows only the hybrid foundation."""
+"""Academic plants of chapter 2: four states with one nonlinear damping, and five. Knows only the hybrid foundation."""
 
 from __future__ import annotations
 
@@ -7,6 +7,46 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
+
+
+class NonTriangularisablePlant(HybridSystem):
+    """Five states with ``a = 1/(1 + x4^2)`` in row 3 and the product ``x1 x2`` in row 4: Bouchama 2024, (2.43)-(2.48).
+
+    The input matrix is the five-vector of the printed vertices, ``[1 0 1 -0.3a -1]'``. Driven by the printed
+    ``u = 5 sin(2 pi t)`` times `drive_gain`, plus the input `drive`; the drive that acts is an output, for the
+    observer. Starts in zero.
+    """
+
+    name = "non_triangularisable_plant"
+    description = "Second academic plant of chapter 2: five states, no triangular form"
+    source = "Bouchama 2024, section 2.5.2"
+    internal_step = 1e-3
+    states = tuple(state(f"state_{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4, 5))
+    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
+    outputs = (
+        *(output_signal(f"x{i}", "1", f"State {i}") for i in (1, 2, 3, 4, 5)),
+        output_signal("total_drive", "1", "Drive u that acts"),
+    )
+    parameters = (parameter("drive_gain", "1", 1.0, "Size of the printed drive"),)
+
+    def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        x1, x2, x3, x4, x5 = x
+        a = 1.0 / (1.0 + x4 * x4)
+        drive = self._drive(t, u, p)
+        return {
+            "state_1": -x1 + x2 + drive,
+            "state_2": -x2 + x3,
+            "state_3": -x2 - x3 - a * x5 + drive,
+            "state_4": -x1 * x2 - x4 + x5 - 0.3 * a * drive,
+            "state_5": -x2 - x3 - x5 - drive,
+        }
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
+
+    @staticmethod
+    def _drive(t: Array, u: Any, p: Any) -> Array:
+        return p.drive_gain * 5.0 * np.sin(2.0 * np.pi * t) + u.drive
 
 
 class TriangularisablePlant(HybridSystem):
