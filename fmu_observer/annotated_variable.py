@@ -23,10 +23,10 @@ carries each."""
 
 
 class AnnotatedVariable(ModelVariable):
-    """A variable of a model description with what annotations tell of it.
+    """A variable of a model description with what annotations say of it.
 
     Args:
-        warning: what is told after a run in which an output was not zero; None for nothing.
+        warning: what is reported after a run in which an output was not zero; None for nothing.
         marks: some of `MARKS`.
         attributes: those of `ModelVariable`, by name.
     """

@@ -1,4 +1,4 @@
-"""Event protocol: how a model with triggered events is told of them, and what it does with one that is told too late.
+"""Event protocol: how a model with triggered events is notified of them, and what it does with one that comes too late.
 
 The same words for the Python block and the exported FMU. Standard library only.
 """
@@ -25,7 +25,7 @@ reach.
 OUTCOME_TEXTS = {
     "accepted": "Events that took effect so far, on time or not",
     "replayed": "Of the accepted events, the late ones applied at their stamps",
-    "late": "Of the accepted events, the late ones applied when they were told",
+    "late": "Of the accepted events, the late ones applied when they arrived",
     "rejected": "Late events without effect so far",
     "lost": "Events announced so far of which nothing else is known",
     "doubted": "Of the accepted events, those that the model doubted",

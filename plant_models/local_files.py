@@ -55,7 +55,7 @@ def _module_name(file: Path, folder: Path) -> str:
 def _content(file: Path) -> bytes:
     try:
         return file.read_bytes()
-    except OSError:  # told by whoever runs it
+    except OSError:  # reported by whoever runs it
         return b""
 
 
@@ -64,7 +64,7 @@ def _imported(content: bytes) -> frozenset[str]:
     """First parts of the names that a file imports, within functions too."""
     try:
         nodes = list(ast.walk(ast.parse(content)))
-    except (SyntaxError, ValueError):  # told by whoever runs it
+    except (SyntaxError, ValueError):  # reported by whoever runs it
         return frozenset()
     names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     names += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module and not node.level]

@@ -42,7 +42,7 @@ class Events:
 
     `stamps`, `counts` and `active` (FMI 3: numbers of the active clocks) are set from outside, as are, before time
     runs, the two parameters in `protocol`: the number of the late policy, from one, and how far back it can go [s].
-    `listener` is told what is wrong with an event; where there is none, Python's log is. `seen` are the counts
+    `listener` gets what is wrong with an event; where there is none, Python's log is. `seen` are the counts
     already taken notice of, `queue` the events whose stamp lies ahead, `journal` the past for replay, where the policy
     needs it.
 

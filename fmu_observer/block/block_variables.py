@@ -171,7 +171,7 @@ class BlockVariables:
         return self.check_settable(reference, self.readable(reference), mode)
 
     def all_readable(self, references: Sequence[int]) -> list[Place]:
-        """The places of the real variables of these references, looked up once for each list; raises as `readable`."""
+        """The places of the real variables of these references, found once for each list; raises as `readable`."""
         key = tuple(references), None
         if key not in self._listed:
             self._listed[key] = [self.readable(reference) for reference in references]

@@ -209,14 +209,14 @@ class FMI3Block(FMIInterface, FMU3Slave):
 
     @refused
     def exitInitializationMode(self) -> None:
-        """End initialisation; time begins to run. A warning where nobody will be able to tell the events of the
+        """End initialisation; time begins to run. A warning where nobody will be able to announce the events of the
         block.
         """
         super().exitInitializationMode()
         if self._event_mode_used is False and self.system.triggered_events and not self._counts_events:
             names = ", ".join(event.name for event in self.system.triggered_events)
             self.instance.events.warn(
-                "%s: eventModeUsed is False, but events (%s) are announced by clocks: none can be told; a block with "
+                "%s: eventModeUsed is False, but events (%s) are announced by clocks: none arrives; a block with "
                 "announcement='counts' (an FMU built with `--events counts`) is for masters without event mode",
                 self.instanceName,
                 names,

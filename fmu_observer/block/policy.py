@@ -25,7 +25,7 @@ class Counters:
 
     Args:
         accepted: events that took effect, on time or not. replayed: of these, the late ones applied at their stamp.
-        late: of these, the late ones applied at the time they were told. rejected: late events without effect.
+        late: of these, the late ones applied at the time they arrived. rejected: late events without effect.
         lost: events announced (count raised by more than one, or too many waiting) of which nothing else is known.
         doubted: of the accepted ones, those that the model doubted. ignored: those it doubted and kept out.
     """
@@ -93,7 +93,7 @@ def communicate(runtime: Runtime, journal: Journal | None) -> None:
 
 
 def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> tuple[str, int]:
-    """Live the past again with `event` at its stamp: what comes out is what would be, had it been told in time.
+    """Live the past again with `event` at its stamp: what comes out is what would be, had it come in time.
 
     Args:
         runtime: at the present; what it was given is kept.

@@ -74,7 +74,7 @@ def describe(
         fmi_version: 2 or 3.
         preset: preset whose values become the start values; None for the system's default.
         model_name: name to show; None for the system's own.
-        protocol: how it is told of triggered events; by default as is usual in the FMI version.
+        protocol: how it is notified of triggered events; by default as is usual in the FMI version.
         model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events
             can be.
 
@@ -114,10 +114,10 @@ def _without_structure(
 
 def _add_structure(system: HybridSystem, description: ModelDescription) -> None:
     """What depends on what, and the token, which follows from it."""
-    table, facts, variables = VariableTable.of(system), _traced_once(system), description.modelVariables
-    outputs = _unknowns(variables, table.outputs, facts["output"])
-    derivatives = _unknowns(variables, table.derivatives, facts["derivative"])
-    # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
+    table, traced, variables = VariableTable.of(system), _traced_once(system), description.modelVariables
+    outputs = _unknowns(variables, table.outputs, traced["output"])
+    derivatives = _unknowns(variables, table.derivatives, traced["derivative"])
+    # A master that knows none of these takes each to depend on every input, and sees algebraic loops where there
     # are none.
     description.initialUnknowns = [*outputs, *derivatives]
     description.outputs, description.derivatives = (
@@ -126,7 +126,7 @@ def _add_structure(system: HybridSystem, description: ModelDescription) -> None:
     indicators = referenced(variables, table.indicators, len(system.frictions) + len(system.switchings))
     description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
     description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
-    description.instantiationToken = _token(system, description, facts["equations"])
+    description.instantiationToken = _token(system, description, traced["equations"])
 
 
 def can_exchange(system: HybridSystem) -> bool:

@@ -14,7 +14,7 @@ from plant_models.hybrid import HybridSystem, Signal, TriggeredEvent
 FmiVersion = Literal[2, 3]
 
 STAMP_NOW = -1.0e30
-"""Start value of ``<event>_time``: the event happened at the time at which it is told."""
+"""Start value of ``<event>_time``: the event happened at the time at which it is notified."""
 
 LATE_POLICY_TYPE = "LatePolicy"
 DISPLAY_UNITS = {"m/s": "km/h"}
@@ -29,7 +29,7 @@ def model_variables(
     Args:
         system: the hybrid system. fmi_version: 2 or 3.
         preset: whose values become the start values; None for the system's default.
-        protocol: how the system is told of triggered events.
+        protocol: how the system is notified of triggered events.
     """
     table = VariableTable.of(system)
     real = "Real" if fmi_version == 2 else "Float64"
@@ -175,7 +175,7 @@ def late_policy_type() -> SimpleType:
     texts = {
         "replay": "Back to the stamp, jump, forward again",
         "reject": "No effect but a warning",
-        "late": "Jump when told; for comparison only",
+        "late": "Jump when notified; for comparison only",
     }
     items = [Item(name=name, value=str(i + 1), description=texts[name]) for i, name in enumerate(LATE_POLICIES)]
     return SimpleType(

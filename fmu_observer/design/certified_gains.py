@@ -19,7 +19,7 @@ def certified_gains(
 ) -> Gains | None:
     """Gains of a family with the largest theta up to ``LIMIT / gap``, to three digits, certified for a gap.
 
-    The limit goes as 1 / theta but for the drag, so the limit at one theta tells the next. What the drag would allow
+    The limit goes as 1 / theta but for the drag, so the limit at one theta gives the next. What the drag would allow
     beyond ``LIMIT / gap`` is not sought.
 
     Args:

@@ -134,7 +134,7 @@ def verdict(rules: Rules, m: Any, p: Any) -> dict[str, Array]:
 
 
 def stated_bounds(rules: Rules) -> dict[str, str]:
-    """The parameter that bounds the noise of an input, by its name; the printed rules are told nothing of noise.
+    """The parameter that bounds the noise of an input, by its name; the printed rules know nothing of noise.
 
     Args:
         rules: that judge.
@@ -148,7 +148,7 @@ def noise_warnings(p: Any) -> list[str]:
         return []
     half, sure = float(doubt_limit(p) / p.residual_gain), float(certain_fault(p))
     return [
-        f"readings are told to be within {float(p.odometer_noise):.3g} m/s of the speed ({NOISE}), which makes a "
+        f"readings are stated to be within {float(p.odometer_noise):.3g} m/s of the speed ({NOISE}), which makes a "
         f"residual of {float(doubt_limit(p)):.3g} m/s, beyond the threshold of {float(p.threshold):.3g} m/s. The rules "
         f"take the former, and find a fault that moves a reading by {half:.3g} m/s in one of two cases, by "
         f"{sure:.3g} m/s always; smaller ones are noise to them. A longer period or more teeth make less noise."
@@ -161,13 +161,13 @@ class JamDetector(HybridSystem):
 
     The inputs are read every `odometer_period`: the `residual` ``M (y - vh)`` of an observer, the `odometer` y and the
     `estimated_speed` vh, and the `effort`, of which the sign alone counts (zero where it is not connected: jams and
-    skids are then possible at all times). With the repaired rules (`RepairedRules`) a fault is told at the sample that
-    shows it, with the printed ones (`_PrintedRules`) at the next.
+    skids are then possible at all times). With the repaired rules (`RepairedRules`) a fault is reported at the sample
+    that shows it, with the printed ones (`_PrintedRules`) at the next.
 
     The detector says that the odometer lies; it does not keep it from the observer. While it says so the repaired rules
     take it that the observer runs on its model alone, and that its speed is set to the odometer when the fault ends.
     `quasi_lpv_uio` has the rules built in and does both. Beside an observer that goes on following a lying odometer the
-    residual fades, and the end of the fault is told too early.
+    residual fades, and the end of the fault is reported too early.
 
     Args:
         rules: ``repaired`` or ``printed``.

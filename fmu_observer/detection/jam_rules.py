@@ -115,7 +115,7 @@ class Rules(Protocol):
         """
 
     def discarded(self, m: Any) -> Array:
-        """1 while the estimate must not follow the odometer: while it is judged to lie, unless the rules tell more.
+        """1 while the estimate must not follow the odometer: while it is judged to lie, unless the rules know more.
 
         Args:
             m: named tuple with the `memory`.
@@ -174,7 +174,7 @@ class RepairedRules(Rules):
        the limit where that is longer.
 
     A fault begins where ``|r| > eps'``, of either sign, in time to keep the very sample out; or where balises refute
-    the way of an odometer that was believed twice in a row. eps' is eps, or what the noise that is told of the odometer
+    the way of an odometer that was believed twice in a row. eps' is eps, or what the noise stated of the odometer
     makes of a residual, ``sqrt(2) M nu``, where that is more (`doubt_limit`); a residual is small that is below eps / 2
     or explained by noise (`settled_limit`). None is judged before `arming_delay` has passed and the residual has been
     small for `settle_samples` (until then an odometer that is not proven is followed at once
@@ -326,7 +326,7 @@ def _compared(m: Any, reading: Reading, p: Any) -> _Compared:
     size = np.abs(reading.residual)
     sign = indicator(reading.effort > 0.0) - indicator(reading.effort < 0.0)
     effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
-    # Of a period in which the sign changes a part is unknown, and a reading tells of the period before it.
+    # Of a period in which the sign changes a part is unknown, and a reading shows of the period before it.
     brief = p.release_time + p.odometer_period
     lasting = sign * indicator(np.abs(effort_time) + ROUNDING >= brief)
     large = indicator(size > doubt_limit(p))

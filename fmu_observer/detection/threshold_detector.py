@@ -1,4 +1,4 @@
-"""The three-threshold fault detector: a residual raises it, has to fall, and tells the end of the fault when it rises
+"""The three-threshold fault detector: a residual raises it, has to fall, and shows the end of the fault when it rises
 again.
 
 Its rules are pure functions, which an observer with a detector inside uses too; the detector is a system of its own.

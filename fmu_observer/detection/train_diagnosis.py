@@ -80,18 +80,19 @@ class TrainDiagnosis(HybridSystem):
     compared with the way of each source. Over a window of some seconds the train as one point is inverted for the share
     of traction and of brake force that arrives. Each residual is divided by its threshold and raises an alarm above 1;
     `MOTION`, `BRAKE` and `TRACTION` say which fault moves which, and the fault that explains the alarms and asks for
-    least is told. One fault at a time in each of the three groups; the second odometer must be on another axle. While
-    any alarm is raised `fault` is 1, whether it is isolated, suspected or, as `several_faults` says, explained by none,
-    or not by the one that is isolated and stays so. Satellites and balises are compared with every source of speed: a
-    fault explains their residuals where it moves all sources that they contradict.
+    least is reported. One fault at a time in each of the three groups; the second odometer must be on another axle.
+    While any alarm is raised `fault` is 1, whether it is isolated, suspected or, as `several_faults` says, explained by
+    none, or not by the one that is isolated and stays so. Satellites and balises are compared with every source of
+    speed: a fault explains their residuals where it moves all sources that they contradict.
 
     An odometer that is off while an effort acts that can make its wheel slip or jam is put down to the wheel; where it
     is off for `contrary_time` without such an effort, or to the other side, to the sensor. A wheel that is locked and a
-    sensor that reads zero are not told apart before the brake is released. Slip of all wheels is no explanation either
-    where an odometer is off so: two that are off alike are told as several, and as the rail under an effort that slips.
+    sensor that reads zero are not distinguished before the brake is released. Slip of all wheels is no explanation
+    either where an odometer is off so: two that are off alike are reported as several, and as the rail under an effort
+    that slips.
 
-    Sensors that are not connected are not fitted: less can be told apart then (`isolability`), and `isolation_limited`
-    says so. While speeds disagree, and a window after, no share of force is found.
+    Sensors that are not connected are not fitted: less can be distinguished then (`isolability`), and
+    `isolation_limited` says so. While speeds disagree, and a window after, no share of force is found.
 
     Args:
         speed_window: samples N of a pair of speeds. gps_window: samples L of a difference of satellite positions.
@@ -142,7 +143,7 @@ class TrainDiagnosis(HybridSystem):
 
     @staticmethod
     def isolability(fitted: tuple[str, ...]) -> dict[str, tuple[str, ...] | None]:
-        """What can be told with these sensors, see `fmu_observer.detection.train_isolation.isolability`.
+        """What can be isolated with these sensors, see `fmu_observer.detection.train_isolation.isolability`.
 
         Args:
             fitted: names of sensors.

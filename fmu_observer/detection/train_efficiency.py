@@ -37,8 +37,8 @@ class Share(NamedTuple):
     """Share of a force that arrives.
 
     Attributes:
-        value: smoothed [1]. found: 1 where this window told something, else 0. bracketed: 1 where the share lies within
-            the grid that was looked through, else 0: then `value` goes to the nearer end.
+        value: smoothed [1]. found: 1 where this window gave a value, else 0. bracketed: 1 where the share lies within
+            the grid that was searched, else 0: then `value` goes to the nearer end.
     """
 
     value: Array
@@ -152,7 +152,7 @@ def brake_share(
 
 
 def _share_where_found(share: Inverted, found: Array, previous: Array) -> Share:
-    """A share where the window tells one, else the last."""
+    """A share where the window shows one, else the last."""
     value = np.where(found > 0.0, share.value, previous)
     return Share(value, found, found * np.where(share.crossings > 0.5, 1.0, 0.0))
 

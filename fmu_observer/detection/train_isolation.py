@@ -110,8 +110,8 @@ def _available_residuals(fitted: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def isolability(fitted: tuple[str, ...]) -> dict[str, tuple[str, ...] | None]:
-    """What can be told with these sensors, by fault: None where it is not detected, else the faults that it cannot be
-    told apart from; none is an isolated fault.
+    """What can be isolated with these sensors, by fault: None where it is not detected, else the faults that it cannot
+    be distinguished from; none is an isolated fault.
 
     Args:
         fitted: names from `SENSORS`; faults of sensors that are not there are left out.

@@ -1,5 +1,5 @@
-"""A wheel that jams or skids, told by the signature of its odometer's record alone. Uses the trained classes and the
-pencil map.
+"""A wheel that jams or skids, detected by the signature of its odometer's record alone. Uses the trained classes and
+the pencil map.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class WheelSignature(HybridSystem):
     coordinates and clouds of Omar 2012, sections 3.4.2-3.4.5, for a train [ours].
 
     At each reading the record of the last four changes is *steady*, a *drop* or a *rise*. A drop begins a jam and a
-    rise ends it; a rise of a wheel that was believed begins a skid and a drop ends it. A change that is told does not
-    enter the record, and a second one of the same kind at the next reading belongs to the first, for a reading is a
+    rise ends it; a rise of a wheel that was believed begins a skid and a drop ends it. A change that is reported does
+    not enter the record, and a second one of the same kind at the next reading belongs to the first, for a reading is a
     mean over the period in which the fault began. A fault that does not end is given up after `hold_limit`.
 
     The detector knows neither effort nor model, so it serves where no observer runs, and it is worse than

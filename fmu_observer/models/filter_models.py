@@ -52,7 +52,7 @@ class FilterModel(NamedStates):
             noise on every state. measurement_noises: likewise for the measurements.
         moved: the transition f over a period, plain NumPy that can be traced; ignores w where noise is additive.
         measured: h, likewise.
-        event: name of the event at which a measurement arrives unless told otherwise. sample_period: [s].
+        event: name of the event at which a measurement arrives unless set otherwise. sample_period: [s].
         any_period: whether `moved` holds for any period from zero; otherwise for one sampling period at a time.
         longest_period: the longest one for which it is as accurate as the system that it comes from [s].
         deviates: whether f or h is not affine in the state; None for what the traced functions show.

@@ -18,7 +18,7 @@ from fmu_observer.models.named_states import NamedStates
 from plant_models.hybrid import Array, Signal, vector
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 
-_PROBES = 5  # states at which a phi of unknown slope is looked at
+_PROBES = 5  # states at which a phi of unknown slope is examined
 
 Remainder = Callable[[Array, Array], Array]  # (x of shape (n,), u of shape (m,)) -> shape (n,)
 
@@ -41,7 +41,7 @@ class ObserverModel(NamedStates):
         slopes: matrices of shape (n, n) whose convex hull holds the Jacobian of `phi` over that range. Certificates of
             a nonlinear model need them.
         event: name of the event at which a sampled measurement arrives.
-        sample_period: sampling period [s] that observers assume unless told otherwise.
+        sample_period: sampling period [s] that observers assume unless set otherwise.
         unknown_inputs: scalar signals by `input_signal`, the inputs d that nobody measures; unknown-input observers
             know what to do with them, the others leave them out.
         H: how the unknown inputs act, shape (n, nd).

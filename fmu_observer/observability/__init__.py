@@ -1,4 +1,4 @@
-"""Can the measurements tell the states? Modes no sensor sees, and the Gramian over an actual pattern of balises.
+"""Do the measurements determine the states? Modes no sensor sees, and the Gramian over an actual pattern of balises.
 
 Linear algebra on matrices; they come from the user, from an observer model, or from a hybrid system at an operating
 point.

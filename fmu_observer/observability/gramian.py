@@ -1,4 +1,4 @@
-"""The observability Gramian over a pattern: what the measurements of an actual run tell of the state at its start.
+"""The observability Gramian over a pattern: what the measurements of an actual run show of the state at its start.
 
 ``W = int exp(A't) Cc'Cc exp(A t) dt + sum exp(A'tk) Cs'Cs exp(A tk)``; x0' W x0 is the energy of all that is measured.
 [ours: the thesis treats observability by rank conditions only]
@@ -32,7 +32,7 @@ _BASE_NORM = 0.5  # of A h, for the step that the doubling starts from
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """What a pattern of measurements tells of the state at its start. All in states divided by their scales.
+    """What a pattern of measurements shows of the state at its start. All in states divided by their scales.
 
     Attributes:
         system: the matrices asked about. pattern: the instants.
@@ -71,7 +71,7 @@ class Observability:
         count, n = len(self.pattern.instants), self.system.order
         plural = "" if count == 1 else "s"
         head = (
-            f"{self.system.name}: {count} sample{plural} in {self.pattern.duration:.4g} s tell {self.rank} of {n} "
+            f"{self.system.name}: {count} sample{plural} in {self.pattern.duration:.4g} s show {self.rank} of {n} "
             f"states"
         )
         if self.observable:
@@ -176,7 +176,7 @@ def _transition(A: np.ndarray, gap: float) -> np.ndarray:
 def _unseen(scaled: MeasuredSystem, pattern: SamplePattern, tolerance: float) -> np.ndarray:
     """Basis of what neither the continuous measurement, over any interval, nor a sample shows, shape (n, k).
 
-    A measured row that is smaller than what rounding could have made of zero tells nothing.
+    A measured row that is smaller than what rounding could have made of zero shows nothing.
     """
     assert isinstance(scaled.C_continuous, np.ndarray)
     assert isinstance(scaled.C_sampled, np.ndarray)

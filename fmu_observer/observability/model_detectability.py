@@ -12,7 +12,7 @@ from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import UnobservableError, require_detectable
 
-_POINTS = 4  # further states at which a nonlinear model is looked at
+_POINTS = 4  # further states at which a nonlinear model is examined
 
 
 def require_detectable_vertices(model: TakagiSugenoModel, asking: str) -> None:

@@ -29,7 +29,7 @@ _PART = 1e-6
 
 
 class UnobservableError(ValueError):
-    """The measurements cannot tell the states; the message says which mode.
+    """The measurements do not determine the states; the message says which mode.
 
     Args:
         message: for the user. modes: those that are not seen.

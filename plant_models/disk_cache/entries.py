@@ -19,7 +19,7 @@ FORMAT = "fmu-observer cache 1"
 
 
 class _DamagedEntryError(ValueError):
-    """A file in the cache is not the entry that was looked for; the message says why."""
+    """A file in the cache is not the entry that was searched for; the message says why."""
 
 
 def remembered(kind: str, key: str | None, compute: Callable[[], Any]) -> Any:
@@ -46,7 +46,7 @@ def remembered(kind: str, key: str | None, compute: Callable[[], Any]) -> Any:
 
 
 def recall(kind: str, key: str) -> Any:
-    """The value of an entry, or None where there is none; a damaged or foreign entry is told in the log.
+    """The value of an entry, or None where there is none; a damaged or foreign entry is reported in the log.
 
     Args:
         kind: as for `remembered`. key: digest of what the value follows from.
@@ -62,7 +62,7 @@ def recall(kind: str, key: str) -> Any:
 
 
 def keep(kind: str, key: str, value: Any) -> Any:
-    """Write an entry in one move; a folder that cannot be written keeps nothing, which the log tells as information.
+    """Write an entry in one move; a folder that cannot be written keeps nothing, which the log notes as information.
 
     Args:
         kind: as for `remembered`. key: digest of what the value follows from. value: as for `remembered`.

@@ -15,7 +15,7 @@ class GasPhaseReaction(NoisyPlant):
 
     x1 and x2 are the partial pressures of A and B, scaled. ``x1(t) = x1(0) / (1 + 2 b x1(0) t)``, and ``x1 + 2 x2``
     stays what it is. Presets: `as_published` (default), b = 0.15 and samples each 0.01 s; the thesis prints no start,
-    (2.5, 0.5) is ours. `wide_samples`, samples each 0.1 s, with which the rate can be told from noise [ours].
+    (2.5, 0.5) is ours. `wide_samples`, samples each 0.1 s, with which the rate can be distinguished from noise [ours].
     `literature`, b = 0.16, start (3, 1), samples each 0.1 s, as in Haseltine and Rawlings 2005.
     """
 

@@ -25,7 +25,7 @@ class _Regulated:
     """What a feedback controls.
 
     Attributes:
-        inputs: state as the feedback is told it. output: the force. gain: K of ``u = -K x``.
+        inputs: state as the feedback gets it. output: the force. gain: K of ``u = -K x``.
     """
 
     inputs: tuple[Signal, ...]
@@ -98,8 +98,8 @@ class StateFeedback(HybridSystem):
         super().__init__(plant=plant)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        told = [getattr(u, s.name) for s in self.inputs]
-        wanted = -sum(p.gain[i] * value for i, value in enumerate(told))
+        states = [getattr(u, s.name) for s in self.inputs]
+        wanted = -sum(p.gain[i] * value for i, value in enumerate(states))
         limited = np.minimum(np.maximum(wanted, -p.force_limit), p.force_limit)
         return {"held_force": np.where(p.force_limit > 0.0, limited, wanted)}
 

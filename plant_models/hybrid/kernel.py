@@ -2,7 +2,7 @@
 
 A kernel works in place on three arrays (state, inputs, parameters). `TracedKernel` calls CasADi functions through
 preset buffers, `NumpyKernel` calls the Python functions themselves; both have the same interface and `runtime` cannot
-tell them apart.
+distinguish them.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def _trace(system: HybridSystem) -> dict[str, str]:
 
 def check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> None:
     """Refuse a system that reads the payload of an event before or without that event: it would depend on when it was
-    told.
+    reported.
 
     Args:
         system: the hybrid system.

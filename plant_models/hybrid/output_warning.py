@@ -1,4 +1,4 @@
-"""What an output warns of: a number other than zero in it, or one that it never reached, is told after the run.
+"""What an output warns of: a number other than zero in it, or one that it never reached, is reported after the run.
 
 Declared beside the output, carried by block and FMU alike. Standard library only.
 """
@@ -18,7 +18,7 @@ class OutputWarning:
     Args:
         text: what that means and what to do, in words that follow the name of the component and begin with a verb or a
             noun, without a full stop.
-        shows: outputs of the same system whose values are told beside it.
+        shows: outputs of the same system whose values are reported beside it.
         at_end: only the last row of a run counts; otherwise every row does.
         reaches: what the output comes to in a run that is long enough; where it is given, staying below it is what is
             warned of, and other numbers are none.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 MOST_NAMED = 4
-"""Values that are told of one requirement, as in `runtime/model.h` of the C runtime."""
+"""Values that are named of one requirement, as in `runtime/model.h` of the C runtime."""
 
 
 def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def unfulfilled(system: HybridSystem, p: np.ndarray, start: np.ndarray | None = 
     for text, fulfilled in needed.items():
         if not fulfilled:
             names, (places,) = _value_names(system), named_values(system, [text])
-            values = [*p, *(() if start is None else start)]
-            told = ", ".join(f"{names[i]} = {float(values[i])!r}" for i in places[:MOST_NAMED])
-            return f"{text} ({told})" if told else text
+            known = [*p, *(() if start is None else start)]
+            values = ", ".join(f"{names[i]} = {float(known[i])!r}" for i in places[:MOST_NAMED])
+            return f"{text} ({values})" if values else text
     return None

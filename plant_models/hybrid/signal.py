@@ -40,7 +40,7 @@ class Signal:
         symmetric: whether that vector holds the upper triangle alone.
         display_unit: unit to show at the user's edge, e.g. ``km/h``.
         integer: a whole number to the outside; only a discrete output can be one.
-        warning: what is told after a run in which the value was not zero; of scalar outputs only.
+        warning: what is reported after a run in which the value was not zero; of scalar outputs only.
         optional: an input that keeps its start value on purpose where nothing is connected to it: nobody is warned.
         can_be_missing: NaN stands for a value that is missing: an output that may have none, an input that leaves out
             what is missing.
@@ -236,7 +236,7 @@ def output_signal(
         name: of the signal. unit: SI, as FMI writes units (``m/s2``). description: one line.
         variability: FMI's word. display_unit: for the user's edge. size: number of elements, None for a scalar.
         integer: whether the FMU shows it as an integer variable.
-        warning: what is told after a run in which the value was not zero; None for nothing.
+        warning: what is reported after a run in which the value was not zero; None for nothing.
         can_be_missing: NaN is a missing value, where there is none.
     """
     kept = (None, None, description, size, display_unit, integer, warning)

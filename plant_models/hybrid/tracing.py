@@ -296,9 +296,9 @@ class TracedSystem:
         else:  # it returned something wrong, and is no longer on the stack
             code = getattr(type(self.system), WRITTEN_AS.get(function, function)).__code__
             place = f"{code.co_filename}:{code.co_firstlineno}"
-        told = bool(users) and "raise " in str(users[-1].line)  # in words of its own, which know better
+        explained = bool(users) and "raise " in str(users[-1].line)  # in words of its own, which know better
         of_kind = isinstance(error, (AttributeError, NameError, LookupError)) or not users
-        advice = "" if of_kind or told else f" {ADVICE}"
+        advice = "" if of_kind or explained else f" {ADVICE}"
         reason = str(error).removeprefix(f"{self.system.name}: ").removesuffix(".") + _hint(error)
         return f"{self.system.name}: cannot trace {WRITTEN_AS.get(function, function)}: {reason} (at {place}).{advice}"
 

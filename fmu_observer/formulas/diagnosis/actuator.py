@@ -49,7 +49,7 @@ def identified_actuator(
             least squares.
 
     Raises:
-        ValueError: recordings are not of one length, or the actuator does not move enough to tell both.
+        ValueError: recordings are not of one length, or the actuator does not move enough to show both.
     """
     reading, asked = _recordings(measured, reference)
     filters = residual_filter(time_constant, sample_period)
@@ -60,7 +60,7 @@ def identified_actuator(
         instruments = _terms(filters, _response(nominal, asked, sample_period), asked)[:, settled:]
     moments = instruments[:2] @ rows[:2].T
     if not np.linalg.cond(moments) < 1e12:
-        raise ValueError("identified_actuator: the actuator does not move enough to tell frequency and damping.")
+        raise ValueError("identified_actuator: the actuator does not move enough to show frequency and damping.")
     square, slope = np.linalg.solve(moments, instruments[:2] @ -rows[2])
     if square <= 0.0:
         raise ValueError(f"identified_actuator: wn^2 comes out as {square:g}: too much noise, or too little motion.")

@@ -64,8 +64,8 @@ def finite_window_observer(
 ) -> _FiniteWindowObserver:
     """``x_k = pinv(O) (Y_k - M U_k)``: Omar 2012, (7.7.1)-(7.7.3); for the last sample the model brings it there.
 
-    Where the window does not show the whole state, the directions it leaves open are told, and the estimate has zero
-    along them at the first sample.
+    Where the window does not show the whole state, the directions it leaves open are reported, and the estimate has
+    zero along them at the first sample.
 
     Args:
         A: of ``x+ = A x + B u``, shape (n, n). B: shape (n, m). C: of ``y = C x``, shape (p, n).

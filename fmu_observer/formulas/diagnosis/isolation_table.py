@@ -1,6 +1,6 @@
 """Which fault explains a set of alarms: structured residuals by a table of faults and the residuals that they move.
 
-Pure functions that trace where a detector executes them; what can be told apart at all is computed before.
+Pure functions that trace where a detector executes them; what can be distinguished at all is computed before.
 """
 
 from __future__ import annotations

@@ -38,9 +38,9 @@ def disagreement(first: Array, second: Array) -> Array:
 def larger(disagree: Array, first: Array, second: Array) -> Isolation:
     """A fault of a sensor or of the system: Omar 2012, 7.5.1 (i), (7.6.9), (7.6.13), from the sizes of the residuals.
 
-    Where sensors disagree, the one with the larger residual is at fault. Sensors that agree tell, where both contradict
-    the model, a fault of the actuator or of the system. A fault that moves the model's state moves the residuals of
-    both sensors; their order still tells.
+    Where sensors disagree, the one with the larger residual is at fault. Sensors that agree decide, where both
+    contradict the model, a fault of the actuator or of the system. A fault that moves the model's state moves the
+    residuals of both sensors; their order still decides.
 
     Args:
         disagree: 1 where the sensors differ by more than their threshold, else 0.

@@ -1,9 +1,9 @@
 """Whether a filter's covariance fits its errors: normalised squares, chi-square bands, a verdict. NumPy and SciPy.
 
-A consistent filter has errors of the size that its covariance tells. Then the normalised square of the estimation error
-(NEES) is chi-square distributed with as many degrees of freedom as there are states, that of the innovation (NIS) with
-as many as there are measurements, and innovations of different samples do not depend on each other: Bar-Shalom, Li,
-Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), section 5.4.
+A consistent filter has errors of the size that its covariance states. Then the normalised square of the estimation
+error (NEES) is chi-square distributed with as many degrees of freedom as there are states, that of the innovation (NIS)
+with as many as there are measurements, and innovations of different samples do not depend on each other: Bar-Shalom,
+Li, Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), section 5.4.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Consistency:
         independent: how many independent ones they are worth.
         inside: share of the samples inside the pointwise 95 % band.
         band: that holds the mean of 99 % of consistent filters.
-        verdict: ``overconfident`` where the mean lies above the band: errors are larger than told.
+        verdict: ``overconfident`` where the mean lies above the band: errors are larger than stated.
     """
 
     degrees: float

@@ -13,7 +13,7 @@ become fewer, else only the one that is wrong by the largest force, so that no s
 with a fallback, Judice and Pires, Comput. Oper. Res. 21 (1994) 587; the choice of the one is ours). What a pass returns
 is clipped, so that it keeps the bounds after any number of passes. A bound of a disturbance is held alike, on the noise
 of a transition before it moves the state. At the end the trajectory is followed once more, each disturbance within its
-bounds, and what it then lacks to be a course of the model is told.
+bounds, and what it then lacks to be a course of the model is reported.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ KEPT = 8  # problems whose sweeps are known as functions, so that they are trace
 FAR = 5.0  # of a measurement's own deviations: noise is not that far off [ours]
 _NEAR = 1e-6  # of its standard deviation: so near a bound a disturbance touches it
 _SOFT = 1e-10  # of its variance: what a state may still move where a bound holds it, so that bounds that depend on each
-# other share a force, whose sign tells which of them to let go
+# other share a force, whose sign shows which of them to let go
 _COLLAPSED = 1e-6  # of its variance: a state that has less is held by a bound, or known
 _SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 

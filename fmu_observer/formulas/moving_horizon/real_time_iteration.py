@@ -1,6 +1,6 @@
 """The real-time iteration: a row arrives, the oldest leaves into the arrival cost, a fixed number of passes follows.
 
-And what an observer remembers and tells of it, as signals. It knows no observer.
+And what an observer remembers and reports of it, as signals. It knows no observer.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ WINDOW_OUTPUTS = {
     "course_error": "Largest part of an estimate that the model and its disturbance do not explain, in its deviations",
     "unsettled": "1 while the window is not a course of the model, or its last pass changed an estimate much",
 }
-"""What is told of a window, outputs by name."""
+"""What is reported of a window, outputs by name."""
 _WARNINGS = {
     "bounds_contradicted": OutputWarning(
         "its bounds contradict its window: they hold the estimate while more than half of the measurements, or of the "

@@ -81,7 +81,7 @@ class SearchStage:
     """One decision: is it this class, or one of those left?
 
     Args:
-        label: of the class that is told apart. plane: in which. rivals: what holds it apart from each class left.
+        label: of the class that is distinguished. plane: in which. rivals: what holds it apart from each class left.
         margin: width of the narrowest strip, as a share of the range across it.
     """
 
@@ -109,7 +109,7 @@ class SignatureClassifier:
     """Decisions one after another, each on a plane of its own: Omar 2012, section 3.4.5.
 
     Args:
-        stages: in their order. last: label of what no stage has told apart. labels: all.
+        stages: in their order. last: label of what no stage has distinguished. labels: all.
     """
 
     stages: tuple[SearchStage, ...]
@@ -144,10 +144,10 @@ class SeparationError(ValueError):
 def train_classifier(
     records: np.ndarray, labels: Sequence[Hashable], space: PencilSpace, *, overlap: bool = False
 ) -> SignatureClassifier:
-    """Decisions that tell classes apart, by random search: Omar 2012, section 3.4.5.
+    """Decisions that distinguish classes, by random search: Omar 2012, section 3.4.5.
 
     Pairs of coordinates are drawn. In the pair with the widest strip around one class, all classes that it holds apart
-    by the margin are told apart, and the search goes on with the rest.
+    by the margin are distinguished, and the search goes on with the rest.
 
     Args:
         records: of all experiments, samples first, shape (K, n). labels: class of each, n of them. space: what is

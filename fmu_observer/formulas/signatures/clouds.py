@@ -82,7 +82,7 @@ class _Extent(NamedTuple):
 
 
 def extent(points: np.ndarray) -> _Extent:
-    """How far a cloud reaches; of many clouds that are compared in pairs each is looked through once.
+    """How far a cloud reaches; of many clouds that are compared in pairs each is searched once.
 
     Args:
         points: shape (2, n).

@@ -2,7 +2,7 @@
 beforehand. Pure functions that trace, so that observers carry them; they know nothing but NumPy.
 
 The map from states to properties is given as values at the nodes of a grid. What inverts it needs no iteration over an
-unknown number of steps: every curve, cell or candidate is looked at, and the best one is taken.
+unknown number of steps: every curve, cell or candidate is examined, and the best one is taken.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Found(NamedTuple):
     """What a look-up gives.
 
     Attributes:
-        values: the quantities looked up, shape (m,). outside: how far the properties lie beyond the table, in cells of
+        values: the quantities found, shape (m,). outside: how far the properties lie beyond the table, in cells of
             it [1]; 0 within.
     """
 
@@ -144,7 +144,7 @@ def network_inverse(
 
     Args:
         first: nodes of the first quantity, shape (a,). second: of the second, shape (b,).
-        network: both properties at the nodes, shape (a, b) each. point: properties looked up, shape (2,).
+        network: both properties at the nodes, shape (a, b) each. point: properties found, shape (2,).
         extrapolated: how far the place may lie beyond its cell, in cells [1].
 
     Returns:
@@ -197,7 +197,7 @@ def weighted_inverse(
 
     Args:
         places: quantities at k nodes, shape (k, m). properties: of the nodes, shape (k, ...) each. point: properties
-            looked up, shape (...) each. sharpness: mu [1].
+            found, shape (...) each. sharpness: mu [1].
 
     Returns:
         The quantities, shape (m, ...).
@@ -312,7 +312,7 @@ def require_monotone(name: str, nodes: np.ndarray, values: np.ndarray, where: st
         column = steps[(slice(None), *turning[0])]
         i = int(np.argmax(np.sign(column) != np.sign(column[np.argmax(np.abs(column))])))
         raise ValueError(
-            f"signature table: the property does not tell {name} between {nodes[i]:g} and {nodes[i + 1]:g}"
+            f"signature table: the property does not show {name} between {nodes[i]:g} and {nodes[i + 1]:g}"
             f"{' ' + where if where else ''}: it turns there, expected one that rises or falls throughout "
             f"{nodes[0]:g} to {nodes[-1]:g}. Narrow the range, or take another property, scaling or order."
         )

@@ -62,7 +62,7 @@ def pencil_point(past: Array, following: Array, eps: Array = EPS, next_scaling: 
 
     The past is scaled by its largest size. ``norm`` scales the sample that follows by the same, so that a record and
     its double have one signature. ``literal`` divides it by the largest size of the *scaled* past, as (2.3.6) prints
-    it, which is nearly 1: the point then tells the size of the signal too.
+    it, which is nearly 1: the point then shows the size of the signal too.
 
     For two past samples the second coordinate is the weight of the second vertex, see `polygon`.
 

@@ -17,7 +17,7 @@ def time_varying_oscillator(excitation: str = "fading") -> StateAffineModel:
     Args:
         excitation: ``fading``, ``g = cos(w1 t) / (1 + t^2)`` as printed, which does not excite for long; or
             ``lasting``, ``g = sin(w1 t)`` [ours]; cos would show in the output in phase with the first, so that the two
-            could not be told apart.
+            could not be distinguished.
     """
     return StateAffineModel(
         name="time_varying_oscillator" if excitation == "fading" else "excited_oscillator",

@@ -22,7 +22,7 @@ SIZE = 3.0  # printed set [-3, 3]^3
 EPS = {"literal": 1.0, "norm": 1e-3}
 SLABS, DIRECTIONS, ANGLES = 15, 12, 19
 _OTHER_SIDE = 1e6
-"""Added to the distance of a class of the other sign, which (4.6.14) does not look at."""
+"""Added to the distance of a class of the other sign, which (4.6.14) does not examine."""
 LEAST = 1e-6
 """Added to each distance: a point in two envelopes lies in the middle of their classes."""
 

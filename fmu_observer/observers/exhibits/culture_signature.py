@@ -34,7 +34,7 @@ _LookUp = Literal["weighted", "cell"]
 class CultureSignature(SignatureObserver):
     """Reduced signature observer of `ecoli_culture`: Omar 2012, section 4.7, (4.7.5)-(4.7.9).
 
-    Biomass is measured; glycerol and enzyme are looked up in the network that the signatures of light make over an
+    Biomass is measured; glycerol and enzyme are found in the network that the signatures of light make over an
     admissible tube around a nominal run, ``S0(X) +- 0.4`` and ``P0(X) +- 0.04`` (4.7.5), with `nodes` values of each.
     Properties are the mean abscissa and the mean ordinate of the points (4.7.8).
 
@@ -44,7 +44,7 @@ class CultureSignature(SignatureObserver):
     refused, `tabulated` makes it. ``literal`` scaling: with ``norm`` both
     quantities move the properties in nearly one direction.
 
-    How a point is looked up is not printed in full ("curvilinear"). ``cell`` takes the place in the quadrilateral
+    How a point is found is not printed in full ("curvilinear"). ``cell`` takes the place in the quadrilateral
     around it, exact without noise. ``weighted`` is the mean of the network, refined to 13 x 13 nodes by the polynomial
     through its own, by ``exp(-mu distance)`` as in (4.6.5); mu is not printed, and is that of the smallest error over
     states of the tube with noise of 1 % (`look_up_errors`) [ours].

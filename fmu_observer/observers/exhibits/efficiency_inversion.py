@@ -116,7 +116,7 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Array]:
     torques = (moved["driving_means"], moved["braking_means"])
     ends_there = _simulated_speed(vector(*grid), start, *torques, p.update_period, p)
     found = invert(grid, [ends_there[i] - m.last_generator for i in range(VALUES)], previous)
-    full = full_blocks > BLOCKS + 0.5  # the block before the window tells where it begins
+    full = full_blocks > BLOCKS + 0.5  # the block before the window says where it begins
     return {
         **moved,
         "driving_sum": 0.0,

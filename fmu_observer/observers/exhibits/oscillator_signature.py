@@ -38,7 +38,7 @@ class OscillatorSignature(SignatureObserver):
     have one signature, and the error of x1 is five times as large.
 
     Args:
-        nodes: grid values an axis, printed 7 and 13. next_scaling: ``literal`` (default) tells both states, ``norm`` x1
+        nodes: grid values an axis, printed 7 and 13. next_scaling: ``literal`` (default) gives both states, ``norm`` x1
             alone. variant: of the plant.
 
     Raises:

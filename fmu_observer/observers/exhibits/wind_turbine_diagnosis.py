@@ -119,11 +119,11 @@ class WindTurbineDiagnosis(HybridSystem):
     """Faults of a wind turbine from its readings and references: Omar 2012, chapter 7.
 
     Sensors of the pitch, of the rotor and of the generator speed come in pairs. Where a pair disagrees one of it is at
-    fault, and the model tells which: the pitch actuator for the pitch (7.6.2), the torsion of the shaft for the speeds
+    fault, and the model shows which: the pitch actuator for the pitch (7.6.2), the torsion of the shaft for the speeds
     (7.7.5). Where a pair agrees and both contradict the model, the actuator is at fault (7.6.14). The torque of the
     generator is compared with its reference (7.8.1). The efficiency of the drive train comes from a window of 30
     updates, 300 s (7.7.7): before it is full the efficiency is nominal. At most one fault at a time is assumed.
-    `fault` is 1 while any is detected: also where a pair disagrees and the model does not tell which sensor it is, and
+    `fault` is 1 while any is detected: also where a pair disagrees and the model does not show which sensor it is, and
     where the sensors of each speed agree, but their speeds turn rotor and generator against each other by more than the
     shaft can twist (the angle of five seconds): one speed or the gear's ratio is off. `undecided` counts these. Speeds
     that are all off by one share contradict nothing, and are not detected.
@@ -268,7 +268,7 @@ class WindTurbineDiagnosis(HybridSystem):
             place = at if group.size == 1 else slice(at, at + group.size)
             found |= {group.output: x.raised[place], f"{group.output}_time": x.since[place]}
             at += group.size
-        any_raised = x.undecided_alarm[0]  # detected is told although it is not isolated
+        any_raised = x.undecided_alarm[0]  # detected is reported although it is not isolated
         for i in range(_ALARMS):
             any_raised = np.maximum(any_raised, x.raised[i])
         residuals = {name: getattr(x, f"held_{name}") for name, *_ in _RESIDUALS}

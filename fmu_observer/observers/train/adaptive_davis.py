@@ -109,9 +109,9 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     outputs, and the coefficients move in closed form, see `adaptation_at_samples`. The regressors ``1, v, v^2`` are
     those of the estimated speed. The first balise sets the position, the first reading the speed.
 
-    Only effort over mass is known, so a mass or an effort that is wrong by a share is told as resistance, and so are
+    Only effort over mass is known, so a mass or an effort that is wrong by a share shows as resistance, and so are
     gradients: use it where the line is level or its gradient is part of the effort, with the effort that acts. One
-    speed tells the resistance at that speed and no more: b and c are learnt where the speed varies.
+    speed shows the resistance at that speed and no more: b and c are learnt where the speed varies.
     Constant resistance and brake are dry friction, which holds a train that stands.
     `resistance_per_mass_deviation` is the standard deviation of the resistance at the speed now, always much surer than
     its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held: from one

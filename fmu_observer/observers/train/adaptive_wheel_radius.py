@@ -71,11 +71,11 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     `adaptive_law`, for balises are seconds apart. At the first balise the position is set, and the adaptation begins
     anew. A reading that is held is late by half of its
     period, one that was aggregated by a whole one: p is the position `reading_age` ago, and what a balise says, and
-    what is told, are moved by the way since.
+    what is reported, are moved by the way since.
 
     `wheel_radius_error_deviation` is the standard deviation of its error, of white noise of the places of balises and
     of the readings, carried exactly between them; `position_deviation` likewise. What is no noise is not in it: the
-    mean creep of a pulling or braking wheel counts as wheel radius unless `creep_per_effort` tells how much of it an
+    mean creep of a pulling or braking wheel counts as wheel radius unless `creep_per_effort` shows how much of it an
     effort makes [ours: ``odometer / (1 + creep_per_effort effort)`` stands for the reading], and a wheel that locks or
     spins spoils the estimate (give an axle that does neither). At standstill nothing is learnt: below
     `least_excitation` the constant is held and `wheel_radius_learnt` is 0. Without balises the deviations grow.

@@ -73,7 +73,7 @@ class AugmentedTrainObserver(TrainObserver):
 
     The unknown acceleration is extrapolated as a line between samples, so without any sample the position error grows
     with the cube of the time. While the observed train stands, held by its brake or its friction, the unknown
-    acceleration stays and its rate fades [ours]: positions tell nothing of a force that friction takes, and learnt from
+    acceleration stays and its rate fades [ours]: positions show nothing of a force that friction takes, and learnt from
     them it would wind up until it pushed the train off.
 
     What is certified: any sequence of balise gaps up to the one asked for while there are no fixes; and where both

@@ -42,7 +42,7 @@ from fmu_observer.observers.train.train_signals import BALISE
 from plant_models.hybrid import Array, OutputWarning, discrete_output, memory, parameter, vector
 from plant_models.hybrid.option import require_chosen
 
-WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
+WINDOW, PASSES = 10, 2  # rows and passes unless set otherwise: small, so that it is built in a second [ours]
 LAYOUT = RowLayout(inputs=ORDER + 5, measurements=1)
 OFFSETS, SPEED, EFFORT = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
 _IS_BALISE, _ANEW, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
@@ -112,7 +112,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     A false balise that comes first is believed, and the true ones after it are doubted. So balises in a row whose
     innovations are beyond `loss_scale` of their own deviations, and agree with each other within that, are counted.
     Where there are more of them than were believed, or `gate_recover`, the position begins anew at the last of them,
-    and `restarts` tells it.
+    and `restarts` shows it.
 
     With the loss ``squares``, no bound active and every reading within its gate it is `BaliseOdometerEkf` at every
     window.

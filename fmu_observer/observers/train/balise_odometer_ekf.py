@@ -58,7 +58,7 @@ FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s],
 ROUNDING = 1e-9  # of times that are sums of periods
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
 SETTLING = 400  # readings after which a certificate takes the covariance for settled, and four gaps at least
-HORIZON = 60.0  # longest gap that a certificate looks at unasked [s]
+HORIZON = 60.0  # longest gap that a certificate examines unasked [s]
 _CERTIFIED_AT = 20.0  # speed of the certificate [m/s]
 
 ODOMETER_ROW = np.array([[0.0, 1.0, 0.0, 1.0]])
@@ -109,8 +109,8 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     series to the third order of its product with that time; noise as if there were no drag), and is corrected in Joseph
     form.
 
-    What it believes of its model follows from what can be known of a train: d drifts as gradients do that are not told
-    (`gradient_deviation` over `gradient_length`) and as an effort that acts on another mass than is told does
+    What it believes of its model follows from what can be known of a train: d drifts as gradients do that are not known
+    (`gradient_deviation` over `gradient_length`) and as an effort that acts on another mass than is stated does
     (`effort_share` of it, for `effort_time`); a wheel creeps as much as it transmits, `creep_share` of the speed from
     `creep_effort` on and nothing while it rolls freely. So where the odometer is right it is followed, and a model that
     is wrong is no reason to doubt it. A train that stands is held by dry friction, and its readings say nothing of
@@ -119,7 +119,8 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     A reading whose innovation is beyond `odometer_gate` of its own standard deviations is not used: a wheel that locks
     or spins. After `odometer_recover` without a reading that was used the next one is believed: the speed is set to
     it, and the position may be off by what that makes. A balise passes the common gate, which is granted three standard
-    deviations of the position, and has the variance of its told location accuracy, at least that of `balise_deviation`.
+    deviations of the position, and has the variance of its stated location accuracy, at least that of
+    `balise_deviation`.
 
     It knows wheels that creep for about `creep_time`. A creep that lasts the whole gap between two balises, or a jam
     that holds a wheel for long, it follows more than the observers with rules for jams.
@@ -303,7 +304,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
 def transition(elapsed: Array, speed: Array, effort: Array, p: Any) -> Transition:
     """Transition of the error over a time, and the covariance that it gets on the way.
 
-    Dry friction holds a train that stands, whatever pulls at it: then its speed is known as well as a reading tells it,
+    Dry friction holds a train that stands, whatever pulls at it: then its speed is known as well as a reading shows it,
     and no reading says anything of position, disturbance and creep.
 
     Args:
@@ -342,7 +343,7 @@ def _noise(T: Array, speed: Array, effort: Array, moves: Array, fade: Array, p: 
 
 
 def _moves(speed: Array, p: Any) -> Array:
-    """1 where the train is faster than a reading can tell from standing, else 0."""
+    """1 where the train is faster than a reading can distinguish from standing, else 0."""
     return np.where(np.abs(speed) > p.odometer_deviation, 1.0, 0.0)
 
 

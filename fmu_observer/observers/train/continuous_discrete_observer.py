@@ -12,7 +12,7 @@ from plant_models.hybrid import Array
 class ContinuousDiscreteObserver(HeldOdometerObserver):
     """CDO: ``K = K(v_estimated(t))``, which runs between samples: Aguiar Cota 2019, (4.22)-(4.40).
 
-    What it observes, and the bounds it tells, stand at `HeldOdometerObserver`; they use the largest gain of all speeds
+    What it observes, and the bounds it states, stand at `HeldOdometerObserver`; they use the largest gain of all speeds
     from 0 to `speed_max`, in which the estimate must stay. With a gain that follows no speed (`davis_c` or
     `gain_schedule` zero, as in 4.3.4) it is the same observer as `DiscreteMeasurementObserver`.
 

@@ -17,7 +17,7 @@ from plant_models.hybrid import Array, TriggeredEvent, input_signal, vector
 
 
 class DelayedTrainObserver(DelayedStateObserver):
-    """The `delayed_state_observer` of a train with two nodes, told of each by an event of its own: the odometer by
+    """The `delayed_state_observer` of a train with two nodes, notified of each by an event of its own: the odometer by
     `packet`, balises by `balise`, all a constant `delay` after their measurement.
 
     Both act when they arrive, not at their stamps; a balise passes the gate of all train observers, against the
@@ -68,7 +68,7 @@ class DelayedTrainObserver(DelayedStateObserver):
 
     @property
     def node_events(self) -> tuple[str, ...]:
-        """Balises tell the position, packets the speed."""
+        """Balises show the position, packets the speed."""
         return ("balise", "packet")
 
     def remembering(self, memory_places: int) -> Self:

@@ -12,7 +12,7 @@ from plant_models.hybrid import Array
 class DiscreteMeasurementObserver(HeldOdometerObserver):
     """DMO: ``K = K(y_k)``, constant between samples: Aguiar Cota 2019, (4.1)-(4.19).
 
-    What it observes, and the bounds it tells, stand at `HeldOdometerObserver`. Its bounds use the gain in use, where
+    What it observes, and the bounds it states, stand at `HeldOdometerObserver`. Its bounds use the gain in use, where
     those of `ContinuousDiscreteObserver` need the largest one.
 
     Presets: `as_published`, set C with the gain printed in 4.3.4, and `as_published_set_d` with that of 5.4; `m_0_5_

@@ -12,7 +12,7 @@ START, LIMIT, RATE = 20.0, 8.0, 1.0 / 12.0  # [1/s], [1/s], [1] [ours], as `dyna
 
 
 class DynamicGainCdo(HighGainTrainObserver):
-    """The `dynamic_high_gain` observer of Hann 2014, (3.5)-(3.8), on a train that is told of balises.
+    """The `dynamic_high_gain` observer of Hann 2014, (3.5)-(3.8), on a train that is notified of balises.
 
     ``dp = v - theta K1 eta``, ``dv = (F - a sgn(v) - b v - c v|v|)/M - theta^2 K2 eta``, ``d eta = -theta K1 eta``,
     ``eta = p - balise_position`` at a balise: the output predictor, with ``eta = C xh - w``. The gain follows

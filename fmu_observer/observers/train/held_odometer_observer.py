@@ -202,7 +202,7 @@ class HeldOdometerObserver(TrainObserver):
         decay = np.where(predicting, rate / p.rate_decay_time, 0.0)
         # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
         holding = np.maximum(self.friction(t, x, u, p)[0] - acceleration, 0.0)
-        # At standstill d and d' leave their equations, too: the carried bound is not told there, nor carried on.
+        # At standstill d and d' leave their equations, too: the carried bound is not reported there, nor carried on.
         standing = stands(speed, x.held_speed, x.held_error)
         drifts = rate + p.gain[1] * residual, p.gain[2] * residual - decay
         P = p.lyapunov_matrix

@@ -42,7 +42,7 @@ from plant_models.hybrid import Array, Signal, input_signal, memory, output_sign
 from plant_models.hybrid.option import require_chosen
 
 SPEEDS = 21  # between the vertices, for the certificate
-HORIZON = 20.0  # [s] to which unstable periods of the odometer are looked for
+HORIZON = 20.0  # [s] to which unstable periods of the odometer are searched for
 _OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
 _HoldChoice = Literal["innovation", "reading"]
@@ -363,7 +363,7 @@ def _read_stability(errors: np.ndarray, gains: np.ndarray, max_gap: float) -> _S
 def _held_stability(errors: np.ndarray, gains: np.ndarray, period: float) -> _Stability:
     """With the innovation held for a period [s]."""
     found, longest = _sampled(errors, gains, period)
-    reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any looked at, up to {HORIZON:g} s,"
+    reach = f"may be up to {longest:.3g} s" if longest < inf else f"may be any examined, up to {HORIZON:g} s,"
     note, radius = f"the odometer's period {reach} at a steady speed", found.spectral_radius
     return _Stability(found.holds, radius < 1.0, radius, found.margin, found.lyapunov_matrix, note)
 

@@ -1,7 +1,7 @@
 """What a train observer may learn while the train stands: nothing. Pure functions, the one place for all of them.
 
-Dry friction takes up any force that is smaller: a train that stands tells an interval of forces and no force, and an
-innovation of zero tells nothing of the integrators behind it. So a disturbance keeps its value, its rate fades, and
+Dry friction takes up any force that is smaller: a train that stands shows an interval of forces and no force, and an
+innovation of zero shows nothing of the integrators behind it. So a disturbance keeps its value, its rate fades, and
 neither a covariance nor a gain grows by the time that passes, until the estimate or the reading moves.
 """
 
@@ -36,7 +36,7 @@ def rolls_back(reading: Array) -> Array:
 
 
 def stands(speed: Array, reading: Array = 0.0, tolerance: Array = 0.0) -> Array:
-    """1 where the observed train is held by its friction and its odometer tells of no motion either.
+    """1 where the observed train is held by its friction and its odometer shows no motion either.
 
     Both are asked: an estimate that a wrong disturbance holds beside a wheel that turns must learn, and so must one
     that moves beside a wheel that stands.

@@ -17,7 +17,7 @@ NOMINAL, DEGRADED = 1.0, 2.0
 
 
 class Situation(NamedTuple):
-    """What the switch looks at.
+    """What the switch examines.
 
     `mode` and `level`: mode until now, adhesion level now. `wanted`: force that the regulator of `mode` asks for [N].
     `error`: reference minus speed [m/s]. `acceleration`: of the reference [m/s2]. `speed`: of train or wheel, the

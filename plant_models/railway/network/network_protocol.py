@@ -36,7 +36,7 @@ class NetworkProtocol(HybridSystem):
 
     Transmissions are at ``start + offset + k * period``. At each of them the protocol chooses a node by its turn, or by
     the network error: what it sent last minus what it measures now. The packet arrives `delay_periods` periods later,
-    if it is not lost. Until something was received the outputs are 0; the first transmission tells all nodes' values
+    if it is not lost. Until something was received the outputs are 0; the first transmission shows all nodes' values
     at once, as if the network had run before.
 
     The same numbers as the network of a scenario come out, lost packets included, where the seed is the same and the
@@ -254,7 +254,7 @@ def _quadratic_costs(weights: Sequence[Array], error: Array) -> list[Array]:
         cost = 0.0 * error[0]
         for row, left in zip(weight, error, strict=True):
             for entry, right in zip(row, error, strict=True):
-                if not (isinstance(entry, float) and entry == 0.0):  # a plain zero; symbols are not looked at
+                if not (isinstance(entry, float) and entry == 0.0):  # a plain zero; symbols are not examined
                     cost = cost + left * entry * right
         costs.append(cost)
     return costs

@@ -19,7 +19,7 @@ from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from fmu_observer.observers.model_observer import ModelObserver
 from plant_models.hybrid import Array, parameter
 
-_POINTS = 5  # states at which the structure of the Jacobian is looked at
+_POINTS = 5  # states at which the structure of the Jacobian is examined
 
 
 class HighGain(ModelObserver):

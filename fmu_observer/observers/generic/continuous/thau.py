@@ -22,7 +22,7 @@ class Thau(Luenberger):
     With ``(A - L C)' P + P (A - L C) = -Q`` the printed condition ``alpha < lmax(Q) / lmin(P)`` (1.8) is unsafe.
     `condition` judges by the valid one, ``alpha < lmin(Q) / (2 lmax(P))`` at Q = I, and gives the printed number beside
     it. A Lipschitz constant depends on the units of the states, so the best coordinates ``z_i = x_i / scale^(i-1)`` are
-    looked for too, and the condition may hold in any of them.
+    searched for too, and the condition may hold in any of them.
 
     Default L [ours]: with one measurement all poles of ``A - L C`` at -2 1/s, for two states the gain (4, 4); the valid
     bound is then 0.438 and the printed one 7.12. With several measurements the poles lie from -2 1/s on.

@@ -1,4 +1,4 @@
-"""What a filter that carries a covariance remembers and tells, as signals. It knows no filter."""
+"""What a filter that carries a covariance remembers and reports, as signals. It knows no filter."""
 
 from __future__ import annotations
 

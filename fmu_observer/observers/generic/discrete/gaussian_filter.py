@@ -359,7 +359,7 @@ class GaussianFilter(GatedObserver, EvaluatedObserver):
         return np.asarray(noise_over(model, model.start, known, model.sample_period, density)), text
 
     def _position_state(self) -> str:
-        """The state that the told position is: the one whose column in its row of the Jacobian is largest."""
+        """The state that the reported position is: the one whose column in its row of the Jacobian is largest."""
         names = [s.name for s in self.model.measurements]
         parameters = np.array([value for s in self.model.parameters for value in s.start_values])
         inputs = self.model.start_inputs

@@ -41,7 +41,7 @@ MOST, DEFAULT = 50, 20  # members: each stands in the generated C once
 
 
 class Sample(NamedTuple):
-    """What a filter with members is told at a sample.
+    """What a filter with members gets at a sample.
 
     Attributes:
         y: measurements, shape (q,). seen: what each member measures, shape (q, M). noise: RN, shape (q, q).

@@ -37,15 +37,15 @@ from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
 
-_TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not told
+_TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not shown
 _PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it
 
 
 class _WindowObservability(NamedTuple):
-    """What a window tells of the state in its first row.
+    """What a window shows of the state in its first row.
 
     Attributes:
-        measured: what the rows measure of it, shape (N * q, n). rank: independent directions that are told.
+        measured: what the rows measure of it, shape (N * q, n). rank: independent directions that are shown.
         unseen: orthonormal basis of those that are not, shape (n, n - rank). states: names of the states.
     """
 
@@ -55,13 +55,13 @@ class _WindowObservability(NamedTuple):
     states: tuple[str, ...]
 
     def explain(self) -> str:
-        """In words, with a window as the subject: it tells every state, or which directions it does not."""
+        """In words, with a window as the subject: it shows every state, or which directions it does not."""
         if not self.unseen.shape[1]:
-            return "tells all of them without the arrival cost"
+            return "shows all of them without the arrival cost"
         directions = "; ".join(self._direction(column) for column in self.unseen.T)
         return (
-            f"tells {self.rank} without the arrival cost; it does not tell {directions}, which is known only from what "
-            "was measured before. A longer window may tell it"
+            f"shows {self.rank} without the arrival cost; it does not show {directions}, which is known only from what "
+            "was measured before. A longer window may show it"
         )
 
     def _direction(self, column: np.ndarray) -> str:
@@ -72,7 +72,7 @@ class _WindowObservability(NamedTuple):
         return "the combination " + " ".join(f"{value:+.3g} {name}" for name, value in parts)
 
 
-WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
+WINDOW, PASSES = 6, 2  # rows and passes unless set otherwise: small, so that it is built in a second [ours]
 _UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
 Bounds = Mapping[str, Sequence[float | None]]
 

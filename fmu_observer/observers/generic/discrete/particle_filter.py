@@ -18,7 +18,7 @@ class ParticleFilter(MemberFilter):
     Each particle's weight is multiplied by the likelihood of the measurement. Where the effective sample size falls
     below `resampling_threshold` times the members, they are resampled systematically, without drawing. Estimate and
     deviation are the mean and the spread of the weighted particles. With few members and small measurement noise all
-    weight falls on one particle: `effective_members` tells.
+    weight falls on one particle: `effective_members` shows.
 
     Options and signals are those of `MemberFilter`. Defaults [ours]: QN of white noise of density 0.01 in every state,
     RN = 1e-4, particles drawn with the covariance I.

@@ -109,7 +109,7 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         return certify_sampled_error(vertices, gap, model)
 
     def vertex_error(self, drift: np.ndarray, believed: np.ndarray, p: Any) -> RiccatiError:
-        """Error equations where the flow has the Jacobian `drift` and S is told `believed`, each of shape (n, n)."""
+        """Error equations where the flow has the Jacobian `drift` and S gets `believed`, each of shape (n, n)."""
         q = len(self.model.measurements)
         noise = np.diag(np.asarray(self._noise(p), dtype=float))
         levels = tuple(range(self.model.order))

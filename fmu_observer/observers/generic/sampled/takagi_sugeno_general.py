@@ -43,7 +43,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified):
 
     ``dxh = sum_i h_i [A_i xh + B_i u - K_i2 (C2 xh - y2) - K_i1 c]``, ``dc = -eta c``, ``c = C1 xh - y1`` at a sample.
     The decaying gain ``exp(-eta (t - t_k)) K_i1`` is one more state a sampled output, reset at samples. Which output a
-    gain belongs to is told by its shape: K_i1 has a column for each sampled output, K_i2 for each continuous one.
+    gain belongs to follows from its shape: K_i1 has a column for each sampled output, K_i2 for each continuous one.
 
     The weights h depend on the premises, read from the state nearest to the estimate that agrees with what `premise`
     lets it see:
@@ -130,7 +130,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified):
         }
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        """The innovation is set anew and the premises are looked at; the estimates stay."""
+        """The innovation is set anew and the premises are examined; the estimates stay."""
         model, estimate = self.model, self._estimate(x)
         arrived = stacked_of(u, model.sampled, f"{model.event}_")
         values = self._premises_at(estimate, None if self.premise == "estimated" else arrived, u)

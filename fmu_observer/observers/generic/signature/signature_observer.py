@@ -38,7 +38,7 @@ TABLE_ERROR = 1e-6
 """Of its range, that a table may be off its parameters: they are written with so many digits at least [ours]."""
 
 _RECENT = 50.0
-"""Windows of which more than half beyond the table are told, although there were many within it before [ours]."""
+"""Windows of which more than half beyond the table are reported, although there were many within it before [ours]."""
 
 _MOSTLY = OutputWarning(
     "found more than half of its windows beyond its table, of all or of some fifty: the state is not in the set the "
@@ -55,7 +55,7 @@ _NO_MODEL = ("sample_period", "process_noise", "measurement_noise")
 
 
 class InvertedWindow(NamedTuple):
-    """What the signature of a window tells.
+    """What the signature of a window shows.
 
     Attributes:
         state: at the oldest sample of the window, shape (n,). outside: how far beyond the table, in cells [1].

@@ -71,12 +71,12 @@ class SignatureTrack(HybridSystem):
     a verdict: Omar 2012, section 2.5.
 
     r1 is the length of S1 from its left end to the middle between its right-hand branches, r2 the abscissa of the right
-    tip of S2, r3 the gap between those branches. For `van_der_pol` they tell the three parameters apart:
+    tip of S2, r3 the gap between those branches. For `van_der_pol` they distinguish the three parameters:
 
     - r3 is off: p3 has changed, whatever p1 and p2 do;
     - r2 is off, and r1 not by much: p2;
     - r1 is off, and r2 not: p1; r1 is off by more than `strong_change`, and r2 too: both. A small change of p1 beside
-      one of p2 cannot be told.
+      one of p2 cannot be detected.
 
     Nominal properties are those of the shipped orders: with others measure them, or read the properties alone. The
     signal has to oscillate: properties are taken over the last two ways from tip to tip, and held until the next
