@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import Array, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
 
 Variant = Literal["mixed", "speed", "root"]
@@ -53,7 +53,7 @@ class BrakedOscillator(NoisyPlant):
         require_chosen(self.name, self.option_choices, variant=variant)
         self.variant: Variant = variant
         self.declare(
-            (output_signal("measured_y", "1/s", "Measured output", variability="discrete"),),
+            (discrete_output("measured_y", "1/s", "Measured output"),),
             (
                 parameter("rate_factor", "1", 1.0, "Factor p1 of x2 in the rate of x1"),
                 parameter("braking", "1/s", 0.1, "Factor p2 of the braking term"),

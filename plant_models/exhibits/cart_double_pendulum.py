@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant, solved_2
-from plant_models.hybrid import Array, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, input_signal, output_signal, parameter, state
 
 Pair = tuple[Array, Array]
 
@@ -37,9 +37,9 @@ class _DoublePendulumConstants:
 
 SECTION_IV_2_2_3 = _DoublePendulumConstants()
 _MEASURED = (
-    output_signal("measured_position", "m", "Measured position of the cart", variability="discrete"),
-    output_signal("measured_first_angle", "rad", "Measured angle of the lower rod", variability="discrete"),
-    output_signal("measured_second_angle", "rad", "Measured angle of the upper rod", variability="discrete"),
+    discrete_output("measured_position", "m", "Measured position of the cart"),
+    discrete_output("measured_first_angle", "rad", "Measured angle of the lower rod"),
+    discrete_output("measured_second_angle", "rad", "Measured angle of the upper rod"),
 )
 _PARAMETERS = (
     parameter("cart_mass", "kg", SECTION_IV_2_2_3.cart_mass, "Mass M of the cart", min=1e-3),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant, solved_2
-from plant_models.hybrid import Array, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, input_signal, output_signal, parameter, state
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class CartPendulum(NoisyPlant):
     def __init__(self) -> None:
         self.declare(
             (
-                output_signal("measured_position", "m", "Measured position of the cart", variability="discrete"),
-                output_signal("measured_angle", "rad", "Measured angle of the pendulum", variability="discrete"),
+                discrete_output("measured_position", "m", "Measured position of the cart"),
+                discrete_output("measured_angle", "rad", "Measured angle of the pendulum"),
             ),
             (
                 parameter("cart_mass", "kg", TABLE_4_1.cart_mass, "Mass M of the cart", min=1e-3),

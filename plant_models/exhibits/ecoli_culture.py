@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import Array, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
 
 Glycerol = Literal["clamped", "as_published"]
@@ -63,8 +63,8 @@ class EcoliCulture(NoisyPlant):
         self.glycerol: Glycerol = glycerol
         self.declare(
             (
-                output_signal("measured_biomass", "kg/m3", "Measured biomass", variability="discrete"),
-                output_signal("measured_light", "1", "Measured light", variability="discrete"),
+                discrete_output("measured_biomass", "kg/m3", "Measured biomass"),
+                discrete_output("measured_light", "1", "Measured light"),
             ),
             (
                 parameter("growth_rate", "1/s", 0.49 / HOUR, "Largest growth rate mu_m", min=0.0),

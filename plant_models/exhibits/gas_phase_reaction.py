@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import Array, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, output_signal, parameter, state
 
 
 class GasPhaseReaction(NoisyPlant):
@@ -41,7 +41,7 @@ class GasPhaseReaction(NoisyPlant):
 
     def __init__(self) -> None:
         self.declare(
-            (output_signal("measured_y", "1", "Measured total pressure", variability="discrete"),),
+            (discrete_output("measured_y", "1", "Measured total pressure"),),
             (parameter("rate", "1/s", 0.15, "Rate b of the reaction", min=0.0),),
             period=1e-2,
         )

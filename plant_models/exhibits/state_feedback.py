@@ -12,9 +12,9 @@ from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,
     Signal,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
 )
 from plant_models.hybrid.option import require_chosen
@@ -37,7 +37,7 @@ CART = (
     input_signal("position", "m", 0.0, "Position of the cart"),
     input_signal("speed", "m/s", 0.0, "Speed of the cart", display_unit="km/h"),
 )
-FORCE = output_signal("force", "N", "Force on the cart", variability="discrete")
+FORCE = discrete_output("force", "N", "Force on the cart")
 
 REGULATED: dict[str, _Regulated] = {
     "cart_pendulum": _Regulated(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import Array, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, output_signal, parameter, state
 
 
 class ThreeStateCascade(NoisyPlant):
@@ -37,7 +37,7 @@ class ThreeStateCascade(NoisyPlant):
 
     def __init__(self) -> None:
         self.declare(
-            (output_signal("measured_x1", "1", "Measured first state", variability="discrete"),),
+            (discrete_output("measured_x1", "1", "Measured first state"),),
             (
                 parameter("nonlinearity", "1", 0.07, "Factor e of the nonlinear terms"),
                 parameter("ramp", "1/s3", 5.0, "Rate c of the third state"),

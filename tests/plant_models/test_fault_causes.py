@@ -188,7 +188,7 @@ def test_a_cause_that_does_not_fit_is_refused_in_words(
 def test_an_unknown_cause_a_class_that_is_none_and_losses_of_another_are_refused() -> None:
     with pytest.raises(ValueError, match=r"Unknown cause 'luck'; choose one of: adhesion, .*, or write file.py:Class"):
         PLANTS["signal_fault"](cause="luck")
-    with pytest.raises(ValueError, match=r"fractions:Fraction is a class, no subclass of FaultCause"):
+    with pytest.raises(ValueError, match=r"fractions:Fraction is a class of base Rational, no subclass of FaultCause"):
         PLANTS["wheel_fault"](cause="fractions:Fraction")
     with pytest.raises(ValueError, match=r"fault_cause:FaultCause is not complete: it has no fault\(\); write it"):
         PLANTS["wheel_fault"](cause="plant_models.faults.fault_cause:FaultCause")

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant_models.railway.sensors.brake_pressure_sensor import BrakePressureSensor
-from plant_models.railway.sensors.doppler_radar import DopplerRadar
+from plant_models.railway.sensors.lagged_sensors import BrakePressureSensor, DopplerRadar
 
 
 def read(sensor: Any, value: float, noise: np.ndarray, **settings: float) -> np.ndarray:

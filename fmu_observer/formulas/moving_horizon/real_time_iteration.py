@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.formulas.moving_horizon.gauss_newton import FAR, KEPT, WindowProblem, passed, solve
-from plant_models.hybrid import Array, OutputWarning, Signal, memory, output_signal
+from plant_models.hybrid import Array, OutputWarning, Signal, discrete_output, memory
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
 
@@ -104,10 +104,7 @@ def window_outputs(window: int) -> tuple[Signal, ...]:
         reaches=float(window),
     )
     warnings = {**_WARNINGS, "rows_in_window": filled}
-    return tuple(
-        output_signal(name, "1", text, variability="discrete", warning=warnings.get(name))
-        for name, text in WINDOW_OUTPUTS.items()
-    )
+    return tuple(discrete_output(name, "1", text, warning=warnings.get(name)) for name, text in WINDOW_OUTPUTS.items())
 
 
 def window_values(last_pass: Array) -> dict[str, Array]:

@@ -16,6 +16,7 @@ from plant_models.hybrid import (
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -94,11 +95,10 @@ class WindTurbine(HybridSystem):
         output_signal("generator_power", "W", "Power of the generator"),
         output_signal("pitch", "deg", "Pitch of each blade", size=BLADES),
         *(
-            output_signal(
+            discrete_output(
                 f"measured_{name}",
                 unit,
                 f"Reading of the {text}",
-                variability="discrete",
                 size=n,
                 display_unit="km/h" if unit == "m/s" else None,
             )

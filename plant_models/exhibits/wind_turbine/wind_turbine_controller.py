@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain
-from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    PeriodicEvent,
+    discrete_output,
+    input_signal,
+    memory,
+    parameter,
+)
 
 LEAST_SPEED = 1.0  # [rad/s]; a generator that stands would be asked for an infinite torque
 
@@ -44,9 +52,9 @@ class WindTurbineController(HybridSystem):
         input_signal("generator_power", "W", 0.0, "Measured power of the generator"),
     )
     outputs = (
-        output_signal("torque_reference", "N.m", "Torque asked of the generator", variability="discrete"),
-        output_signal("pitch_reference", "deg", "Pitch asked of the three blades", variability="discrete"),
-        output_signal("zone", "1", "2 in weak wind, 3 in strong wind", variability="discrete", integer=True),
+        discrete_output("torque_reference", "N.m", "Torque asked of the generator"),
+        discrete_output("pitch_reference", "deg", "Pitch asked of the three blades"),
+        discrete_output("zone", "1", "2 in weak wind, 3 in strong wind", integer=True),
     )
     parameters = (
         parameter("sample_period", "s", 0.01, "Time between two instants", min=1e-6),

@@ -13,9 +13,9 @@ from plant_models.hybrid import (
     Array,
     HybridSystem,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
     vector,
 )
@@ -77,11 +77,11 @@ class AntiSlipDevice(HybridSystem):
         input_signal("effort_setpoint", "N", 0.0, "Effort that driver or controller ask for"),
     )
     outputs = (
-        output_signal("effort", "N", "Effort that is let through in this period", variability="discrete"),
-        output_signal("effort_share", "1", "Share of the set-point that is let through", variability="discrete"),
-        output_signal("reference_speed", "m/s", "Reference speed", variability="discrete", display_unit="km/h"),
-        output_signal("axle_slipping", "1", "1 for each axle that slips", variability="discrete", size=AXLES),
-        output_signal("sanding_request", "1", "1 while sand is requested", variability="discrete"),
+        discrete_output("effort", "N", "Effort that is let through in this period"),
+        discrete_output("effort_share", "1", "Share of the set-point that is let through"),
+        discrete_output("reference_speed", "m/s", "Reference speed", display_unit="km/h"),
+        discrete_output("axle_slipping", "1", "1 for each axle that slips", size=AXLES),
+        discrete_output("sanding_request", "1", "1 while sand is requested"),
     )
     parameters = (
         parameter("control_period", "s", 0.02, "Time between two looks at the axles", min=1e-4),

@@ -10,7 +10,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    PeriodicEvent,
+    discrete_output,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+)
 from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import (
     air_brake_demand,
@@ -133,14 +142,12 @@ class MdpeController(HybridSystem):
         input_signal("acceleration_reference", "m/s2", 0.0, "Acceleration of the reference"),
     )
     outputs = (
-        output_signal(
-            "effort", "N", "Effort of the locomotive's drive: traction > 0, electric brake < 0", variability="discrete"
-        ),
-        output_signal("brake_demand", "1", "Demand to the air brake, 0..1", variability="discrete"),
-        output_signal("mode", "1", "1 traction, 2 electric, 3 indirect, 4 combined brake", variability="discrete"),
-        output_signal("adhesion_level", "1", "Adhesion that counts: 1 nominal, 2 degraded", variability="discrete"),
-        output_signal("sanding_request", "1", "1 while sand is requested", variability="discrete"),
-        output_signal("effort_available", "N", "Effort that the rail is believed to bear", variability="discrete"),
+        discrete_output("effort", "N", "Effort of the locomotive's drive: traction > 0, electric brake < 0"),
+        discrete_output("brake_demand", "1", "Demand to the air brake, 0..1"),
+        discrete_output("mode", "1", "1 traction, 2 electric, 3 indirect, 4 combined brake"),
+        discrete_output("adhesion_level", "1", "Adhesion that counts: 1 nominal, 2 degraded"),
+        discrete_output("sanding_request", "1", "1 while sand is requested"),
+        discrete_output("effort_available", "N", "Effort that the rail is believed to bear"),
         output_signal("speed_error", "m/s", "Reference minus estimated speed, now", display_unit="km/h"),
         output_signal("drive_power", "W", "Power of the drive at the wheels, now; braking < 0"),
     )

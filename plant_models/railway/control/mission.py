@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, discrete_output, input_signal, output_signal, parameter
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.control.logic import either, every, holds
 
@@ -112,9 +112,7 @@ class Mission(HybridSystem):
         output_signal("speed_reference", "m/s", "Speed to be driven", display_unit="km/h"),
         output_signal("acceleration_reference", "m/s2", "Acceleration to be driven"),
         output_signal("position_reference", "m", "Distance run by the reference in time"),
-        output_signal(
-            "phase", "1", "0 waiting, 1 accelerating, 2 holding, 3 braking, 4 arrived", variability="discrete"
-        ),
+        discrete_output("phase", "1", "0 waiting, 1 accelerating, 2 holding, 3 braking, 4 arrived"),
     )
     parameters = (
         parameter("target_speed", "m/s", _KMH_35, "Speed of the hold phase", min=0.1, display_unit="km/h"),

@@ -15,6 +15,7 @@ from plant_models.hybrid import (
     HybridSystem,
     OutputWarning,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
     output_signal,
@@ -104,56 +105,52 @@ class StoppingController(HybridSystem):
         ),
     )
     outputs = (
-        output_signal("effort", "N", "Effort: traction > 0, brake < 0", variability="discrete"),
+        discrete_output("effort", "N", "Effort: traction > 0, brake < 0"),
         output_signal("speed_reference", "m/s", "Speed of the reference, now", display_unit="km/h"),
         output_signal("position_reference", "m", "Position of the reference, now"),
-        output_signal("planned_effort", "N", "Constant effort of the plan, u*", variability="discrete"),
-        output_signal("brake_released", "1", "1 while the brake is to be released", variability="discrete"),
-        output_signal(
+        discrete_output("planned_effort", "N", "Constant effort of the plan, u*"),
+        discrete_output("brake_released", "1", "1 while the brake is to be released"),
+        discrete_output(
             "no_braking_solution",
             "1",
             "1 where the drag alone stops the train short of the mark",
-            variability="discrete",
             warning=OutputWarning(
                 "no brake leads to the mark: the drag alone stops the train short of it, so it rolls; enable the "
                 "controller later",
                 ("speed_reference", "remaining_distance"),
             ),
         ),
-        output_signal(
+        discrete_output(
             "limited_plan",
             "1",
             "1 where the brake is too weak: the train will pass the mark",
-            variability="discrete",
             warning=OutputWarning(
                 "the mark is too near for effort_limit, or behind: the train brakes with all there is and passes it; "
                 "enable the controller sooner, or raise effort_limit",
                 ("speed_reference", "remaining_distance"),
             ),
         ),
-        output_signal(
+        discrete_output(
             "stands_short",
             "1",
             "1 where the train stands short of the mark by more than stop_tolerance",
-            variability="discrete",
             warning=OutputWarning(
                 "the train stands short of the mark, and the controller may not pull it there: raise traction_limit "
                 "where it is 0, or look for what braked it beyond the plan",
                 ("remaining_distance",),
             ),
         ),
-        output_signal(
+        discrete_output(
             "rolls_back",
             "1",
             "1 where the train rolls backwards although it is to stand",
-            variability="discrete",
             warning=OutputWarning(
                 "the train rolls back from where it is to stand: holding_effort is too weak for the slope, or acts too "
                 "late; raise it",
                 ("effort", "remaining_distance"),
             ),
         ),
-        output_signal("plans", "1", "Number of plans made so far", variability="discrete"),
+        discrete_output("plans", "1", "Number of plans made so far"),
         output_signal("remaining_distance", "m", "Way from the estimated position to the mark, now"),
     )
     parameters = (

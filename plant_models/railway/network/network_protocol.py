@@ -15,9 +15,9 @@ from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,
     Signal,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
     vector,
 )
@@ -221,7 +221,7 @@ def _protocol_parameters(protocol: str, signals: int, nodes: int, turns: int) ->
 
 
 def _held_output(name: str, unit: str, text: str, size: int | None) -> Any:
-    return output_signal(name, unit, text, variability="discrete", size=size)
+    return discrete_output(name, unit, text, size=size)
 
 
 def _memory(signals: int, nodes: int) -> tuple[Signal, ...]:

@@ -15,9 +15,9 @@ from plant_models.hybrid import (
     CommunicationEvent,
     HybridSystem,
     Resource,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
     vector,
 )
@@ -158,12 +158,10 @@ class BaliseReader(HybridSystem):
         input_signal("speed", "m/s", 0.0, "Speed of the train at the same instant", display_unit="km/h"),
     )
     outputs = (
-        output_signal(
-            "balise_count", "1", "Goes up by one with every balise announced", variability="discrete", integer=True
-        ),
-        output_signal("balise_time", "s", "Instant at which the balise was passed", variability="discrete"),
-        output_signal("balise_position", "m", "Position of the balise passed", variability="discrete"),
-        output_signal("lost_count", "1", "Crossings that found no room", variability="discrete", integer=True),
+        discrete_output("balise_count", "1", "Goes up by one with every balise announced", integer=True),
+        discrete_output("balise_time", "s", "Instant at which the balise was passed"),
+        discrete_output("balise_position", "m", "Position of the balise passed"),
+        discrete_output("lost_count", "1", "Crossings that found no room", integer=True),
     )
     events = (CommunicationEvent("reading", "Position and speed are taken"),)
     option_choices = {

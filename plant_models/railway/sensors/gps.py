@@ -9,7 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    PeriodicEvent,
+    discrete_output,
+    input_signal,
+    memory,
+    parameter,
+)
 
 
 class Gps(HybridSystem):
@@ -47,11 +55,11 @@ class Gps(HybridSystem):
     )
     inputs = (input_signal("position", "m", 0.0, "True position"),)
     outputs = (
-        output_signal("reading", "m", "Position of the last fix, held", variability="discrete"),
-        output_signal("drift", "m", "Slow part of its error", variability="discrete"),
-        output_signal("gps_count", "1", "Goes up by one with every fix", variability="discrete", integer=True),
-        output_signal("gps_time", "s", "Instant of the last fix", variability="discrete"),
-        output_signal("gps_position", "m", "Position of the last fix", variability="discrete"),
+        discrete_output("reading", "m", "Position of the last fix, held"),
+        discrete_output("drift", "m", "Slow part of its error"),
+        discrete_output("gps_count", "1", "Goes up by one with every fix", integer=True),
+        discrete_output("gps_time", "s", "Instant of the last fix"),
+        discrete_output("gps_position", "m", "Position of the last fix"),
     )
     parameters = (
         parameter("sample_period", "s", 0.1, "Time between two fixes", min=1e-6),

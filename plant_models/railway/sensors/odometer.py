@@ -9,7 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, input_signal, memory, output_signal, parameter, state
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    discrete_output,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+)
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 from plant_models.railway.sensors.sampling import sampling_event
 
@@ -43,9 +52,7 @@ class Odometer(HybridSystem):
     )
     inputs = (input_signal("wheel_speed", "m/s", 0.0, "Circumferential speed of the wheel", display_unit="km/h"),)
     outputs = (
-        output_signal(
-            "reading", "m/s", "Odometer speed, held between instants", variability="discrete", display_unit="km/h"
-        ),
+        discrete_output("reading", "m/s", "Odometer speed, held between instants", display_unit="km/h"),
         output_signal("distance", "m", "Odometer distance since the start, in whole pulses where there are teeth"),
     )
     parameters = (

@@ -14,9 +14,9 @@ from plant_models.hybrid import (
     Array,
     HybridSystem,
     PeriodicEvent,
+    discrete_output,
     input_signal,
     memory,
-    output_signal,
     parameter,
     state,
 )
@@ -57,13 +57,9 @@ class PulseOdometer(HybridSystem):
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
     bounded_parameters = "all"
     outputs = (
-        output_signal(
-            "reading", "m/s", "Speed over the last aggregation period", variability="discrete", display_unit="km/h"
-        ),
-        output_signal(
-            "sampled_reading", "m/s", "Speed over the last sampling period", variability="discrete", display_unit="km/h"
-        ),
-        output_signal("distance", "m", "Distance counted up to the last sample", variability="discrete"),
+        discrete_output("reading", "m/s", "Speed over the last aggregation period", display_unit="km/h"),
+        discrete_output("sampled_reading", "m/s", "Speed over the last sampling period", display_unit="km/h"),
+        discrete_output("distance", "m", "Distance counted up to the last sample"),
     )
     parameters = (
         parameter("sample_period", "s", 0.05, "Time between two samples", min=1e-6),

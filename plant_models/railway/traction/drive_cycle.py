@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, discrete_output, parameter
 
 RPM_1000 = 1000.0 * 2.0 * float(np.pi) / 60.0
 RPM_100 = 0.1 * RPM_1000
@@ -31,8 +31,8 @@ class DriveCycle(HybridSystem):
     internal_step = 1e-2  # nothing flows
     bounded_parameters = "all"
     outputs = (
-        output_signal("speed_reference", "rad/s", "Speed asked for", display_unit="rpm", variability="discrete"),
-        output_signal("load_torque", "N.m", "Torque of the load against the rotation", variability="discrete"),
+        discrete_output("speed_reference", "rad/s", "Speed asked for", display_unit="rpm"),
+        discrete_output("load_torque", "N.m", "Torque of the load against the rotation"),
     )
     parameters = (
         parameter("speed", "rad/s", RPM_1000, "Speed asked for at first", display_unit="rpm"),

@@ -6,7 +6,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    PeriodicEvent,
+    discrete_output,
+    input_signal,
+    memory,
+    parameter,
+)
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
 from plant_models.railway.traction.transforms import to_rotor, to_stator
@@ -50,11 +58,11 @@ class FieldOrientedControl(HybridSystem):
         memory("held_reference", "A", 0.0, "Current asked for along q"),
     )
     outputs = (
-        output_signal("voltage_d", "V", "Voltage along d", variability="discrete"),
-        output_signal("voltage_q", "V", "Voltage along q", variability="discrete"),
-        output_signal("voltage_alpha", "V", "Voltage along alpha", variability="discrete"),
-        output_signal("voltage_beta", "V", "Voltage along beta", variability="discrete"),
-        output_signal("current_reference", "A", "Current asked for along q", variability="discrete"),
+        discrete_output("voltage_d", "V", "Voltage along d"),
+        discrete_output("voltage_q", "V", "Voltage along q"),
+        discrete_output("voltage_alpha", "V", "Voltage along alpha"),
+        discrete_output("voltage_beta", "V", "Voltage along beta"),
+        discrete_output("current_reference", "A", "Current asked for along q"),
     )
     parameters = (
         parameter("control_period", "s", 1e-4, "Control period", min=1e-7),
