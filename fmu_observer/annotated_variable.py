@@ -11,7 +11,7 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from plant_models.hybrid.output_warning import OutputWarning
+from plant_models.hybrid.signal import OutputWarning
 
 _OPTIONAL, CAN_BE_MISSING = "optional", "can_be_missing"
 MARKS = {

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cosim.fmu_filter.belief import FmuBelief, FmuFilter, Noises
 from cosim.fmu_model.sealed import SealedModel
-from fmu_observer.formulas.filtering import ensemble, particles
+from fmu_observer.formulas.filtering import particles
 
 Array = NDArray[np.float64]
 
@@ -34,16 +34,16 @@ class EnsembleFilter(FmuFilter):
     def begin(self, x: Array, P: Array) -> FmuBelief:
         """Members drawn about the estimate; arguments as for `FmuFilter`."""
         draws = self._draws(0, len(x))
-        members = x[:, None] + ensemble.drawn(P, draws)
+        members = x[:, None] + particles.drawn(P, draws)
         return self._summed(FmuBelief(x, P, points=members))
 
     def predict(self, belief: FmuBelief, t: float, h: float, u: Array) -> FmuBelief:
         """The belief a step later; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
         draws = self._draws(2 * count, len(u))
-        driven = u[:, None] + (ensemble.drawn(self.noises.inputs, draws) if len(u) else draws)
+        driven = u[:, None] + (particles.drawn(self.noises.inputs, draws) if len(u) else draws)
         moved = self.model.states_after(t, h, members, driven)
-        added = ensemble.drawn(h * self.noises.intensity, self._draws(2 * count + 1, len(belief.x)))
+        added = particles.drawn(h * self.noises.intensity, self._draws(2 * count + 1, len(belief.x)))
         return self._summed(replace(belief, points=moved + added, count=count))
 
     def correct(self, belief: FmuBelief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> FmuBelief:
@@ -51,7 +51,7 @@ class EnsembleFilter(FmuFilter):
         members, count = _points(belief), belief.count + 1
         chosen = list(seen)
         looks = self.model.outputs_at(t, members, u, chosen)
-        found = ensemble.correct_members(members, looks, y, R, self._draws(2 * count, len(y)))
+        found = particles.correct_members(members, looks, y, R, self._draws(2 * count, len(y)))
         return self._summed(replace(belief, points=found.members, nis=float(found.nis), degrees=len(y), count=count))
 
     def _draws(self, index: int, rows: int) -> Array:
@@ -60,8 +60,8 @@ class EnsembleFilter(FmuFilter):
 
     def _summed(self, belief: FmuBelief) -> FmuBelief:
         members = _points(belief)
-        mean = ensemble.mean_of(members)
-        apart = ensemble.deviations_of(members, mean)
+        mean = particles.mean_of(members)
+        apart = particles.deviations_of(members, mean)
         return replace(belief, x=mean, P=apart @ apart.T)
 
 
@@ -123,7 +123,7 @@ class FmuParticleFilter(FmuFilter):
         """The belief a step later; arguments as for `FmuFilter`."""
         model, count = self.model, belief.count + 1
         draws = np.random.default_rng([self._seed, count]).standard_normal((len(u), self._count))
-        driven = u[:, None] + (ensemble.drawn(self.noises.inputs, draws) if len(u) else draws)
+        driven = u[:, None] + (particles.drawn(self.noises.inputs, draws) if len(u) else draws)
         states, columns = [], []
         for i, saved in enumerate(belief.states):
             model.called(partial(model.instance.restore, saved.state))

@@ -11,7 +11,7 @@ from math import sqrt
 
 from cosim.network.settings import NetworkSettings
 from plant_models.hybrid.noise import Purpose, standard_normal, uniform_pair
-from plant_models.railway.network.loss import loss_threshold
+from plant_models.railway.network.protocols import loss_threshold
 
 LOSS, INSTANT, DELAY, _SECOND_DELAY = range(4)
 """Numbers of the noise signals; the first is that of the block `network_protocol`."""

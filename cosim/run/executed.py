@@ -33,7 +33,7 @@ from cosim.run.summary import judged_summary, run_summary
 from cosim.structure.divergence import explained_failure
 from fmu_observer.annotated_variable import declared_warnings
 from plant_models.hybrid.missing import MISSED_SAMPLES
-from plant_models.hybrid.output_warning import OutputWarning
+from plant_models.hybrid.signal import OutputWarning
 
 _DOUBTS = {"doubted": "used", "ignored": "ignored"}  # what became of a telegram that was doubted, by its outcome
 _NAMED_DOUBTS = 5

@@ -10,12 +10,56 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
-from fmu_observer.detection.wheel_classes import CHANGES, DROP, RISE, STEADY, WHEEL_CLASSES
-from fmu_observer.formulas.signatures.classification import Plane, SignatureClassifier
-from fmu_observer.formulas.signatures.clouds import Coordinate
+from fmu_observer.formulas.signatures.classification import Plane, SearchStage, SignatureClassifier
+from fmu_observer.formulas.signatures.clouds import Coordinate, Separation
 from fmu_observer.formulas.signatures.pencil import pencil_point
 from fmu_observer.formulas.signatures.properties import PROPERTIES
 from plant_models.hybrid import Array, HybridSystem, discrete_output, input_signal, memory, parameter, vector
+
+STEADY, DROP, RISE = "steady", "drop", "rise"
+CHANGES = 4
+"""Changes from reading to reading in a record."""
+_PLANE_1 = Plane(
+    (
+        Coordinate(2, "max_eta", 10.0, "norm"),
+        Coordinate(2, "range_xi", 0.1, "norm"),
+    ),
+    np.array([0.48824321, 9.35163292e-05]),
+    np.array([1.94450841, 68.2743576]),
+)
+_PLANE_2 = Plane(
+    (
+        Coordinate(2, "min_eta", 10.0, "literal"),
+        Coordinate(2, "min_eta", 1.0, "norm"),
+    ),
+    np.array([-1.39895177, -13.9128048]),
+    np.array([1.9117224, 14.5279604]),
+)
+WHEEL_CLASSES = SignatureClassifier(
+    (
+        SearchStage(
+            DROP,
+            _PLANE_1,
+            {
+                STEADY: Separation(0.00672659163, 0.00610860294, np.array([0.996194698, -0.0871557427]), 0.0173349324),
+                RISE: Separation(0.00988674917, 0.00922705105, np.array([0.99756405, -0.0697564737]), 0.0161031639),
+            },
+            0.00672659163,
+        ),
+        SearchStage(
+            STEADY,
+            _PLANE_2,
+            {
+                RISE: Separation(0.00579823116, 0.00303093431, np.array([0.906307787, -0.422618262]), 0.474184313),
+            },
+            0.00579823116,
+        ),
+    ),
+    RISE,
+    (STEADY, DROP, RISE),
+)
+"""Decisions of `wheel_signature`: at 5 Hz and 0.05 m/s of noise, faults of at least 0.6 m/s."""
+
 
 _TRAINED_PERIOD = 0.2  # [s]
 CODES: Mapping[str, float] = {STEADY: 0.0, DROP: -1.0, RISE: 1.0}

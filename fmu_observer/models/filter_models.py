@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fmu_observer.formulas.filtering.kalman import symmetric
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals
 from fmu_observer.models.discrete_model import transition
-from fmu_observer.models.named_states import NamedStates
-from fmu_observer.models.observer_model import ObserverModel
+from fmu_observer.models.observer_model import NamedStates, ObserverModel
 from plant_models.hybrid import Array, Signal, width
 from plant_models.hybrid.exact_jacobian import exact_jacobian, is_affine
 
@@ -220,3 +220,21 @@ def _flat(known: Known) -> tuple[Array, ...]:
 
 def _row(value: Array) -> Array:
     return np.reshape(value, (1,))
+
+
+def noise_over(model: FilterModel, x: Array, known: Known, period: Array, density: Array) -> Array:
+    """Covariance that white noise on the states leaves after a period, by Simpson's rule of its integral.
+
+    Exact for chains of up to two integrators; positive for any period.
+
+    Args:
+        model: holds for any period. x: state at the start, shape (n,). known: time, inputs and parameters.
+        period: [s]. density: spectral density, shape (n, n) [x2/s].
+
+    Returns:
+        ``integral of F(s) density F(s)'`` over the period, shape (n, n).
+    """
+    half, _ = model.transition_jacobians(x, known, 0.5 * period)
+    whole, _ = model.transition_jacobians(x, known, period)
+    middle = half @ density @ half.T
+    return symmetric((period / 6.0) * (density + 4.0 * middle + whole @ density @ whole.T))

@@ -14,9 +14,35 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
-from fmu_observer.models.named_states import NamedStates
 from plant_models.hybrid import Array, Signal, vector
 from plant_models.hybrid.exact_jacobian import exact_jacobian
+
+
+class NamedStates:
+    """A model of n scalar states and m scalar inputs.
+
+    Attributes:
+        states: n of them. inputs: m of them.
+    """
+
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+
+    @property
+    def order(self) -> int:
+        """Number of states, n."""
+        return len(self.states)
+
+    @property
+    def start(self) -> np.ndarray:
+        """Start of the estimates, shape (n,)."""
+        return np.array([float(s.start_values[0]) for s in self.states])
+
+    @property
+    def start_inputs(self) -> np.ndarray:
+        """Inputs at their starts, shape (m,)."""
+        return np.array([float(s.start_values[0]) for s in self.inputs])
+
 
 _PROBES = 5  # states at which a phi of unknown slope is examined
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
-from fmu_observer.models.named_states import NamedStates
+from fmu_observer.models.observer_model import NamedStates
 from plant_models.hybrid import Array, Signal
 
 Matrices = Callable[[Array, Array], Array]  # (t, u of shape (m,)) -> an array

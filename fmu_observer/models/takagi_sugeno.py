@@ -13,8 +13,7 @@ from math import isfinite
 import numpy as np
 
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
-from fmu_observer.models.named_states import NamedStates
-from fmu_observer.models.observer_model import stacked
+from fmu_observer.models.observer_model import NamedStates, stacked
 from plant_models.hybrid import Array, Signal, vector
 
 PremiseFunction = Callable[[Array, Array], Array]  # (x of shape (n,), u of shape (m,)) -> a number

@@ -6,7 +6,6 @@ point.
 
 from fmu_observer.observability.gramian import Observability, observability, observability_gramian
 from fmu_observer.observability.measured_system import MeasuredSystem
-from fmu_observer.observability.model_detectability import require_detectable_model, require_detectable_vertices
 from fmu_observer.observability.modes import (
     Mode,
     UnobservableError,
@@ -16,7 +15,12 @@ from fmu_observer.observability.modes import (
     unobservable_modes,
 )
 from fmu_observer.observability.pattern import SamplePattern
-from fmu_observer.observability.sources import measured_model, measured_plant
+from fmu_observer.observability.sources import (
+    measured_model,
+    measured_plant,
+    require_detectable_model,
+    require_detectable_vertices,
+)
 
 __all__ = [
     "MeasuredSystem",

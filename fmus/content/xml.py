@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
 
 from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
-from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT
+from plant_models.hybrid.signal import ANNOTATION, ELEMENT
 
 _CAPABILITIES_2 = {
     "canHandleVariableCommunicationStepSize": "canHandleVariableCommunicationStepSize",

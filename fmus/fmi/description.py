@@ -12,7 +12,7 @@ from fmpy.model_description import ModelDescription, ModelVariable, Unknown
 
 from fmu_observer.annotated_variable import MARKS, AnnotatedVariable
 from fmus.fmi.standard import OWN_TOOL
-from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT, OutputWarning
+from plant_models.hybrid.signal import ANNOTATION, ELEMENT, OutputWarning
 
 FILE = "modelDescription.xml"
 LEFT_OUT = {

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from plant_models.hybrid.arrays import Array, matrix, vector
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
-from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import (
+    OutputWarning,
     Signal,
     discrete_output,
     input_signal,

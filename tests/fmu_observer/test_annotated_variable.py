@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from fmu_observer.annotated_variable import AnnotatedVariable
-from plant_models.hybrid.output_warning import OutputWarning
+from plant_models.hybrid.signal import OutputWarning
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda v: pickle.loads(pickle.dumps(v))])

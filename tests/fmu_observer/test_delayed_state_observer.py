@@ -17,7 +17,7 @@ from fmu_observer.certificates.printed_bounds.network_bounds import (
     exact_predictor_delay,
     largest_gain,
 )
-from fmu_observer.formulas.delay.delay_memory import at_age, integral_weights, weighted
+from fmu_observer.formulas.delay.finite_time_predictor import at_age, integral_weights, weighted
 from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
 from fmu_observer.observers.generic.sampled.dynamic_high_gain import OutputPredictor

@@ -11,7 +11,7 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
-from fmu_observer.design.noise_covariance import process_covariance
+from fmu_observer.design.uio_design import process_covariance
 from fmu_observer.models.discrete_model import _zero_order_hold, transition
 from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum
 from fmu_observer.models.train.freight_train_model import freight_train

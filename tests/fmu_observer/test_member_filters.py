@@ -5,7 +5,7 @@ import pytest
 from generic_runner import sampled_run
 from scipy import stats
 
-from fmu_observer.formulas.filtering import ensemble, particles
+from fmu_observer.formulas.filtering import particles
 from fmu_observer.formulas.filtering.covariance_consistency import judge
 from fmu_observer.formulas.filtering.smoothing import extended_pass
 from fmu_observer.models.discrete_model import _zero_order_hold
@@ -43,30 +43,30 @@ def test_an_ensemble_tends_to_the_kalman_filter_as_members_grow() -> None:
         last = []
         for seed in range(40):
             random = np.random.default_rng(seed)
-            members = START[:, None] + ensemble.drawn(P, random.normal(size=(2, count)))
+            members = START[:, None] + particles.drawn(P, random.normal(size=(2, count)))
             for k, sample in enumerate(samples):
                 if k > 0:
-                    members = F @ members + ensemble.drawn(Q, random.normal(size=(2, count)))
+                    members = F @ members + particles.drawn(Q, random.normal(size=(2, count)))
                 draws = random.normal(size=(1, count))
-                members = ensemble.correct_members(members, H @ members, sample, R, draws).members
-            last.append(ensemble.mean_of(members)[0] - means[-1, 0])
+                members = particles.correct_members(members, H @ members, sample, R, draws).members
+            last.append(particles.mean_of(members)[0] - means[-1, 0])
         low, high = stats.t.interval(0.999, 39, np.mean(last), np.std(last, ddof=1) / np.sqrt(40))
         assert low < 0.0 < high
         sizes[count] = float(np.std(last))
     assert sizes[400] < 0.5 * sizes[25]  # a quarter in the limit
     assert sizes[400] < 3.0 * spread / np.sqrt(400)
-    assert ensemble.variances_of(members)[0] == pytest.approx(covariances[-1, 0, 0], rel=0.3)
+    assert particles.variances_of(members)[0] == pytest.approx(covariances[-1, 0, 0], rel=0.3)
 
 
 def test_particles_tend_to_the_kalman_filter_as_they_grow() -> None:
     samples, count = recording(15), 4000
     means, covariances = kalman(samples)
     random = np.random.default_rng(0)
-    points = START[:, None] + ensemble.drawn(P, random.normal(size=(2, count)))
+    points = START[:, None] + particles.drawn(P, random.normal(size=(2, count)))
     weights = np.full(count, 1.0 / count)
     for k, sample in enumerate(samples):
         if k > 0:
-            points = F @ points + ensemble.drawn(Q, random.normal(size=(2, count)))
+            points = F @ points + particles.drawn(Q, random.normal(size=(2, count)))
         weights = particles.reweighted(weights, H @ points, sample, R)
         found = particles.moments(points, weights)
         error = np.abs(found.mean - means[k]) / np.sqrt(np.diag(covariances[k]))

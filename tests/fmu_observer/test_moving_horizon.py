@@ -396,7 +396,7 @@ def test_illegal_options_are_refused_in_words(options: dict[str, Any], said: str
 def test_a_window_that_does_not_tell_a_state_says_which() -> None:
     short, long = (own_condition(MovingHorizonObserver("linear_pendulum", window=w)) for w in (1, 2))
     assert short.numbers["window_rank"] == 1
-    assert "A window of 1 full row tells 1 without the arrival cost; it does not tell rate," in short.statement
+    assert "A window of 1 full row shows 1 without the arrival cost; it does not show rate," in short.statement
     assert long.numbers["window_rank"] == 2
     assert "A window of 2 full rows tells all of them" in long.statement
 

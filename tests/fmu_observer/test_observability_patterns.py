@@ -113,7 +113,7 @@ def test_samples_in_step_with_an_oscillation_miss_half_of_it() -> None:
     assert (in_step.rank, in_step.unobservable) == (1, ())
     np.testing.assert_allclose(np.abs(in_step.unseen[:, 0]), [0.0, 1.0], atol=1e-9)
     with pytest.raises(
-        UnobservableError, match=r"coupler: 5 samples .* tell 1 of 2 states; not measured: \+?-?1 rate.*in step"
+        UnobservableError, match=r"coupler: 5 samples .* show 1 of 2 states; not measured: \+?-?1 rate.*in step"
     ):
         in_step.require()
     observability(system, SamplePattern(0.9 * np.pi * np.arange(1, 6))).require()

@@ -8,7 +8,7 @@ from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, MASS, SteadyMotion, in_st
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
-from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K
+from fmu_observer.formulas.correction.innovation_decay import HIGH_GAIN_K
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo, TrainObserver
 
 MOTION = SteadyMotion(speed=20.0)

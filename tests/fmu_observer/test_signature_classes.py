@@ -13,8 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.distance import cdist
 
 from fmu_observer.detection import WheelSignature
-from fmu_observer.detection.wheel_classes import WHEEL_CLASSES
-from fmu_observer.detection.wheel_signature import CODES, _record_class
+from fmu_observer.detection.wheel_signature import CODES, WHEEL_CLASSES, _record_class
 from fmu_observer.formulas.signatures.classification import PencilSpace, SeparationError, train_classifier
 from fmu_observer.formulas.signatures.clouds import Coordinate, extent, separation
 from fmu_observer.formulas.signatures.conditional_estimate import train_conditional, train_curve

@@ -103,7 +103,7 @@ def test_a_search_finds_the_candidate_and_says_where_none_brackets() -> None:
 
 
 def test_a_table_that_turns_is_refused_with_quantity_and_range() -> None:
-    with pytest.raises(ValueError, match=r"does not tell x2 between 1 and 2 at b = 3.*Narrow the range"):
+    with pytest.raises(ValueError, match=r"does not show x2 between 1 and 2 at b = 3.*Narrow the range"):
         inversion.require_monotone("x2", np.arange(4.0), np.array([0.0, 1.0, 0.5, 4.0]), "at b = 3")
     inversion.require_monotone("x2", np.arange(4.0), np.array([0.0, 1.0, 3.5, 4.0]))
 

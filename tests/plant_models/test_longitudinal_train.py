@@ -14,8 +14,7 @@ from scipy.integrate import solve_ivp
 from fmu_observer.observability import measured_plant, unobservable_modes
 from plant_models import PLANTS
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
-from plant_models.railway.vehicle.davis_sets import DAVIS_SETS
-from plant_models.railway.vehicle.resistance import davis_from_vehicle
+from plant_models.railway.vehicle.resistance import DAVIS_SETS, davis_from_vehicle
 
 TRAIN = PLANTS["longitudinal_train"]()
 EULER = PLANTS["longitudinal_train_euler"]()

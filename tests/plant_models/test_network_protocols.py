@@ -9,9 +9,9 @@ import pytest
 
 from plant_models.hybrid.runtime import Runtime
 from plant_models.hybrid.signal import scalar_names
-from plant_models.railway.network.loss import loss_threshold
 from plant_models.railway.network.network_protocol import NetworkProtocol
 from plant_models.railway.network.protocols import (
+    loss_threshold,
     network_error,
     periodic_sender,
     quadratic_sender,

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models import Locomotive
-from plant_models.railway.track.table import piecewise_linear
-from plant_models.railway.track.track import Track, _piecewise_constant
+from plant_models.railway.track.track import Track, _piecewise_constant, piecewise_linear
 from plant_models.railway.vehicle.resistance import davis_from_vehicle, gradient_resistance, moving_resistance
 
 BB27000 = {"mass": 90e3, "axle_mass": 22.5e3, "cross_section": 2.857 * 4.31, "perimeter": 2.857, "length": 19.5}

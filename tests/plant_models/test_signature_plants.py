@@ -7,9 +7,9 @@ import pytest
 import scipy
 
 from plant_models.exhibits import BrakedOscillator, EcoliCulture, GasPhaseReaction, ThreeStateCascade
-from plant_models.exhibits.braked_oscillator import Variant
 from plant_models.exhibits.ecoli_culture import HOUR
 from plant_models.exhibits.noisy_plant import NoisyPlant
+from plant_models.exhibits.oscillators import Variant
 from plant_models.hybrid.integration import rk4_step
 
 

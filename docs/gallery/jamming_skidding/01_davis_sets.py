@@ -6,8 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from plant_models.railway.vehicle.davis_sets import DAVIS_SETS
-from plant_models.railway.vehicle.resistance import davis_from_vehicle
+from plant_models.railway.vehicle.resistance import DAVIS_SETS, davis_from_vehicle
 
 NOT_PRINTED = "only the coefficients are published; the independent number is computed from them"
 INDEPENDENT = {

@@ -9,7 +9,7 @@ from shared.sheet import Sheet
 from plant_models import PLANTS
 from plant_models.hybrid import Runtime
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
-from plant_models.railway.vehicle.davis_sets import ADHESION_LEVELS
+from plant_models.railway.vehicle.resistance import ADHESION_LEVELS
 
 PUBLISHED = {
     "sncf_multi_motor_bogie": 0.33,

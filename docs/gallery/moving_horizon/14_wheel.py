@@ -14,7 +14,7 @@ from shared.sheet import Sheet
 import fmus
 from cosim.evaluation.fault_detection import clopper_pearson, garwood
 from fmu_observer.detection import WheelSignature
-from fmu_observer.detection.wheel_classes import DROP, RISE, STEADY, WHEEL_CLASSES
+from fmu_observer.detection.wheel_signature import DROP, RISE, STEADY, WHEEL_CLASSES
 
 HELD_OUT_SEED, MEMBERS, NOISES = 77, 100, (0.02, 0.05)
 OURS = "the thesis has no train: plant, faults, classes and detector are ours; seed {seed}, the training had seed 1"

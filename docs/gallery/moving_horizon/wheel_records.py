@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from shared.jam_runs import CASES, random_jams, readings, trains
 
-from fmu_observer.detection.wheel_classes import DROP, RISE, STEADY
+from fmu_observer.detection.wheel_signature import DROP, RISE, STEADY
 from fmu_observer.formulas.signatures.classification import PencilSpace, SignatureClassifier, train_classifier
 
 CHANGES = 4  # in a record

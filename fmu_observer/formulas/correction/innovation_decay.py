@@ -1,10 +1,16 @@
-"""How much of a sampled innovation still acts a while after its sample, in closed form. A pure function."""
+"""Corrections by a sampled innovation: the gain that decays after a sample, and how much of the innovation still acts,
+in closed form. Pure functions.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from plant_models.hybrid import Array, Signal, parameter, state
+
+# K = inv(P) C' with P + A'P + P A = C'C, A the shift matrix: Bouchama 2024, (3.29) with A for Abar
+HIGH_GAIN_K = (2.0, 1.0)
+
 
 _NOTHING = 1e-300  # in place of zero, of which a power has no derivative by its exponent
 ELAPSED = state("elapsed", "s", 0.0, "Time since the last sample")
@@ -35,3 +41,20 @@ def innovation_left(elapsed: Array, rate: Array, exponent: Array) -> Array:
     ending = np.where(exponent < 1.0, 1.0 - exponent, 1.0)
     linear = np.maximum(1.0 - ending * rate * elapsed, _NOTHING)
     return np.where(exponent < 1.0, linear ** (1.0 / ending), np.exp(-rate * elapsed))
+
+
+def correction(theta: Array, K: Array, innovation: Array) -> tuple[Array, Array]:
+    """Correction ``theta inv(Delta) K eta`` of a second-order observer: Bouchama 2024, (1.47), (3.26).
+
+    Args:
+        theta: gain [1/s]. K: shape (2,). innovation: decaying innovation eta, unit of the measured state.
+
+    Returns:
+        The two terms to subtract from the derivatives: ``theta K1 eta`` and ``theta^2 K2 eta``.
+    """
+    return theta * K[0] * innovation, theta * theta * K[1] * innovation
+
+
+def innovation_decay(theta: Array, K: Array, innovation: Array) -> Array:
+    """Derivative of the decaying innovation, ``-theta K1 eta``: Bouchama 2024, (1.47) with K^1 in the exponent."""
+    return -theta * K[0] * innovation

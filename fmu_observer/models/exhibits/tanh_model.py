@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
-from plant_models.exhibits.tanh_system import Reading, tanh_term
+from plant_models.exhibits.oscillators import Reading, tanh_term
 from plant_models.hybrid import Array, input_signal, state, vector
 
 _STIFFNESS = 0.1  # [1/s2]

@@ -11,7 +11,7 @@ from fmu_observer.formulas.signatures.inversion import soft_inverse
 from fmu_observer.formulas.signatures.pencil import NextScaling
 from fmu_observer.observers.generic.signature.signature_observer import TABLE_ERROR, InvertedWindow, SignatureObserver
 from fmu_observer.observers.parameter_values import Value
-from plant_models.exhibits.braked_oscillator import BrakedOscillator, Variant
+from plant_models.exhibits.oscillators import BrakedOscillator, Variant
 from plant_models.hybrid import Array, parameter
 from plant_models.hybrid.option import require_chosen, require_whole
 

@@ -17,8 +17,8 @@ from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.formulas.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.evaluated_observer import EvaluatedObserver
+from fmu_observer.observers.generic.discrete.arrivals import at_sample, initialised_memory
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
-from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
 from fmu_observer.observers.model_signals import LOG_LIKELIHOOD, sampling_event
 from plant_models.hybrid import (
     Array,

@@ -11,7 +11,7 @@ import numpy as np
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.design.certified_gains import certified_gains, rounded_down
-from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K
+from fmu_observer.formulas.correction.innovation_decay import HIGH_GAIN_K
 from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
 from fmu_observer.observers.train.train_observer import TrainObserver

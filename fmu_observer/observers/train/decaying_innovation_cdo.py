@@ -13,8 +13,7 @@ from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.limit_search import LimitSearch
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds
 from fmu_observer.design.certified_gains import certified_gains
-from fmu_observer.formulas.correction.decaying_gain import correction
-from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_parameters, innovation_left
+from fmu_observer.formulas.correction.innovation_decay import ELAPSED, correction, decay_parameters, innovation_left
 from fmu_observer.models.observer_model import shift_matrix
 from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver

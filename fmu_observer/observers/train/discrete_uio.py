@@ -10,8 +10,7 @@ import scipy
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
-from fmu_observer.design.noise_covariance import process_covariance
-from fmu_observer.design.uio_design import uio_matrices
+from fmu_observer.design.uio_design import process_covariance, uio_matrices
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver

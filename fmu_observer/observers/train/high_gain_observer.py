@@ -14,7 +14,7 @@ from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import GapError
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import certified_gains
-from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
+from fmu_observer.formulas.correction.innovation_decay import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag

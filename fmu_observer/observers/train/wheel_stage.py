@@ -11,7 +11,7 @@ from typing import Any
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
-from fmu_observer.formulas.correction.decaying_gain import HIGH_GAIN_K, correction, innovation_decay
+from fmu_observer.formulas.correction.innovation_decay import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.formulas.differentiation.differentiator import filtering_differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
 from plant_models.hybrid import Array, PeriodicEvent, Signal, parameter, state

@@ -11,8 +11,9 @@ import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import (
+    DRIVE_AND_BRAKES,
+    PRESETS,
     air_brake_demand,
     electric_brake_limit,
     electric_part,

@@ -12,7 +12,7 @@ import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_whole
-from plant_models.railway.track.table import piecewise_linear
+from plant_models.railway.track.track import piecewise_linear
 
 PROFILE_POINTS = 8
 FEWEST_POINTS, MOST_POINTS = 4, 64  # the shipped profiles have four

@@ -20,8 +20,9 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
 )
-from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import (
+    DRIVE_AND_BRAKES,
+    PRESETS,
     air_brake_demand,
     electric_brake_limit,
     electric_part,

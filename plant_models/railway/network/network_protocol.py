@@ -23,8 +23,7 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.railway.network.loss import loss_threshold
-from plant_models.railway.network.protocols import smallest, try_once_discard
+from plant_models.railway.network.protocols import loss_threshold, smallest, try_once_discard
 
 Protocol = Literal["round-robin", "periodic", "try-once-discard", "quadratic"]
 PROTOCOLS = ("round-robin", "periodic", "try-once-discard", "quadratic")

@@ -12,7 +12,9 @@ import numpy as np
 
 from plant_models.hybrid import Array, Signal, parameter
 from plant_models.hybrid.option import require_chosen, require_whole
-from plant_models.railway.track.table import piecewise_linear
+
+_SMALLEST_WIDTH = 1e-9  # equal abscissae make a jump, not a division by zero
+
 
 ZoneAxis = Literal["time", "position"]
 GradientShape = Literal["constant", "linear"]
@@ -138,4 +140,24 @@ def _piecewise_constant(at: Array, abscissae: Array, ordinates: Array) -> Array:
     value = ordinates[0]
     for i in range(1, ordinates.shape[0]):
         value = np.where(at >= abscissae[i], ordinates[i], value)
+    return value
+
+
+def piecewise_linear(at: Array, abscissae: Array, ordinates: Array) -> Array:
+    """Broken line through the points, constant before the first and after the last.
+
+    A sum of clipped ramps: points may be repeated (padding), and two points with equal abscissae make a jump.
+
+    Args:
+        at: where to read, a scalar or shape (members,).
+        abscissae: shape (n,) or (n, members), not decreasing.
+        ordinates: shape (n,) or (n, members).
+
+    Returns:
+        The value there, of the shape of `at`.
+    """
+    value = ordinates[0]
+    for i in range(ordinates.shape[0] - 1):
+        width = np.maximum(abscissae[i + 1] - abscissae[i], _SMALLEST_WIDTH)
+        value = value + (ordinates[i + 1] - ordinates[i]) * np.clip((at - abscissae[i]) / width, 0.0, 1.0)
     return value

@@ -15,6 +15,8 @@ from plant_models.railway.traction.motor_equations import (
     AXES,
     FRAMES,
     MOTOR_PARAMETERS,
+    NOISE_PARAMETERS,
+    PUBLISHED_NOISE,
     TRACTION_200_KW,
     Frame,
     electromagnetic_torque,
@@ -22,12 +24,8 @@ from plant_models.railway.traction.motor_equations import (
     motor_inputs,
     motor_outputs,
     motor_rates,
-    rotor_voltages,
-)
-from plant_models.railway.traction.sampled_currents import (
-    NOISE_PARAMETERS,
-    PUBLISHED_NOISE,
     process_noise,
+    rotor_voltages,
     sampling_event,
 )
 from plant_models.railway.traction.transforms import to_stator

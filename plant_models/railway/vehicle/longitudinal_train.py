@@ -1,20 +1,200 @@
-"""The longitudinal train: one point with Davis resistance, brake and gradient, per unit mass or not.
-
-Declares the continuous system; the forces stand in `longitudinal_forces`.
+"""The longitudinal train: one point with Davis resistance, brake and gradient, per unit mass or not, continuous and in
+Euler steps.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import Array, PeriodicEvent, memory, parameter, state, vector
-from plant_models.railway.track.track import GradientShape, ZoneAxis
-from plant_models.railway.vehicle.longitudinal_forces import TRAIN_PRESETS, LongitudinalForces
+from plant_models.hybrid import (
+    Array,
+    HybridSystem,
+    OutputWarning,
+    PeriodicEvent,
+    Signal,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
+from plant_models.hybrid.option import require_chosen
+from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
+from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
+from plant_models.railway.vehicle.resistance import (
+    DAVIS_SETS,
+    GRAVITY,
+    DavisSet,
+    gradient_resistance,
+    moving_resistance,
+)
 
 
-class LongitudinalTrainEuler(LongitudinalForces):
+class _Forces(NamedTuple):
+    """Forces on the train [N], each a scalar or shape (members,).
+
+    Args:
+        push: sum of all that flows with the motion: traction, disturbance, moving resistance and gradient.
+        moving: speed-dependent part of the Davis resistance. gradient: downhill pull as a resistance.
+        brake: largest dry friction of the brake.
+    """
+
+    push: Array
+    moving: Array
+    gradient: Array
+    brake: Array
+
+
+class _LongitudinalForces(HybridSystem):
+    """Base of the trains that are one point: signals, presets and forces of (2.1), (2.2), (2.7) and (2.26)-(2.28).
+
+    Args:
+        zones: zones of degraded adhesion along ``time`` or ``position``.
+        zone_count: number of zones.
+        gradient_shape: gradient ``constant`` between its points, or ``linear``.
+        gradient_count: number of gradient points.
+        railway: row of Table 2.1 that gives the default of `adhesion_at_rest`.
+
+    Raises:
+        ValueError: an unknown option, or a count below one.
+
+    Source: Aguiar Cota 2019, section 2.1.1 and (2.26)-(2.28).
+    """
+
+    inputs = (
+        input_signal("effort", "N", 0.0, "Effort demanded: traction > 0, brake < 0"),
+        input_signal("effort_loss", "1", 0.0, "Share of the effort that is lost, 0 to 1", optional=True),
+        input_signal("disturbance_force", "N", 0.0, "Unknown force along increasing position", optional=True),
+    )
+    outputs = (
+        output_signal("position", "m", "Position of the train"),
+        output_signal("speed", "m/s", "Speed of the train", display_unit="km/h"),
+        output_signal("acceleration", "m/s2", "Acceleration of the train"),
+        output_signal("wheel_speed", "m/s", "Circumferential speed of a wheel that rolls", display_unit="km/h"),
+        output_signal("resistance_force", "N", "Davis resistance, against the motion"),
+        output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
+        output_signal("adhesion_limit", "N", "Largest force that the rails can take"),
+        output_signal(
+            "outside_fitted_range",
+            "1",
+            "1 where the speed is outside the range of the Davis coefficients",
+            warning=OutputWarning(
+                "the train left the speeds from fitted_from to fitted_to in which its Davis coefficients hold, and a "
+                "set with davis_c < 0 pulls it at high speed: take another set, or set the range that you accept",
+                ("speed", "resistance_force"),
+            ),
+        ),
+    )
+    presets = {}
+    default_preset = "set_a"
+    option_choices = {
+        "zones": ("position", "time"),
+        "zone_count": range(1, 65),
+        "gradient_shape": ("constant", "linear"),
+        "gradient_count": range(1, 65),
+        "railway": tuple(STANDING_ADHESION),
+    }
+    own_parameters: ClassVar[tuple[Signal, ...]] = ()
+
+    def __init__(
+        self,
+        *,
+        zones: ZoneAxis = "position",
+        zone_count: int = 3,
+        gradient_shape: GradientShape = "constant",
+        gradient_count: int = 4,
+        railway: str = "sncf_multi_motor_bogie",
+    ) -> None:
+        require_chosen(self.name, self.option_choices, railway=railway)
+        self._track = Track(zones, zone_count, gradient_shape, gradient_count)
+        self.parameters = (*_vehicle(railway), *self.own_parameters, *self._unused_zones())
+        super().__init__(
+            zones=zones,
+            zone_count=zone_count,
+            gradient_shape=gradient_shape,
+            gradient_count=gradient_count,
+            railway=railway,
+        )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Zones have a length and do not overlap; the range of the fit is one."""
+        ordered = "fitted_to must not lie below fitted_from"
+        return {**self._track.requirements(p), ordered: np.where(p.fitted_to >= p.fitted_from, 1.0, 0.0)}
+
+    # -- forces -----------------------------------------------------------------------------------------------------
+
+    def _forces(self, t: Array, position: Array, speed: Array, u: Any, p: Any) -> _Forces:
+        """All forces at a time [s], a position [m] and a speed [m/s]."""
+        working = 1.0 - np.clip(u.effort_loss, 0.0, 1.0)
+        traction = p.traction_coefficient * working * np.maximum(u.effort, 0.0)
+        brake = p.brake_coefficient * working * np.maximum(-u.effort, 0.0)
+        moving = moving_resistance(speed, p.davis_b, p.davis_c)
+        wave = p.mass * p.grade_amplitude * np.sin(p.grade_rate * t)
+        gradient = gradient_resistance(p.mass, p.gravity, self._track.gradient(position, p)) + wave
+        return _Forces(traction + u.disturbance_force - moving - gradient, moving, gradient, brake)
+
+    def _outputs(self, position: Array, speed: Array, forces: _Forces, degraded: Array, p: Any) -> dict[str, Array]:
+        """The declared outputs; at rest the forces are those that hold the train."""
+        push, at_rest, direction = forces.push, speed == 0.0, np.sign(speed)
+        dry = np.where(at_rest, np.clip(push, -p.davis_a, p.davis_a), direction * p.davis_a)
+        freed = np.sign(push) * np.maximum(np.abs(push) - p.davis_a - forces.brake, 0.0)
+        moves = np.where(at_rest, freed, push - direction * (p.davis_a + forces.brake))
+        size = np.abs(speed)
+        level = p.adhesion_level * (1.0 + degraded * (p.degraded_level - 1.0))
+        weight = p.adhesive_share * p.mass * p.gravity
+        outside = np.where(size < p.fitted_from, 1.0, np.where(size > p.fitted_to, 1.0, 0.0))
+        return {
+            "position": position,
+            "speed": speed,
+            "acceleration": moves / p.mass,
+            "wheel_speed": speed,
+            "resistance_force": forces.moving + dry,
+            "gradient_force": forces.gradient,
+            "adhesion_limit": weight * level * adhesion_coefficient(size, p.adhesion_at_rest),
+            "outside_fitted_range": np.where(at_rest, 0.0, outside),
+        }
+
+    def _unused_zones(self) -> tuple[Signal, ...]:
+        """Parameters of the track; no zone is laid unless it is asked for, along time neither."""
+        unused = {"zone_from": 0.0, "zone_to": 0.0}
+        return tuple(
+            parameter(s.name, s.unit, unused[s.name], s.description, size=s.size) if s.name in unused else s
+            for s in self._track.parameters
+        )
+
+
+def _davis_preset(chosen: DavisSet) -> dict[str, float]:
+    """Parameter values of a published set, per unit mass: newtons are m/s2."""
+    return {
+        "mass": 1.0,
+        "traction_coefficient": chosen.effort_coefficient,
+        "brake_coefficient": chosen.effort_coefficient,
+        "davis_a": chosen.a,
+        "davis_b": chosen.b,
+        "davis_c": chosen.c,
+        "fitted_from": chosen.fitted_from,
+        "fitted_to": chosen.fitted_to,
+        "adhesion_level": chosen.adhesion_level,
+    }
+
+
+_TRAIN_PRESETS: dict[str, Mapping[str, Any]] = {
+    **{name: _davis_preset(chosen) for name, chosen in DAVIS_SETS.items() if name != "set_b_observer"},
+    "scenario_3_3_4": {
+        **_davis_preset(DAVIS_SETS["set_b"]),
+        "grade_amplitude": 0.05,
+        "grade_rate": 0.1,
+        "train_speed": 45.0,
+    },
+}
+"""Presets of the trains: Davis sets A to F, and set B on the grade ``0.05 sin(0.1 t)`` of section 3.3.4 at 45 m/s."""
+
+
+class LongitudinalTrainEuler(_LongitudinalForces):
     """Train as one point in discrete time: ``x(k+1) = (I + A(x(k)) Dt) x(k) - Dt B_B u_B + Dt B_T u_T + Dt G(x(k))``.
 
     The update occurs at ``start + k * update_period``, k = 1, 2, ..., with the inputs held since; between updates the
@@ -49,7 +229,7 @@ class LongitudinalTrainEuler(LongitudinalForces):
     )
     own_parameters = (parameter("update_period", "s", 0.05, "Time between two updates Dt", min=1e-6),)
     events = (PeriodicEvent("update", "update_period", description="The state is updated"),)
-    presets = TRAIN_PRESETS
+    presets = _TRAIN_PRESETS
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Position and speed one period later."""
@@ -70,7 +250,7 @@ class LongitudinalTrainEuler(LongitudinalForces):
         return self._outputs(position, speed, self._forces(t, position, speed, u, p), self._track.degraded(passed), p)
 
 
-class LongitudinalTrain(LongitudinalForces):
+class LongitudinalTrain(_LongitudinalForces):
     """Train as one point: ``m dv = b_T u_T - b_B u_B - w(v) - m g i(p)``, ``dp = v``, ``w = a + b v + c v |v|``.
 
     `effort` is ``u_T`` where it is positive and ``-u_B`` where it is negative. The wheel rolls: `wheel_speed` is the
@@ -116,7 +296,7 @@ class LongitudinalTrain(LongitudinalForces):
         state("train_speed", "m/s", 0.0, "Speed of the train at start"),
     )
     frictions = ("train_speed",)
-    presets = TRAIN_PRESETS
+    presets = _TRAIN_PRESETS
 
     def __init__(
         self,
@@ -153,3 +333,35 @@ class LongitudinalTrain(LongitudinalForces):
 
     def switching(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         return vector(*self._track.beyond_edges(t, x.train_position, p))
+
+
+def _vehicle(railway: str) -> tuple[Signal, ...]:
+    return (
+        parameter("mass", "kg", 1.0, "Mass of the train; 1 where forces are per unit mass", min=1e-3),
+        parameter("traction_coefficient", "1", 0.1, "Force of one newton of traction demanded, b_T", min=0.0),
+        parameter("brake_coefficient", "1", 0.1, "Force of one newton of brake demanded, b_B", min=0.0),
+        parameter("davis_a", "N", 0.01, "Running resistance, constant part; dry friction", min=0.0),
+        parameter("davis_b", "N.s/m", 0.1, "Running resistance, viscous part"),
+        parameter("davis_c", "N.s2/m2", 0.001, "Running resistance, aerodynamic part; may be negative in a fit"),
+        parameter(
+            "fitted_from", "m/s", 0.0, "Lowest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
+        ),
+        parameter(
+            "fitted_to", "m/s", 50.0, "Highest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
+        ),
+        parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0),
+        parameter("grade_amplitude", "m/s2", 0.0, "Amplitude of a grade term that swings in time, sine, uphill > 0"),
+        parameter("grade_rate", "rad/s", 0.1, "Angular frequency of that term", min=0.0),
+        parameter(
+            "adhesion_at_rest",
+            "1",
+            STANDING_ADHESION[railway],
+            "Adhesion coefficient on dry rails at standstill",
+            min=0.0,
+        ),
+        parameter(
+            "adhesion_level", "1", 1.0, "Share of the dry adhesion: 1 dry, 0.5 LoA, 0.3 BaA, 0.1 EBA", min=0.0, max=1.0
+        ),
+        parameter("degraded_level", "1", 0.3, "Further share within a zone of degraded adhesion", min=0.0, max=1.0),
+        parameter("adhesive_share", "1", 1.0, "Share of the mass on motored and braked axles", min=0.0, max=1.0),
+    )

@@ -12,13 +12,15 @@ import numpy as np
 from fmu_observer.certificates.finding import Finding, condition_found
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, network_bounds
-from fmu_observer.formulas.delay.delay_memory import at_age, integral_weights
-from fmu_observer.formulas.delay.finite_time_predictor import Prediction, moved_on
+from fmu_observer.formulas.delay.finite_time_predictor import Prediction, at_age, integral_weights, moved_on
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as
 from fmu_observer.observers.generic.delayed.delayed_limits import delay_findings, packet_findings
-from fmu_observer.observers.generic.delayed.delayed_state_memory import declared_memory
-from fmu_observer.observers.generic.delayed.measurement_nodes import nodes_of_measurements, turns_of_nodes
+from fmu_observer.observers.generic.delayed.delayed_state_memory import (
+    declared_memory,
+    nodes_of_measurements,
+    turns_of_nodes,
+)
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.generic.sampled.sampled_observer import per_measurement
 from fmu_observer.observers.parameter_values import Value, parameter_values

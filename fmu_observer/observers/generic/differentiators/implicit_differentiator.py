@@ -12,7 +12,7 @@ from fmu_observer.formulas.differentiation.differentiator import power
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
-from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
+from fmu_observer.observers.generic.discrete.arrivals import at_sample, initialised_memory
 from plant_models.hybrid import Array, PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
 from plant_models.hybrid.option import require_whole

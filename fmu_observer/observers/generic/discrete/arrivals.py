@@ -1,16 +1,22 @@
-"""How the measurements of a filter arrive: at its own period, or by events from outside. A value."""
+"""How the measurements of a filter arrive, at its own period or by events from outside, and the step to a sample."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from fmu_observer.models.filter_models import FilterModel
 from fmu_observer.models.observer_model import stacked_of
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from fmu_observer.observers.model_signals import arrival_event, measured_inputs, sampling_event
-from plant_models.hybrid import Array, Event, Signal
+from plant_models.hybrid import Array, Event, Signal, memory
+
+Update = Callable[[Any], dict[str, Array]]  # named tuple of the memory -> what of it changes, by name
+INITIALISED = memory("primed", "1", 0.0, "1 after the first sample")
+
 
 PERIODIC = "periodic"
 SAMPLING = "sampling"
@@ -88,3 +94,24 @@ class Arrivals:
         """
         prefix = "measured" if event == SAMPLING else event
         return stacked_of(u, [self.signals[i] for i in self.rows(event)], f"{prefix}_")
+
+
+def initialised_memory(*signals: Signal) -> tuple[Signal, ...]:
+    """Memory of an observer, with the mark of the first sample behind it.
+
+    Args:
+        signals: memory of the observer itself.
+    """
+    return (*signals, INITIALISED)
+
+
+def at_sample(x: Any, advance: Update, correct: Update) -> dict[str, Array]:
+    """What a sample changes: the memory is advanced over the period since the last one (not at the first), then
+    corrected.
+
+    Args:
+        x: named tuple of the memory, `INITIALISED` among it.
+        advance: over one period. correct: by the measurement at hand.
+    """
+    moved = {name: np.where(x.primed > 0.5, value, getattr(x, name)) for name, value in advance(x).items()}
+    return moved | correct(x._replace(**moved)) | {INITIALISED.name: 1.0}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.formulas.filtering.ensemble import correct_members, mean_of, variances_of
+from fmu_observer.formulas.filtering.particles import correct_members, mean_of, variances_of
 from fmu_observer.observers.generic.discrete.member_filter import CorrectedMembers, MemberFilter, Sample
 from plant_models.hybrid import Array, parameter
 

@@ -14,7 +14,7 @@ from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observability import require_detectable_model
-from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
+from fmu_observer.observers.generic.discrete.filter_signals import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
 from plant_models.hybrid import Array
 from plant_models.hybrid.missing import is_there, or_else

@@ -15,7 +15,7 @@ from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.models.suitability import require_linear
 from fmu_observer.observability import MeasuredSystem, UnobservableError, require_observable
-from fmu_observer.observers.generic.discrete.sample_step import at_sample, initialised_memory
+from fmu_observer.observers.generic.discrete.arrivals import at_sample, initialised_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from plant_models.hybrid import Array, Signal, memory
 from plant_models.hybrid.missing import or_else

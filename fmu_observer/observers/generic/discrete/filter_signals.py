@@ -1,8 +1,9 @@
-"""What a filter that carries a covariance remembers and reports, as signals. It knows no filter."""
+"""What a filter that carries a covariance believes, remembers and reports, as values and signals; no filter is known."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +16,22 @@ from fmu_observer.observers.model_signals import (
     estimate_outputs,
     estimate_states,
 )
-from plant_models.hybrid import OutputWarning, Signal, discrete_output
+from plant_models.hybrid import Array, OutputWarning, Signal, discrete_output
 from plant_models.hybrid import memory as memory_signal
+
+
+class Belief(NamedTuple):
+    """What a filter believes.
+
+    Attributes:
+        estimate: shape (n,). spread: its covariance, or the lower factor of it, shape (n, n). drawn: what a prediction
+            hands on to the correction after it, or None.
+    """
+
+    estimate: Array
+    spread: Array
+    drawn: Any = None
+
 
 NOT_POSITIVE = discrete_output(
     "covariance_not_positive",
@@ -85,3 +100,22 @@ class SignalsOf:
         if self.covariances:
             found.append(discrete_output("covariance", "1", f"Covariance of the estimate, {_ROWS}", size=n * n))
         return tuple(found)
+
+
+def chosen(begun: Array, one: Belief, other: Belief) -> Belief:
+    """The one belief where a filter has begun, else the other.
+
+    Args:
+        begun: whether it has. one, other: of the same shapes.
+    """
+
+    def fields(a: Any, b: Any) -> Any:
+        if a is None:
+            return None
+        return (
+            type(a)(*(fields(*pair) for pair in zip(a, b, strict=True)))
+            if isinstance(a, tuple)
+            else np.where(begun, a, b)
+        )
+
+    return Belief(*(fields(*pair) for pair in zip(one, other, strict=True)))

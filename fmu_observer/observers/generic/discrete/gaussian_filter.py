@@ -14,19 +14,16 @@ import numpy as np
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.kalman import Corrected, log_likelihood, normalised_square
-from fmu_observer.models.filter_models import Known
-from fmu_observer.models.noise_over_period import noise_over
+from fmu_observer.models.filter_models import Known, noise_over
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
 from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
-from fmu_observer.observers.generic.discrete.arrivals import PERIODIC, Arrivals
+from fmu_observer.observers.generic.discrete.arrivals import INITIALISED, PERIODIC, Arrivals
 from fmu_observer.observers.generic.discrete.covariance_requirements import is_positive, positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
-from fmu_observer.observers.generic.discrete.filter_signals import NOT_POSITIVE, SignalsOf
-from fmu_observer.observers.generic.discrete.gaussian_belief import Belief, chosen
-from fmu_observer.observers.generic.discrete.sample_step import INITIALISED
+from fmu_observer.observers.generic.discrete.filter_signals import NOT_POSITIVE, Belief, SignalsOf, chosen
 from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import matrix_parameter

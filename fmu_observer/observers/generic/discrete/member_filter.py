@@ -10,16 +10,15 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from fmu_observer.certificates.finding import Finding
-from fmu_observer.formulas.filtering.ensemble import drawn
 from fmu_observer.formulas.filtering.kalman import decoupled
-from fmu_observer.models.filter_models import Known
-from fmu_observer.models.noise_over_period import noise_over
+from fmu_observer.formulas.filtering.particles import drawn
+from fmu_observer.models.filter_models import Known, noise_over
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
 from fmu_observer.observers.evaluated_observer import EvaluatedObserver
+from fmu_observer.observers.generic.discrete.arrivals import INITIALISED
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.generic.discrete.filter_condition import steady_condition, within_steps
-from fmu_observer.observers.generic.discrete.sample_step import INITIALISED
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.model_signals import (
     LAST_NIS,

@@ -28,7 +28,7 @@ from fmu_observer.models.observer_model import named_as, stacked, stacked_of
 from fmu_observer.models.traced_system_model import Source
 from fmu_observer.observers.gated_observer import GATED_EVENT
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
-from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
+from fmu_observer.observers.generic.discrete.filter_signals import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix

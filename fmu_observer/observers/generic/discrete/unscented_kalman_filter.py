@@ -13,7 +13,7 @@ from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.filtering.unscented import Scattered, Weights
 from fmu_observer.models.filter_models import Known
 from fmu_observer.models.traced_system_model import Source
-from fmu_observer.observers.generic.discrete.gaussian_belief import Belief
+from fmu_observer.observers.generic.discrete.filter_signals import Belief
 from fmu_observer.observers.generic.discrete.gaussian_filter import Form, GaussianFilter
 from plant_models.hybrid import Array, parameter
 from plant_models.hybrid.missing import is_there, or_else

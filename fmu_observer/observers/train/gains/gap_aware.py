@@ -20,7 +20,7 @@ from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import RATIOS, SHARES, Gains, balise_family, certified_gains, rounded_down
 from fmu_observer.observers.train.adaptive_gain_cdo import AdaptiveGainCdo
-from fmu_observer.observers.train.differentiator_cdo import DifferentiatorCdo
+from fmu_observer.observers.train.multirate_cdo import DifferentiatorCdo
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo
 
 _POINTS = 16  # of time in a gap at which the error is judged
