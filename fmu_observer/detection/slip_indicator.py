@@ -14,6 +14,7 @@ from plant_models.hybrid import (
     Array,
     HybridSystem,
     PeriodicEvent,
+    Signal,
     discrete_output,
     input_signal,
     memory,
@@ -27,11 +28,11 @@ NOMINAL, DEGRADED = 1.0, 2.0
 FILTERED_SLIP = state("filtered_slip", "1", description="Slip ratio (3.49) behind the first-order filter")
 
 
-SLIP_OUTPUTS = (
+SLIP_OUTPUTS: tuple[Signal, ...] = (
     output_signal("slip", "1", "Slip ratio relative to the odometer, (3.49), guarded by slip_floor"),
     output_signal("slip_indicator", "1", "1 nominal, 2 degraded adhesion"),
 )
-SLIP_PARAMETERS = (
+SLIP_PARAMETERS: tuple[Signal, ...] = (
     parameter("slip_floor", "m/s", 0.5, "Smallest denominator of the slip ratio", min=1e-6),
     parameter("slip_filter_time", "s", 0.2, "Time constant of the slip filter", min=0.01),
     parameter("slip_threshold", "1", 0.02, "Filtered slip above which adhesion counts as degraded", min=0.0),
@@ -74,7 +75,7 @@ class SlipIndicator(HybridSystem):
     name = "slip_indicator"
     description = "Slip ratio and indicator of degraded adhesion from odometer and train speed"
     source = "Bouchama 2024, (3.49), (4.14)"
-    states = (FILTERED_SLIP,)
+    states: tuple[Signal, ...] = (FILTERED_SLIP,)
     inputs = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed r w"),
         input_signal("speed", "m/s", 0.0, "Train speed, estimated or measured"),

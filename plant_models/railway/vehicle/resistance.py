@@ -1,5 +1,5 @@
-"""Running resistance and gravity, the forces on a train that do not come from its wheels' torque, and Davis coefficients
-that were published per unit mass, each with the speeds in which it holds.
+"""Running resistance and gravity, the forces on a train that do not come from its wheels' torque, and Davis
+coefficients that were published per unit mass, each with the speeds in which it holds.
 
 Plain NumPy on numbers, batches and traced symbols. The constant part of the Davis formula is not here as a force: it is
 dry friction, which the plants declare and the integrator resolves, so that it can stop a train but never push one.

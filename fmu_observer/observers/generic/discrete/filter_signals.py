@@ -1,4 +1,4 @@
-"""What a filter that carries a covariance believes, remembers and reports, as values and signals; no filter is known."""
+"""What a filter that carries a covariance believes, remembers and reports, as values and signals."""
 
 from __future__ import annotations
 
