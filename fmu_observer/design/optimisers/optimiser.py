@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
+@dataclass(eq=False, repr=False)
 class Optimiser(ABC):
     """Minimises a cost over a box, one population after the other.
 
@@ -32,8 +34,12 @@ class Optimiser(ABC):
     description: ClassVar[str]
     source: ClassVar[str]
 
-    def __init__(self, lower: ArrayLike, upper: ArrayLike, *, seed: int = 0) -> None:
-        self.lower, self.upper = np.atleast_1d(np.asarray(lower, float)), np.atleast_1d(np.asarray(upper, float))
+    lower: Array
+    upper: Array
+    seed: int = field(default=0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        self.lower, self.upper = (np.atleast_1d(np.asarray(end, float)) for end in (self.lower, self.upper))
         if self.lower.ndim != 1 or self.lower.shape != self.upper.shape or not self.lower.size:
             raise ValueError(
                 f"{self.name}: expected a lower and an upper bound for each parameter, got shapes {self.lower.shape} "
@@ -44,8 +50,7 @@ class Optimiser(ABC):
                 f"{self.name}: bounds must be finite, the lower below the upper one (got {self.lower.tolist()} and "
                 f"{self.upper.tolist()}); an optimiser does not search without bounds."
             )
-        self.seed = seed
-        self.random = np.random.default_rng(seed)
+        self.random = np.random.default_rng(self.seed)
         self.best: Array | None = None
         self.best_cost = np.inf
         self.evaluations = 0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class Biogeography(Optimiser):
     """Biogeography-based optimisation, blended: habitats move towards those from which they take.
 
@@ -18,7 +20,6 @@ class Biogeography(Optimiser):
     of the habitats is kept.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator.
         population: number of habitats. absorption: alpha. mutation: probability that a parameter mutates.
         mutation_size: standard deviation of a mutation, as a share of the range. kept: share of the habitats kept.
 
@@ -30,24 +31,19 @@ class Biogeography(Optimiser):
     description = "Biogeography-based optimisation, blended migration"
     source = "Allaoui 2024, (3.6)-(3.7), section III.3.2"
 
-    def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        *,
-        seed: int = 0,
-        population: int = 20,
-        absorption: float = 0.9,
-        mutation: float = 0.1,
-        mutation_size: float = 0.02,
-        kept: float = 0.2,
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
-        if population < 3:
-            raise ValueError(f"{self.name}: a habitat takes from others, so there are at least 3 (got {population}).")
-        self.population, self.absorption, self.mutation = population, absorption, mutation
-        self._spread = mutation_size * (self.upper - self.lower)
-        self._kept = round(kept * population)
+    population: int = 20
+    absorption: float = 0.9
+    mutation: float = 0.1
+    mutation_size: float = 0.02
+    kept: float = 0.2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count = self.population
+        if count < 3:
+            raise ValueError(f"{self.name}: a habitat takes from others, so there are at least 3 (got {count}).")
+        self._spread = self.mutation_size * (self.upper - self.lower)
+        self._kept = round(self.kept * count)
         self._habitats: Array | None = None
         self._costs = np.empty(0)
 

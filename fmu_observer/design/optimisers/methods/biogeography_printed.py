@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class BiogeographyPrinted(Optimiser):
     """Biogeography-based optimisation, Algorithms 3.1 and 3.2.
 
@@ -21,7 +23,6 @@ class BiogeographyPrinted(Optimiser):
     more than 1 in 200, and the search stands still; so P_i acts through m_i alone, as in Simon 2008.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator.
         population: number of habitats. mutation: m_max.
     """
 
@@ -29,15 +30,16 @@ class BiogeographyPrinted(Optimiser):
     description = "Biogeography-based optimisation, algorithms as printed"
     source = "Allaoui 2024, Algorithms 3.1-3.2"
 
-    def __init__(
-        self, lower: ArrayLike, upper: ArrayLike, *, seed: int = 0, population: int = 20, mutation: float = 0.1
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
-        self.population = population
+    population: int = 20
+    mutation: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        population = self.population
         species = np.arange(population, 0, -1)  # the best habitat has the most
         self._emigration = species / population
         chances = scipy.stats.binom.pmf(species, population, 0.5)
-        self._rates = mutation * (1.0 - chances / chances.max())
+        self._rates = self.mutation * (1.0 - chances / chances.max())
         self._habitats: Array | None = None
         self._costs = np.empty(0)
 

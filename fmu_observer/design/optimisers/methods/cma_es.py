@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,13 @@ from numpy.typing import ArrayLike
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class CovarianceMatrixAdaptation(Optimiser):
     """Covariance matrix adaptation evolution strategy, the modern comparison; by the package `cma` of its author.
 
     The search runs in the unit cube, within the bounds by the transformation of that package.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator.
         population: candidates an iteration; None for ``4 + 3 ln d``.
         start: first mean, shape (d,); None for the middle of the box.
         step: first standard deviation, as a share of the range.
@@ -29,24 +30,19 @@ class CovarianceMatrixAdaptation(Optimiser):
     description = "Covariance matrix adaptation evolution strategy"
     source = "Hansen 2016, The CMA Evolution Strategy: A Tutorial; package cma"
 
-    def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        *,
-        seed: int = 0,
-        population: int | None = None,
-        start: ArrayLike | None = None,
-        step: float = 0.3,
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
+    population: int | None = None
+    start: ArrayLike | None = None
+    step: float = 0.3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         try:
             import cma  # noqa: PLC0415 - an optional extra
         except ImportError as error:
             raise ImportError(
                 "The optimiser cma_es needs the package cma: pip install 'fmu-observer[tuning]'."
             ) from error
-        first = 0.5 * (self.lower + self.upper) if start is None else np.asarray(start, float)
+        first = 0.5 * (self.lower + self.upper) if self.start is None else np.asarray(self.start, float)
         settings: dict[str, Any] = {
             "bounds": [0.0, 1.0],
             "randn": lambda *shape: self.random.standard_normal(shape),
@@ -56,10 +52,10 @@ class CovarianceMatrixAdaptation(Optimiser):
         }
         if self.dimension == 1:
             settings["maxstd"] = np.inf  # the package fails where it limits the only deviation there is
-        if population is not None:
-            settings["popsize"] = population
+        if self.population is not None:
+            settings["popsize"] = self.population
         unit = np.clip((first - self.lower) / (self.upper - self.lower), 0.0, 1.0)
-        self._strategy = cma.CMAEvolutionStrategy(unit, step, settings)
+        self._strategy = cma.CMAEvolutionStrategy(unit, self.step, settings)
         self._units: list[Array] = []
 
     def propose(self) -> Array:

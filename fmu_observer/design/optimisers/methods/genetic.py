@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class Genetic(Optimiser):
     """Genetic algorithm, section III.2.1, with the numbers of III.3.2: population 100, crossover 0.8, mutation 0.01.
 
@@ -17,7 +19,6 @@ class Genetic(Optimiser):
     the search starts, and no bound.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator.
         population: number of individuals. crossover: probability that two parents are crossed. mutation: probability
             that a gene is drawn anew. elite: how many of the best survive.
         start: range of the first population, (low, high) of all parameters, as far as it lies within the bounds; None
@@ -28,30 +29,23 @@ class Genetic(Optimiser):
     description = "Genetic algorithm, real strings"
     source = "Allaoui 2024, (3.1)-(3.3), section III.3.2"
 
-    def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        *,
-        seed: int = 0,
-        population: int = 100,
-        crossover: float = 0.8,
-        mutation: float = 0.01,
-        elite: int = 2,
-        start: tuple[float, float] | None = None,
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
-        self.population, self.crossover, self.mutation, self.elite = population, crossover, mutation, elite
-        self._start = start
+    population: int = 100
+    crossover: float = 0.8
+    mutation: float = 0.01
+    elite: int = 2
+    start: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._members: Array | None = None
         self._costs = np.empty(0)
 
     def propose(self) -> Array:
         """Children, shape (population - elite, d); the elite is not evaluated again. First the whole population."""
         if self._members is None:
-            if self._start is None:
+            if self.start is None:
                 return self.uniform(self.population)
-            low, high = (np.clip(end, self.lower, self.upper) for end in self._start)
+            low, high = (np.clip(end, self.lower, self.upper) for end in self.start)
             return self.random.uniform(low, high, (self.population, self.dimension))
         count, d = self.population - self.elite, self.dimension
         chances = 1.0 / np.sqrt(np.arange(1, self.population + 1))

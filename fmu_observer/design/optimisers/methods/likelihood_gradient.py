@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
@@ -19,6 +21,7 @@ class _WantedError(Exception):
         self.point = point
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class LikelihoodGradient(Optimiser):
     """L-BFGS-B from several starts side by side, with exact gradients where they are told.
 
@@ -30,7 +33,6 @@ class LikelihoodGradient(Optimiser):
     one more: the same numbers in a few milliseconds, without a thread.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator.
         starts: number of descents, from random points. start: where the first begins, shape (d,); None for a random
             point. gradients: whether they will be told.
     """
@@ -39,21 +41,15 @@ class LikelihoodGradient(Optimiser):
     description = "Gradient descent (L-BFGS-B), several starts"
     source = "Byrd, Lu, Nocedal, Zhu 1995; SciPy"
 
-    def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        *,
-        seed: int = 0,
-        starts: int = 1,
-        start: ArrayLike | None = None,
-        gradients: bool = False,
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
-        self._starts = (self.uniform(starts) - self.lower) / (self.upper - self.lower)
-        if start is not None:
-            self._starts[0] = (np.asarray(start, float) - self.lower) / (self.upper - self.lower)
-        self._gradients = gradients
+    starts: int = 1
+    start: ArrayLike | None = None
+    gradients: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._starts = (self.uniform(self.starts) - self.lower) / (self.upper - self.lower)
+        if self.start is not None:
+            self._starts[0] = (np.asarray(self.start, float) - self.lower) / (self.upper - self.lower)
         self._known: dict[bytes, tuple[float, Array]] = {}
         self._wanted: list[Array] = []
 
@@ -64,7 +60,7 @@ class LikelihoodGradient(Optimiser):
         if not self._wanted:
             return np.empty((0, self.dimension))
         units = np.stack(self._wanted)
-        if not self._gradients:
+        if not self.gradients:
             moves = _DIFFERENCE * np.eye(self.dimension)
             around = np.concatenate([np.zeros((1, self.dimension)), moves, -moves])
             units = np.clip(units[:, np.newaxis] + around, 0.0, 1.0).reshape(-1, self.dimension)
@@ -74,7 +70,7 @@ class LikelihoodGradient(Optimiser):
         """Take the costs in, see `Optimiser.learn`."""
         count, width = 2 * self.dimension + 1, self.upper - self.lower
         for place, point in enumerate(self._wanted):
-            if self._gradients:
+            if self.gradients:
                 if gradients is None:
                     raise ValueError(f"{self.name}: made with gradients=True, told none.")
                 self._known[point.tobytes()] = float(costs[place]), gradients[place] * width

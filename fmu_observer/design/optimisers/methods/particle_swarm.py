@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from numpy.typing import ArrayLike
+from dataclasses import dataclass
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
 _START_SPEED = 0.2  # of the range of each parameter, at most [ours]
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class ParticleSwarm(Optimiser):
     """Particle swarm, equations (3.4) and (3.5).
 
@@ -17,7 +18,6 @@ class ParticleSwarm(Optimiser):
     the bounds. The thesis recommends c1 in [1.5, 2], c2 in [2, 2.5], w in [0.4, 1.4] and uses the defaults here.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator.
         population: number of particles. inertia: w. own: c1, pull to the particle's own best. common: c2, pull to the
             best of all.
     """
@@ -26,20 +26,14 @@ class ParticleSwarm(Optimiser):
     description = "Particle swarm, global best"
     source = "Allaoui 2024, (3.4)-(3.5), section III.3.2"
 
-    def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        *,
-        seed: int = 0,
-        population: int = 20,
-        inertia: float = 0.8,
-        own: float = 1.0,
-        common: float = 1.5,
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
-        self.inertia, self.own, self.common = inertia, own, common
-        self._positions = self.uniform(population)
+    population: int = 20
+    inertia: float = 0.8
+    own: float = 1.0
+    common: float = 1.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._positions = self.uniform(self.population)
         reach = _START_SPEED * (self.upper - self.lower)
         self._velocities = self.random.uniform(-reach, reach, self._positions.shape)
         self._own_best = self._positions

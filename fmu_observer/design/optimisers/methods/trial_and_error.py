@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class TrialAndError(Optimiser):
     """What a hand does: each parameter up and down by a step, the best is kept; where none is better, half the step.
 
     The thesis prints the values found by hand and not how; this is [ours], and known as compass search.
 
     Args:
-        lower, upper: bounds, shape (d,). seed: of the generator; it is not used, since nothing is drawn.
         start: where to begin, shape (d,); None for the middle of the box.
         step: first step, as a share of the range of each parameter.
     """
@@ -23,19 +25,14 @@ class TrialAndError(Optimiser):
     description = "Trial and error, one parameter at a time"
     source = "Allaoui 2024, section III.3.1 (values only); compass search"
 
-    def __init__(
-        self,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        *,
-        seed: int = 0,
-        start: ArrayLike | None = None,
-        step: float = 0.25,
-    ) -> None:
-        super().__init__(lower, upper, seed=seed)
+    start: ArrayLike | None = None
+    step: float = 0.25
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         middle = 0.5 * (self.lower + self.upper)
-        self._centre = middle if start is None else np.asarray(start, float)
-        self._steps = step * (self.upper - self.lower)
+        self._centre = middle if self.start is None else np.asarray(self.start, float)
+        self._steps = self.step * (self.upper - self.lower)
         self._cost: float | None = None
 
     def propose(self) -> Array:
