@@ -206,19 +206,9 @@ def state(
     return Signal(name, unit, "local", "continuous", first, **kept)
 
 
-def memory(
-    name: str,
-    unit: str,
-    start: Start | np.ndarray = 0.0,
-    description: str = "",
-    *,
-    size: int | None = None,
-    shape: tuple[int, int] | None = None,
-    symmetric: bool = False,
-) -> Signal:
+def memory(name: str, unit: str, start: Start | np.ndarray = 0.0, description: str = "", **further: Any) -> Signal:
     """See `state`: a discrete one, constant between events, which changes only in jumps."""
-    flowing = state(name, unit, start, description, size=size, shape=shape, symmetric=symmetric)
-    return replace(flowing, variability="discrete")
+    return replace(state(name, unit, start, description, **further), variability="discrete")
 
 
 def input_signal(
