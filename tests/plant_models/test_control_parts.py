@@ -23,8 +23,8 @@ from plant_models.railway.control.mdpe_controller import (
     _next_available_effort,
     _stepped_towards,
 )
-from plant_models.railway.control.mode_switch import Situation, next_level, next_mode
-from plant_models.railway.control.sampled_regulator import pole_placement, tracking_integral, wanted_force
+from plant_models.railway.control.mode_switch import Situation, next_level
+from plant_models.railway.control.sampled_regulator import pole_placement
 
 FORCES = st.floats(-500e3, 500e3)
 P = MdpeController().unpack_parameters(MdpeController().start_parameters())
@@ -47,9 +47,7 @@ def test_an_inactive_regulator_would_ask_for_the_force_that_is_applied(
     force: float, feedforward: float, error: float, bandwidth: float
 ) -> None:
     gains = pole_placement(bandwidth, 166e3, 0.1)
-    assert wanted_force(
-        gains, tracking_integral(gains, force, feedforward, error), feedforward, error
-    ) == pytest.approx(force, abs=1e-3)
+    assert gains.force(gains.holding(force, feedforward, error), feedforward, error) == pytest.approx(force, abs=1e-3)
 
 
 def test_traction_is_limited_by_effort_and_power() -> None:
@@ -178,7 +176,7 @@ def situation(**changes: float) -> Situation:
     ],
 )
 def test_the_switch_chooses_the_mode(now: dict[str, float], mode: float) -> None:
-    assert next_mode(situation(**now), P) == mode
+    assert situation(**now).next_mode(P) == mode
 
 
 @given(
@@ -202,9 +200,9 @@ def test_the_switch_settles_at_once_and_never_asks_for_air_that_is_not_there(
         coupler_force=coupler,
         speed=speed,
     )
-    chosen = next_mode(s, P)
-    assert next_mode(s._replace(mode=chosen), P) == chosen  # the same situation gives the same mode: no chatter
-    assert float(next_mode(s, NO_AIR)) in {1.0, 2.0}
+    chosen = s.next_mode(P)
+    assert s._replace(mode=chosen).next_mode(P) == chosen  # the same situation gives the same mode: no chatter
+    assert float(s.next_mode(NO_AIR)) in {1.0, 2.0}
 
 
 def test_degraded_adhesion_counts_at_once_and_nominal_after_the_recovery_time() -> None:

@@ -37,14 +37,10 @@ from plant_models.railway.control.mode_switch import (
     TRACTION,
     Situation,
     next_level,
-    next_mode,
 )
 from plant_models.railway.control.sampled_regulator import (
     RegulatorGains,
-    next_integral,
     pole_placement,
-    tracking_integral,
-    wanted_force,
 )
 
 
@@ -211,8 +207,8 @@ class MdpeController(HybridSystem):
         sliding = _sliding(u, p)
         level, quiet = next_level(x.held_level, x.quiet_time, u.adhesion_condition, p.control_period, p.recovery_time)
         available = _available(x, u, p, level, sliding)
-        wanted = wanted_force(_gains(x.held_mode, x.held_level, p), x.integral, feedforward, error)
-        mode = next_mode(_situation(x, u, level, wanted, error, standing), p)
+        wanted = _gains(x.held_mode, x.held_level, p).force(x.integral, feedforward, error)
+        mode = _situation(x, u, level, wanted, error, standing).next_mode(p)
         limits = _limits(x, u, p, available)
         regulated = _regulate(x, mode, level, error, feedforward, limits, p)
         target = either(standing, 0.0, regulated.target)
@@ -310,11 +306,11 @@ def _regulate(
     gains = _gains(mode, level, p)
     changed = some(holds(mode != x.held_mode), holds(level != x.held_level))
     # The new regulator starts from the force of the last instant; a step of the feedforward since then is kept.
-    integral = either(changed, tracking_integral(gains, x.target_force, x.last_feedforward, x.last_error), x.integral)
-    wanted = wanted_force(gains, integral, feedforward, error)
+    integral = either(changed, gains.holding(x.target_force, x.last_feedforward, x.last_error), x.integral)
+    wanted = gains.force(integral, feedforward, error)
     lowest, highest = _range(x, mode, limits, p)
     target = np.minimum(np.maximum(wanted, lowest), highest)
-    return _Regulated(target, next_integral(gains, integral, error, target - wanted))
+    return _Regulated(target, gains.next_integral(integral, error, target - wanted))
 
 
 def _range(x: Any, mode: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:

@@ -34,6 +34,26 @@ class Situation(NamedTuple):
     coupler_force: Array
     standing: Array
 
+    def next_mode(self, p: Any) -> Array:
+        """Mode for the coming period.
+
+        1. Between traction and brake the sign of the wanted force decides, but only when the reference accelerates that
+           way, or the error has left `error_band`; in between the train coasts.
+        2. A brake is electric until the reference decelerates by `service_deceleration`, the speed falls to where the
+           electric brake fades, the coupler is pressed beyond its soft limit, or the adhesion is degraded: then air is
+           used, on all wheels of the train, until the brake ends (an air brake is not released and applied again for
+           small changes).
+        3. Air and electric brake are combined where the train runs faster than the reference by `combined_error`, or
+           more is wanted than the air brake has; that ends at half the error and 80 % of the force.
+        """
+        braking = _brakes(self, p)
+        both = _asks_for_both(self, p)
+        air = every(
+            braking, holds(p.full_brake_force > 0.0), some(holds(self.mode > 2.5), both, _asks_for_air(self, p))
+        )
+        combined = every(air, both, 1.0 - self.standing)
+        return either(combined, COMBINED, either(air, INDIRECT, either(braking, ELECTRIC, TRACTION)))
+
 
 def next_level(
     level: Array, quiet_time: Array, condition: Array, period: Array, recovery_time: Array
@@ -49,28 +69,6 @@ def next_level(
     quiet = either(degraded, 0.0, np.minimum(quiet_time + period, recovery_time))
     recovered = holds(quiet >= recovery_time - 0.5 * period)
     return either(degraded, DEGRADED, either(recovered, NOMINAL, level)), quiet
-
-
-def next_mode(s: Situation, p: Any) -> Array:
-    """Mode for the coming period.
-
-    1. Between traction and brake the sign of the wanted force decides, but only when the reference accelerates that
-       way, or the error has left `error_band`; in between the train coasts.
-    2. A brake is electric until the reference decelerates by `service_deceleration`, the speed falls to where the
-       electric brake fades, the coupler is pressed beyond its soft limit, or the adhesion is degraded: then air is
-       used, on all wheels of the train, until the brake ends (an air brake is not released and applied again for small
-       changes).
-    3. Air and electric brake are combined where the train runs faster than the reference by `combined_error`, or more
-       is wanted than the air brake has; that ends at half the error and 80 % of the force.
-
-    Args:
-        s: what is known at the start of the period. p: parameters of the controller.
-    """
-    braking = _brakes(s, p)
-    both = _asks_for_both(s, p)
-    air = every(braking, holds(p.full_brake_force > 0.0), some(holds(s.mode > 2.5), both, _asks_for_air(s, p)))
-    combined = every(air, both, 1.0 - s.standing)
-    return either(combined, COMBINED, either(air, INDIRECT, either(braking, ELECTRIC, TRACTION)))
 
 
 def _brakes(s: Situation, p: Any) -> Array:

@@ -20,6 +20,31 @@ class RegulatorGains:
     integral: Array
     tracking: Array
 
+    def holding(self, force: Array, feedforward: Array, error: Array) -> Array:
+        """Integral [N] with which it would have asked for just this force: what an inactive one holds.
+
+        Args:
+            force, feedforward: [N]. error: reference minus speed [m/s].
+        """
+        return force - feedforward - self.proportional * error
+
+    def force(self, integral: Array, feedforward: Array, error: Array) -> Array:
+        """Force asked for [N], before limits.
+
+        Args:
+            integral, feedforward: [N]. error: reference minus speed [m/s].
+        """
+        return feedforward + self.proportional * error + integral
+
+    def next_integral(self, integral: Array, error: Array, cut_off: Array) -> Array:
+        """Integral [N] for the next period.
+
+        Args:
+            integral: that of this period [N]. error: reference minus speed [m/s]. cut_off: limited minus wanted force
+                [N], 0 between the limits.
+        """
+        return integral + self.integral * error + self.tracking * cut_off
+
 
 def pole_placement(bandwidth: Array, mass: Array, period: Array) -> RegulatorGains:
     """Gains that put both poles of the mass under the sampled regulator at ``rho = exp(-bandwidth * period)``.
@@ -35,30 +60,3 @@ def pole_placement(bandwidth: Array, mass: Array, period: Array) -> RegulatorGai
     """
     reach = -np.expm1(-bandwidth * period)
     return RegulatorGains(2.0 * reach * mass / period, reach * reach * mass / period, reach)
-
-
-def tracking_integral(gains: RegulatorGains, force: Array, feedforward: Array, error: Array) -> Array:
-    """Integral [N] with which a regulator would have asked for just this force: what an inactive one holds.
-
-    Args:
-        gains: of the regulator. feedforward: force [N]. error: reference minus speed [m/s].
-    """
-    return force - feedforward - gains.proportional * error
-
-
-def wanted_force(gains: RegulatorGains, integral: Array, feedforward: Array, error: Array) -> Array:
-    """Force asked for [N], before limits. error: reference minus speed [m/s].
-
-    Args:
-        gains: of the regulator. integral: its integral [N]. feedforward: force [N].
-    """
-    return feedforward + gains.proportional * error + integral
-
-
-def next_integral(gains: RegulatorGains, integral: Array, error: Array, cut_off: Array) -> Array:
-    """Integral [N] for the next period. cut_off: limited minus wanted force [N], 0 between the limits.
-
-    Args:
-        gains: of the regulator. integral: that of this period [N]. error: reference minus speed [m/s].
-    """
-    return integral + gains.integral * error + gains.tracking * cut_off

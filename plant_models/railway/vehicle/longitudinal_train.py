@@ -52,16 +52,6 @@ class _Forces(NamedTuple):
 class _LongitudinalForces(HybridSystem):
     """Base of the trains that are one point: signals, presets and forces of (2.1), (2.2), (2.7) and (2.26)-(2.28).
 
-    Args:
-        zones: zones of degraded adhesion along ``time`` or ``position``.
-        zone_count: number of zones.
-        gradient_shape: gradient ``constant`` between its points, or ``linear``.
-        gradient_count: number of gradient points.
-        railway: row of Table 2.1 that gives the default of `adhesion_at_rest`.
-
-    Raises:
-        ValueError: an unknown option, or a count below one.
-
     Source: Aguiar Cota 2019, section 2.1.1 and (2.26)-(2.28).
     """
 
@@ -111,6 +101,8 @@ class _LongitudinalForces(HybridSystem):
     ) -> None:
         require_chosen(self.name, self.option_choices, railway=railway)
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
+        if self.frictions:  # it flows
+            self.switchings = self._track.edges
         self.parameters = (*_vehicle(railway), *self.own_parameters, *self._unused_zones())
         super().__init__(
             zones=zones,
@@ -205,15 +197,7 @@ class LongitudinalTrainEuler(_LongitudinalForces):
     Brake and constant resistance are dry friction here too: a train that would change its direction within an update
     under them alone stands.
 
-    Args:
-        zones: zones of degraded adhesion along ``position`` or ``time``.
-        zone_count: number of zones.
-        gradient_shape: gradient ``constant`` between its points, or ``linear``.
-        gradient_count: number of gradient points.
-        railway: row of Table 2.1 that gives the default of `adhesion_at_rest`.
-
-    Raises:
-        ValueError: an unknown option, or a count below one.
+    Options are those of `LongitudinalTrain`.
 
     Source: Aguiar Cota 2019, (2.9)-(2.10); dry friction is ours.
     """
@@ -297,24 +281,6 @@ class LongitudinalTrain(_LongitudinalForces):
     )
     frictions = ("train_speed",)
     presets = _TRAIN_PRESETS
-
-    def __init__(
-        self,
-        *,
-        zones: ZoneAxis = "position",
-        zone_count: int = 3,
-        gradient_shape: GradientShape = "constant",
-        gradient_count: int = 4,
-        railway: str = "sncf_multi_motor_bogie",
-    ) -> None:
-        super().__init__(
-            zones=zones,
-            zone_count=zone_count,
-            gradient_shape=gradient_shape,
-            gradient_count=gradient_count,
-            railway=railway,
-        )
-        self.switchings = self._track.edges
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives of position and speed without dry friction."""
