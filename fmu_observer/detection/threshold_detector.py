@@ -134,7 +134,6 @@ class ThresholdDetector(HybridSystem):
     default_preset = "repaired"
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Order and bounds of the thresholds, see `HybridSystem.requirements`."""
         return super().requirements(p) | threshold_requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -398,7 +398,7 @@ def test_a_window_that_does_not_tell_a_state_says_which() -> None:
     assert short.numbers["window_rank"] == 1
     assert "A window of 1 full row shows 1 without the arrival cost; it does not show rate," in short.statement
     assert long.numbers["window_rank"] == 2
-    assert "A window of 2 full rows tells all of them" in long.statement
+    assert "A window of 2 full rows shows all of them" in long.statement
 
 
 def reaction(**options: Any) -> MovingHorizonObserver:

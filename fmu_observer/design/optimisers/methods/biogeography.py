@@ -65,7 +65,6 @@ class Biogeography(Optimiser):
         return moved + np.where(mutates, self._spread * self.random.standard_normal(shape), 0.0)
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         candidates, costs = self.ranked(candidates, costs)
         if self._habitats is not None:
             new = self.population - self._kept

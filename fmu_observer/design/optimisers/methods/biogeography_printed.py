@@ -59,7 +59,6 @@ class BiogeographyPrinted(Optimiser):
         return np.where(mutates, self.uniform(n), moved)
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         candidates, costs = self.ranked(candidates, costs)
         if self._habitats is not None and self._costs[0] < costs[0]:
             candidates = np.concatenate([self._habitats[:1], candidates[:-1]])

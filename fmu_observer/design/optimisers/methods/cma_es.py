@@ -66,7 +66,6 @@ class CovarianceMatrixAdaptation(Optimiser):
         return np.asarray(self.lower + np.array(self._units) * (self.upper - self.lower))
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         if len(costs):
             worst = float(np.max(costs[np.isfinite(costs)], initial=0.0))
             # infinite costs would be warned of: what has none ranks behind all others

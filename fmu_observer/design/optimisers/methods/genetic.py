@@ -58,7 +58,6 @@ class Genetic(Optimiser):
         return np.where(self.random.random((count, d)) < self.mutation, self.uniform(count), children)
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         if self._members is not None:
             candidates = np.concatenate([self._members[: self.elite], candidates])
             costs = np.concatenate([self._costs[: self.elite], costs])

@@ -67,7 +67,6 @@ class LikelihoodGradient(Optimiser):
         return np.asarray(self.lower + units * (self.upper - self.lower))
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         count, width = 2 * self.dimension + 1, self.upper - self.lower
         for place, point in enumerate(self._wanted):
             if self.gradients:

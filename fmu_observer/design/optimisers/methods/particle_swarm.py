@@ -53,7 +53,6 @@ class ParticleSwarm(Optimiser):
         return self._positions + self._velocities
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         self._positions = candidates
         if self._own_costs is None:
             self._own_best, self._own_costs = candidates.copy(), costs.copy()

@@ -43,7 +43,6 @@ class TrialAndError(Optimiser):
         return np.asarray(self._centre + np.concatenate([moves, -moves]))
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
-        """Take the costs in, see `Optimiser.learn`."""
         place = int(np.argmin(costs))
         if self._cost is None or costs[place] < self._cost:
             self._centre, self._cost = candidates[place], float(costs[place])

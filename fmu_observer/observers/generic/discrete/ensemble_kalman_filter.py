@@ -29,11 +29,9 @@ class EnsembleKalmanFilter(MemberFilter):
     own_parameters = (parameter("inflation", "1", 1.0, "Factor of the members' distances from their mean", min=1.0),)
 
     def spread(self, members: Array, p: Any) -> Array:
-        """Members moved apart, see `MemberFilter.spread`."""
         return _inflated(members, p.inflation)
 
     def corrected(self, members: Array, x: Any, sample: Sample, u: Any, p: Any) -> CorrectedMembers:
-        """Estimate, NIS, variances and members after the gain of the ensemble, see `MemberFilter.corrected`."""
         draws = np.reshape(u.measurement_normal, (len(self.model.measurements), self.members))
         found = correct_members(self.spread(members, p), sample.seen, sample.y, sample.noise, draws)
         after = np.where(sample.count > 0.5, found.members, members)

@@ -50,7 +50,6 @@ class ExtendedKalmanFilter(GaussianFilter):
         super().__init__(model, **options)
 
     def predicted(self, belief: Belief, known: Known, period: Array, noise: Array, p: Any) -> Belief:
-        """The belief a period later, see `GaussianFilter.predicted`."""
         F, W = self.model.transition_jacobians(belief.estimate, known, period)
         moved = self.model.moved(belief.estimate, self.model.no_noise(), known, period)
         if self.rooted:
@@ -61,7 +60,6 @@ class ExtendedKalmanFilter(GaussianFilter):
     def corrected(
         self, belief: Belief, known: Known, y: Array, rows: Sequence[int], noise: Array, p: Any
     ) -> tuple[Corrected, Array]:
-        """The belief after some measurements, see `GaussianFilter.corrected`."""
         chosen = list(rows)
         H, V = self.model.measurement_jacobians(belief.estimate, known)
         expected = self.model.measured(belief.estimate, self.model.no_reading_noise(), known)[chosen]

@@ -50,7 +50,6 @@ class ParticleFilter(MemberFilter):
         super().__init__(model, members, **options)
 
     def corrected(self, members: Array, x: Any, sample: Sample, u: Any, p: Any) -> CorrectedMembers:
-        """Estimate, NIS, variances, particles, weights and effective size, see `MemberFilter.corrected`."""
         n, count, some = self.model.order, self.members, sample.count > 0.5
         before, (y, seen, RN) = x.weights, sample[:3]
         weights = np.where(some, reweighted(before, seen, y, RN), before)

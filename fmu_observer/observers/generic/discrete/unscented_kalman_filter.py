@@ -89,7 +89,6 @@ class UnscentedKalmanFilter(GaussianFilter):
         return belief._replace(drawn=_Drawn(unscented.scattered(lambda at: at[:n], points), np.zeros((n, n))))
 
     def predicted(self, belief: Belief, known: Known, period: Array, noise: Array, p: Any) -> Belief:
-        """The belief a period later, see `GaussianFilter.predicted`."""
         n, inputs = self.model.order, len(self.model.process_noises)
         w, root = self._weights(inputs, p), self._root(belief.spread)
         centre = np.hstack([belief.estimate, self.model.no_noise()])
@@ -107,7 +106,6 @@ class UnscentedKalmanFilter(GaussianFilter):
     def corrected(
         self, belief: Belief, known: Known, y: Array, rows: Sequence[int], noise: Array, p: Any
     ) -> tuple[Corrected, Array]:
-        """The belief after some measurements, see `GaussianFilter.corrected`."""
         chosen, n, inputs = list(rows), self.model.order, len(self.model.measurement_noises)
         unseen = None
         if belief.drawn is None:
