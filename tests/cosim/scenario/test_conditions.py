@@ -36,13 +36,13 @@ def test_a_window_that_does_not_tell_a_state_is_told_before_the_run() -> None:
     """One row of the pendulum is its angle: the rate is known from earlier rows only. Two rows tell both."""
     heard: list[str] = []
     windowed(1).run(warn=heard.append)
-    assert any("observer: A window of 1 full row tells 1" in text and "does not tell rate" in text for text in heard)
+    assert any("observer: A window of 1 full row shows 1" in text and "does not show rate" in text for text in heard)
     heard.clear()
     windowed(2).run(warn=heard.append)
     assert not any("tell" in text and "window" in text for text in heard)
 
 
 def test_it_may_be_required_or_left_aside() -> None:
-    with pytest.raises(cosim.CosimError, match="does not tell rate"):
+    with pytest.raises(cosim.CosimError, match="does not show rate"):
         windowed(1, certificates="require").run()
     assert evaluate_observers(windowed(1).table().components, {}, "ignore", "here") == ({}, [])
