@@ -14,7 +14,7 @@ from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.calibration.runs import Hidden, Runs
 from cosim.errors import nearest
 from fmus.tables.numbers import number
-from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
+from fmus.tables.table import Column, Parts, Readable, Table, name_column, text_column
 
 Array = NDArray[np.float64]
 _ESTIMATE = (
@@ -42,7 +42,7 @@ _ROUNDING = 1e-6  # of what a signal varies: residuals below it are no noise
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(Readable):
     """Calibrated parameters.
 
     Attributes:
@@ -135,10 +135,6 @@ class Calibration:
         head = f"{len(time)} samples {span}, {self.fit.runs} runs, condition number {number(self.fit.condition, 2)}"
         notes = [*(f"- Not identified: {hidden.text}" for hidden in self.hidden), *(f"- {r}" for r in self.remarks)]
         return [head, self.parameters(), self.signals(), *(["\n".join(notes)] if notes else [])]
-
-    def text(self) -> str:
-        """All of it as one text."""
-        return joined(self.parts())
 
 
 def _ends(row: dict[str, Any]) -> dict[str, Any]:

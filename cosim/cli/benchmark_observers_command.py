@@ -76,7 +76,7 @@ def execute(options: argparse.Namespace) -> Output:
         bar.close()
     paths = benchmark.write(options.out) if options.out is not None else {}
     return Output(
-        [benchmark.table(), benchmark.errors(), "\n".join(benchmark.remarks())],
+        benchmark.parts(),
         benchmark.to_data(),
         paths,
         NOT_AS_ASKED if benchmark.failed else DONE,

@@ -19,7 +19,7 @@ from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import Mode, unobservable_modes
 from fmus.tables.numbers import number
-from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
+from fmus.tables.table import Column, Parts, Readable, Table, name_column, text_column
 
 Array = NDArray[np.float64]
 Method = Literal["exact Jacobians", "directional derivatives", "central differences"]
@@ -29,7 +29,7 @@ _RANK_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Linearisation:
+class Linearisation(Readable):
     """``d dx = A dx + B du``, ``dy = C dx + D du`` about a point, or the same from one step to the next.
 
     Attributes:
@@ -133,10 +133,6 @@ class Linearisation:
         except OSError as error:
             raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
         return path
-
-    def text(self) -> str:
-        """The linearisation for people; see `parts`."""
-        return joined(self.parts())
 
     def parts(self) -> Parts:
         """The linearisation for people: the point, the matrices, eigenvalues with time constants, and modes that are

@@ -11,11 +11,11 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.observer_scores import ObserverScore
 from cosim.observer_benchmark.observer_table import observer_table
 from cosim.run.outcome import Outcome
-from fmus.tables.table import Table
+from fmus.tables.table import Parts, Readable, Table
 
 
 @dataclass(frozen=True)
-class BenchmarkScores:
+class BenchmarkScores(Readable):
     """Observers beside one recorded run.
 
     Args:
@@ -38,6 +38,11 @@ class BenchmarkScores:
         """Names of the observers without numbers, or whose numbers end early."""
         return [score.name for score in self.scores if score.failure is not None]
 
+    def parts(self) -> Parts:
+        """The main table, errors by phase, what failed, and what the reader must know."""
+        failed = [f"{score.label}: {score.failure}" for score in self.scores if score.failure]
+        return [self.table(), self.errors(), "\n".join([*failed, *(f"- {note}" for note in self.notes)])]
+
     def table(self) -> Table:
         """The main table: one row for each observer."""
         title = f"{self.spec.title}: {len(self.scores)} observers on one recorded run of {self.steps} steps"
@@ -46,16 +51,6 @@ class BenchmarkScores:
     def errors(self) -> Table:
         """Errors of each observer in each phase."""
         return error_table([phase for score in self.scores for phase in score.phases], self.labelled_spec())
-
-    def remarks(self) -> list[str]:
-        """What failed, and what the reader must know."""
-        failed = [f"{score.label}: {score.failure}" for score in self.scores if score.failure]
-        return [*failed, *(f"- {note}" for note in self.notes)]
-
-    def text(self) -> str:
-        """The tables for a terminal."""
-        tables = [table.text() for table in (self.table(), self.errors()) if table]
-        return "\n".join(["\n\n".join(tables), *self.remarks()])
 
     def labelled_spec(self) -> ReportSpec:
         """The roles with all observers of the benchmark and their labels."""

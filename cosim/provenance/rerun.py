@@ -21,7 +21,7 @@ from cosim.results.unfinished import DID_NOT_END
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import Manifest, read_manifest
 from cosim.simulation.scenario import Scenario
-from fmus.tables.table import Parts, joined
+from fmus.tables.table import Parts, Readable
 
 if TYPE_CHECKING:
     from cosim.comparison.compare import Given
@@ -79,7 +79,7 @@ def _bits(value: object) -> object:
 
 
 @dataclass(frozen=True)
-class Rerun:
+class Rerun(Readable):
     """What came out of running results again.
 
     Args:
@@ -104,10 +104,6 @@ class Rerun:
     def equal(self) -> bool:
         """Whether the results are the same, to the last bit or within the tolerance."""
         return self.verdict != "differs"
-
-    def text(self) -> str:
-        """The same as text; see `parts`."""
-        return joined(self.parts())
 
     def parts(self) -> Parts:
         """Verdict, what differs, and what changed since, for people."""

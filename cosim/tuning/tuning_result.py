@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim.studies.groups import Spread, mean_of
 from fmus.tables.numbers import number
-from fmus.tables.table import Column, Parts, Table, joined, name_column
+from fmus.tables.table import Column, Parts, Readable, Table, name_column
 
 if TYPE_CHECKING:
     from cosim.simulation.scenario import Scenario
@@ -47,7 +47,7 @@ class Searched:
 
 
 @dataclass(frozen=True)
-class Tuning:
+class Tuning(Readable):
     """What came out.
 
     Args:
@@ -113,10 +113,6 @@ class Tuning:
             f"{len(finals)} searches end at {number(middle)} in the median, quartiles {number(low)} and "
             f"{number(high)}, best {number(finals.min())}."
         )
-
-    def text(self) -> str:
-        """The same as text; see `parts`."""
-        return joined(self.parts())
 
     def to_data(self) -> dict[str, Any]:
         """Plain data."""

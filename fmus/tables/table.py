@@ -167,6 +167,22 @@ def joined(parts: Parts, width: int | None = None) -> str:
     return "\n\n".join(filter(None, texts))
 
 
+class Readable:
+    """What people read as tables and paragraphs."""
+
+    def parts(self) -> Parts:
+        """The tables and paragraphs, in their order."""
+        raise NotImplementedError
+
+    def text(self, width: int | None = None) -> str:
+        """All of it as one text; ends without a line break.
+
+        Args:
+            width: of the terminal, see `Table.text`.
+        """
+        return joined(self.parts(), width)
+
+
 def pairs_table(key: str, entries: Mapping[str, Any], title: str = "") -> Table:
     """Names and what belongs to each, without headings.
 
