@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,11 @@ from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.coupling.instants import is_continuous
 from cosim.errors import CosimError, nearest
 from cosim.fmu_model.opening import Interface, open_model
-from cosim.results.result import Result
+from cosim.run.outcome import Outcome
+from cosim.runs.engine import run_jobs
+from cosim.runs.executors import make_executor
+from cosim.runs.journal import Journal
+from cosim.runs.run import Run
 from cosim.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -200,19 +205,48 @@ class FmuRuns(Runs):
         self._model.close()
 
 
+@dataclass(frozen=True)
+class _Sampled:
+    """What is taken of an outcome: signals at instants, on lines between its rows.
+
+    Args:
+        names: of the signals. instants: [s].
+    """
+
+    names: Sequence[str]
+    instants: Sequence[float]
+
+    def __call__(self, outcome: Outcome) -> list[list[float]] | None:
+        if outcome.failure is not None:
+            return None
+        time, rows = np.unique(outcome.result.time, return_index=True)
+        return [np.interp(self.instants, time, outcome[name][rows]).tolist() for name in self.names]
+
+
 class ScenarioRuns(Runs):
-    """Runs of a scenario with other values of ``component.parameter``.
+    """Runs of a scenario with other values of ``component.parameter``, those of a derivative at once.
 
     Args:
         scenario: what is run. names: values to fit, as `Scenario.set` takes them.
         guesses: first guesses by name; needed where the scenario does not set the value itself.
+        workers, scheduler: where it is run, see `make_executor`.
+        journal: that runs are written to and taken over from; None for none.
 
     Raises:
-        CalibrationError: there is no first guess for a value.
+        CalibrationError: there is no first guess for a value. RunError: the cluster cannot be used.
     """
 
-    def __init__(self, scenario: Scenario, names: Sequence[str], guesses: Mapping[str, float] | None = None) -> None:
-        self.scenario = scenario
+    def __init__(
+        self,
+        scenario: Scenario,
+        names: Sequence[str],
+        guesses: Mapping[str, float] | None = None,
+        *,
+        workers: int = 1,
+        scheduler: str | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        self.scenario, self._journal = scenario, journal
         table = scenario.table()
         self.start, self.bounds = {}, {}
         for name in names:
@@ -228,25 +262,36 @@ class ScenarioRuns(Runs):
                     f"{scenario.where}: no first guess of {name}: the scenario does not set it. Write {name}=VALUE."
                 )
             self.start[name] = float(value)
-        outcome = self._outcome(self.start)
-        self.outputs = tuple(signal.name for signal in outcome.signals)
-        self._units = {signal.name: signal.unit for signal in outcome.signals}
+        self._executor = make_executor(workers, scheduler, apart=Run(scenario, self.start).apart)
+        first = self._rows([Run(scenario, self.start)])[0].result
+        self.outputs = tuple(signal.name for signal in first.signals)
+        self._units = {signal.name: signal.unit for signal in first.signals}
 
     def run(self, values: Mapping[str, float], recorded: RecordedSignals) -> Array:
-        """Simulate with parameters; arguments and result as for `Runs`."""
-        result = self._outcome(values)
-        instants, rows = np.unique(result.time, return_index=True)
-        return np.array([np.interp(recorded.time, instants, result[name][rows]) for name in recorded.measured])
+        """The signals of one run, see `Runs.run`."""
+        return np.asarray(self.run_all([values], recorded)[0])
 
-    def _outcome(self, values: Mapping[str, float]) -> Result:
-        scenario = self.scenario.copy()
-        for name, value in values.items():
-            scenario.set(name, float(value))
-        outcome = scenario.run(warn=lambda _text: None)
-        if outcome.failure is not None:
-            raise CosimError(f"{self.scenario.where}: a run of the calibration failed: {outcome.failure}")
-        result: Result = outcome.result
-        return result
+    def run_all(self, points: Sequence[Mapping[str, float]], recorded: RecordedSignals) -> Array:
+        """The signals of several runs, see `Runs.run_all`."""
+        take = _Sampled(tuple(recorded.measured), tuple(recorded.time.tolist()))
+        rests_on = repr((take.names, take.instants))
+        return np.array(self._rows([Run(self.scenario, values, take, rests_on) for values in points], self._journal))
+
+    def _rows(self, jobs: Sequence[Run], journal: Journal | None = None) -> list[Any]:
+        """What is taken of each run.
+
+        Raises:
+            CosimError: a run failed.
+        """
+        found: dict[int, Any] = {}
+        for done in run_jobs(jobs, self._executor, journal):
+            if done.failure is not None:
+                values = ", ".join(f"{name} = {value:.6g}" for name, value in done.job.settings.items())
+                raise CosimError(
+                    f"{self.scenario.where}: a run of the calibration failed, with {values}: {done.failure.reason}"
+                )
+            found[done.number] = done.row
+        return [found[number] for number in range(len(jobs))]
 
     def unit(self, name: str) -> str:
         """Unit of a signal; nothing is said of that of a scenario's value.
@@ -255,6 +300,10 @@ class ScenarioRuns(Runs):
             name: of the signal or value.
         """
         return self._units.get(name, "")
+
+    def close(self) -> None:
+        """Let the worker processes end."""
+        self._executor.__exit__(None, None, None)
 
 
 def _number(text: object, otherwise: float) -> float:

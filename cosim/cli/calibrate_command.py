@@ -14,12 +14,14 @@ from cosim.calibration.fitting import Calibration, calibrate
 from cosim.calibration.recorded_signals import CalibrationError, Selection, sort_columns
 from cosim.calibration.running_resistance import RunningResistance
 from cosim.calibration.runs import FmuRuns, Runs, ScenarioRuns
-from cosim.cli.arguments import PARAMETERS_FILE, settings_argument
+from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, settings_argument
 from cosim.cli.output import save_figure, write_text
 from cosim.cli.scenarios import between_samples, parse_setting, setting_number
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
+from cosim.results.results_folder import check_writable
+from cosim.runs.journal import Journal
 from cosim.simulation.scenario import Scenario
 from fmus import cached_fmu
 from fmus.cli.commands import argument
@@ -104,6 +106,8 @@ ARGUMENTS = (
     argument("--stop", type=float, default=_RUN_SECONDS, help="of an FMU that is driven: end of the run [s] (60)"),
     argument("--plot", type=Path, metavar="FILE", help="write signals and residuals as a picture"),
     PARAMETERS_FILE,
+    argument("--out", type=Path, metavar="DIR", help="of a scenario: folder of the journal of the runs"),
+    *MANY_RUNS,
 )
 
 
@@ -184,7 +188,10 @@ def _runs(options: argparse.Namespace, inputs: Mapping[str, Any]) -> Runs:
     scenario = Scenario.load(options.model)
     for name, value in map(parse_setting, options.settings):
         scenario.set(name, value)
-    return ScenarioRuns(scenario, names, guesses)
+    if options.resume and options.out is None:
+        raise CalibrationError("--resume goes on with the runs in a folder: say which, --out DIR.")
+    journal = options.out and Journal(check_writable(options.out), resume=options.resume, retry=options.retry)
+    return ScenarioRuns(scenario, names, guesses, workers=options.workers, scheduler=options.scheduler, journal=journal)
 
 
 def _running_resistance(options: argparse.Namespace, inputs: Mapping[str, Any]) -> RunningResistance:

@@ -16,6 +16,8 @@ from cosim.calibration.fitting import calibrate
 from cosim.calibration.recorded_signals import RecordedSignals
 from cosim.calibration.runs import FmuRuns, ScenarioRuns
 from cosim.cli import main
+from cosim.errors import CosimError
+from cosim.runs.journal import Journal, read_lines
 from plant_models import PLANTS
 
 TRUE = {"mass": 80e3, "davis_a": 1800.0, "davis_b": 80.0, "davis_c": 7.0}
@@ -92,24 +94,43 @@ def test_a_ratio_is_named(path: Path) -> None:
     assert any("only the ratio of mass and traction_coefficient is identified" in h.text for h in found.hidden)
 
 
-def test_scenarios_are_calibrated_too() -> None:
-    s = cosim.Scenario(stop=40.0, step=0.5)
-    s.add(
-        "train",
-        model="longitudinal_train",
-        parameters={
-            "mass": 80e3,
-            "train_speed": 20.0,
-            "traction_coefficient": 1.0,
-            **{k: TRUE[k] for k in ("davis_a", "davis_b", "davis_c")},
-        },
-    )
-    truth = s.run()
+def coasting() -> cosim.Scenario:
+    """A train that only its resistance slows down."""
+    known = {"mass": 80e3, "train_speed": 20.0, "traction_coefficient": 1.0}
+    values = known | {name: TRUE[name] for name in ("davis_a", "davis_b", "davis_c")}
+    return cosim.Scenario(stop=40.0, step=0.5).add("train", model="longitudinal_train", parameters=values)
+
+
+def recorded_journey() -> RecordedSignals:
+    truth = coasting().run()
     noisy = truth["train.speed"] + 0.01 * np.random.default_rng(0).standard_normal(len(truth.result.time))
-    signals = RecordedSignals(truth.result.time, {"train.speed": noisy}, {}, {"train.speed": "m/s"})
-    found = calibrate(ScenarioRuns(s, ["train.davis_a"], {"train.davis_a": 1500.0}), signals)
+    return RecordedSignals(truth.result.time, {"train.speed": noisy}, {}, {"train.speed": "m/s"})
+
+
+def test_scenarios_are_calibrated_too() -> None:
+    found = calibrate(ScenarioRuns(coasting(), ["train.davis_a"], {"train.davis_a": 1500.0}), recorded_journey())
     low, high = found.intervals["train.davis_a"]
     assert low < TRUE["davis_a"] < high
+
+
+def test_workers_and_a_resumed_calibration_find_the_same(tmp_path: Path) -> None:
+    """To the bit; what stands in the journal is not run again."""
+    found = []
+    for workers, resume in ((1, False), (2, False), (1, True)):
+        journal = Journal(tmp_path, resume=resume)
+        before = len(read_lines(journal.path)) if resume else 0
+        runs = ScenarioRuns(coasting(), ["train.davis_a"], {"train.davis_a": 1500.0}, workers=workers, journal=journal)
+        found.append(calibrate(runs, recorded_journey()))
+        runs.close()
+        assert len(read_lines(journal.path)) > before or resume
+        assert not resume or len(read_lines(journal.path)) == before
+    assert found[0].to_dict() == found[1].to_dict() == found[2].to_dict()
+
+
+def test_a_run_that_fails_is_named_with_its_values() -> None:
+    runs = ScenarioRuns(coasting(), ["train.mass"])
+    with pytest.raises(CosimError, match=r"a run of the calibration failed, with train\.mass = -1: .*mass"):
+        runs.run({"train.mass": -1.0}, recorded_journey())
 
 
 def words(path: Path, table: Path, *more: str) -> list[str]:
