@@ -249,9 +249,9 @@ def _covariance(jacobian: Array, weights: Array, variances: Array, sizes: Array)
     normal = np.einsum("qni,qnj,q->ij", rows, rows, weights**2)
     spread = np.einsum("qni,qnj,q->ij", rows, rows, weights**4 * variances)
     values, vectors = np.linalg.eigh(normal)
-    seen = values > np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
-    inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
-    hidden = vectors[:, ~seen]
+    shown = values > np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
+    inverse = (vectors[:, shown] / values[shown]) @ vectors[:, shown].T
+    hidden = vectors[:, ~shown]
     return np.asarray((inverse @ spread @ inverse + _UNSEEN * hidden @ hidden.T) * np.outer(sizes, sizes))
 
 
@@ -276,7 +276,7 @@ class Direction:
                 "size)"
             )
         changes = ", ".join(f"{name} {100.0 * share:+.0f} %" for name, share in self.shares.items())
-        text = f"a common change of {changes} is hardly seen (uncertain by {100.0 * self.uncertainty:.3g} %)"
+        text = f"a common change of {changes} hardly shows (uncertain by {100.0 * self.uncertainty:.3g} %)"
         if len(names) == 2 and abs(abs(self.shares[names[1]] / self.shares[names[0]]) - 1.0) < _RATIO:
             one, other = names
             alike = self.shares[one] * self.shares[other] > 0.0

@@ -299,7 +299,7 @@ class ScenarioRuns(Runs):
         Args:
             name: of the signal or value.
         """
-        return self._units.get(name, "")
+        return str(self._units.get(name, ""))
 
     def close(self) -> None:
         """Let the worker processes end."""

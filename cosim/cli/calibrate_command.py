@@ -172,7 +172,7 @@ def _numbers(option: str, texts: Sequence[str]) -> dict[str, float]:
 
 
 def _runs(options: argparse.Namespace, inputs: Mapping[str, Any]) -> Runs:
-    """What is run, with the first guesses given."""
+    """What is run, with first guesses."""
     names = [text.partition("=")[0] for text in options.parameters or ()]
     if len(set(names)) < len(names):
         raise CalibrationError(f"--parameters: each once (got {', '.join(names)}).")

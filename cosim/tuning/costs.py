@@ -35,7 +35,7 @@ class Cost(ABC):
         return ()
 
     @property
-    def seen(self) -> tuple[str, ...]:
+    def estimates(self) -> tuple[str, ...]:
         """Outputs of the observer on which it depends; none where that is not known."""
         return ()
 
@@ -74,7 +74,7 @@ class StateCost(Cost):
         return tuple(name for pair in self.pairs for name in pair)
 
     @property
-    def seen(self) -> tuple[str, ...]:
+    def estimates(self) -> tuple[str, ...]:
         """The estimates."""
         return tuple(estimate for estimate, _ in self.pairs) or (f"{self.observer}.speed",)
 
@@ -115,7 +115,7 @@ class LikelihoodCost(Cost):
         return (f"{self.observer}.innovation_likelihood",)
 
     @property
-    def seen(self) -> tuple[str, ...]:
+    def estimates(self) -> tuple[str, ...]:
         """The accumulated log-likelihood."""
         return self.signals
 
@@ -131,8 +131,8 @@ class NisCost(Cost):
     Twice too large counts as much as twice too small: ``log(mean / q)^2``.
 
     Args:
-        observer: component with the output `nis`. measurements: q, or None where the observer tells it sample by sample
-            as `nis_degrees`.
+        observer: component with the output `nis`. measurements: q, or None where the observer states it sample by
+            sample as `nis_degrees`.
     """
 
     observer: str
@@ -146,10 +146,10 @@ class NisCost(Cost):
     @property
     def signals(self) -> tuple[str, ...]:
         """The normalised innovation squared, and its degrees of freedom where they are outputs."""
-        return (*self.seen, *(() if self.measurements else (f"{self.observer}.nis_degrees",)))
+        return (*self.estimates, *(() if self.measurements else (f"{self.observer}.nis_degrees",)))
 
     @property
-    def seen(self) -> tuple[str, ...]:
+    def estimates(self) -> tuple[str, ...]:
         """The normalised innovation squared."""
         return (f"{self.observer}.nis",)
 
@@ -241,7 +241,7 @@ def make_cost(
             ``expectation:NUMBER or part of its text``, the name of a measure (``speed_error_rms``,
             ``observer.gap_error_max``), with ``-`` in front where the largest is wanted; or a function of the outcome.
         observer: the component that is tuned; None where there is none.
-        outputs: names of the observer's, which tell ``nis`` how many measurements there are.
+        outputs: names of the observer's, by which ``nis`` knows how many measurements there are.
 
     Raises:
         ScenarioError: it needs an observer and none is named, or it cannot be read.

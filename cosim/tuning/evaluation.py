@@ -308,7 +308,7 @@ def _not_finite(outcome: Outcome, cost: Cost, value: float) -> tuple[str, float 
     that is none first, for some can be missing.
     """
     known = outcome.result.table.dtype.names or ()
-    columns = {name: outcome.result[name] for name in (*cost.signals, *cost.seen) if name in known}
+    columns = {name: outcome.result[name] for name in (*cost.signals, *cost.estimates) if name in known}
     first = {name: int(np.argmin(np.isfinite(c))) for name, c in columns.items() if not np.isfinite(c).all()}
     if not first:
         return f"the cost is {value:g}, although all signals that it names are finite", None
@@ -322,7 +322,7 @@ def _signals(outcome: Outcome, observer: str | None, cost: Cost) -> np.ndarray:
     """
     table, time = outcome.result.table, outcome.result.time
     mine = [n for n in table.dtype.names or () if n != "time" and (observer is None or n.startswith(f"{observer}."))]
-    names = [name for name in mine if name in cost.seen] or [name for name in mine if not name.endswith("_std")]
+    names = [name for name in mine if name in cost.estimates] or [name for name in mine if not name.endswith("_std")]
     if observer is None:  # events, and so rows, may differ between candidates
         instants = np.linspace(float(time[0]), float(time[-1]), _ROWS)
         columns = [np.interp(instants, time, np.asarray(table[name], float)) for name in names]

@@ -42,7 +42,7 @@ class LikelihoodSlopes:
         if type(cost) is not LikelihoodCost:
             raise NoSlopesError("the cost is not the likelihood")
         if not replays:
-            raise NoSlopesError("candidates are not run as members of a batch over what the observer heard")
+            raise NoSlopesError("candidates are not run as members of a batch over the inputs of the observer")
         self._names = asked.space.names
         self._seeds = [_accumulated(found, asked) for found in replays]
 

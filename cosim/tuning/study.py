@@ -21,6 +21,7 @@ from fmu_observer.design.optimisers.optimiser import Optimiser
 from fmu_observer.design.optimisers.search_space import SearchSpace
 
 ITERATIONS = "iterations.jsonl"
+_REPLAYED = "as members of a batch over the inputs of the observer"
 _NEAR_BOUND = 1e-3
 """Share of the range of a parameter within which a value counts as standing at its end."""
 _NOTHING_BETTER = "No candidate is better with the training seeds than the scenario as it is; its values are kept."
@@ -89,7 +90,8 @@ class Study:
             start=self.asked.start,
             best=self.asked.start if better is None else better,
             runs=self.evaluator.runs,
-            how=("as members of a batch over what the observer heard" if self.evaluator.replayed else how) + gradients,
+            how=("as members of a batch over the inputs of the observer" if self.evaluator.replayed else how)
+            + gradients,
             warnings=[*remarks, *self._warnings(shown, at_best)],
             fixed=why,
             interrupted=interrupted,

@@ -1,5 +1,5 @@
 """Tuning as files: the tuned scenario, an overlay with the values, data, and a picture of the convergence. Touches only
-the folder it is given.
+the folder that it writes.
 """
 
 from __future__ import annotations

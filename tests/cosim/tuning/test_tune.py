@@ -76,7 +76,7 @@ def mean_square(outcome: Outcome) -> float:
 
 def test_costs_are_those_of_runs_of_the_scenario(found: Tuning) -> None:
     """Members of a batch against whole runs: the same bits, and a cost written by hand to rounding."""
-    assert found.how == "as members of a batch over what the observer heard"
+    assert found.how == "as members of a batch over the inputs of the observer"
     whole = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], whole_runs=True)
     assert whole.how.startswith("of the whole scenario")
     assert (found.before, found.after, found.judged_after) == (whole.before, whole.after, whole.judged_after)
