@@ -60,6 +60,11 @@ def error_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
     Returns:
         The sizes; where no time passes, the root mean square is that of the rows.
     """
+    return _size(np.diff(time), error)
+
+
+def _size(steps: np.ndarray, error: np.ndarray) -> _ErrorSize:
+    """As `error_size`, by the differences between the times of the rows [s], shape (rows - 1,)."""
     if not len(error):
         return _ErrorSize(nan, nan)
     largest = float(np.max(np.abs(error)))
@@ -68,7 +73,7 @@ def error_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
     if largest < np.finfo(float).tiny:  # too small to divide by
         return _ErrorSize(largest, largest)
     square = (error / largest) ** 2  # scaled, so that a diverged estimate does not overflow
-    steps = np.maximum(np.diff(time), 0.0)
+    steps = np.maximum(steps, 0.0)
     elapsed = float(np.sum(steps))
     mean = float(np.sum(steps * (square[1:] + square[:-1]))) / (2 * elapsed) if elapsed > 0 else float(np.mean(square))
     return _ErrorSize(largest, largest * float(np.sqrt(mean)))
@@ -80,7 +85,11 @@ def instants(time: np.ndarray) -> int:
     Args:
         time: instants [s], shape (rows,), never falling.
     """
-    return int(np.count_nonzero(np.diff(time) > 0.0)) + 1 if len(time) else 0
+    return _instants(np.diff(time)) if len(time) else 0
+
+
+def _instants(steps: np.ndarray) -> int:
+    return int(np.count_nonzero(steps > 0.0)) + 1
 
 
 def judged_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
@@ -90,7 +99,8 @@ def judged_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
         time: instants [s], shape (rows,), never falling.
         error: estimate minus true value, shape (rows,).
     """
-    return error_size(time, error) if instants(time) >= FEWEST_INSTANTS else _ErrorSize(nan, nan)
+    steps = np.diff(time)
+    return _size(steps, error) if len(time) and _instants(steps) >= FEWEST_INSTANTS else _ErrorSize(nan, nan)
 
 
 def within(time: np.ndarray, phase: Phase, evaluate_after: float) -> np.ndarray:

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from plant_models.hybrid import HybridSystem
 
 
+_BATCHES = 3
+"""Of different sizes, kept at a time."""
+
+
 class ReplayError(CosimError):
     """An observer cannot be replayed; the message says why and what to do."""
 
@@ -66,6 +70,7 @@ class Replay:
         members: int | None = None,
         progress: Callable[[int, int], None] | None = None,
         late: Mapping[str, int] | None = None,
+        into: np.ndarray | None = None,
     ) -> np.ndarray:
         """Run members over the recording.
 
@@ -77,6 +82,7 @@ class Replay:
             progress: called with the number of members done and of all.
             late: by name of a connected input the number of points that its values come later than in the run, or
                 sooner where negative: what a wrong order of exchange would cost.
+            into: where the values are written, as for `Batch.run`; a new array by default.
 
         Returns:
             Shape (members, points, len(results)); NaN from where a member failed.
@@ -93,7 +99,7 @@ class Replay:
         for name, value in self._first.items():
             batch.set(name, value)
         batch.start(float(self.instants[0]))
-        return batch.run(self.instants[1:], results, self._moved(late or {}), progress)
+        return batch.run(self.instants[1:], results, self._moved(late or {}), progress, into)
 
     def inputs(self) -> np.ndarray:
         """Inputs as the observer had them at each communication point, in the order of its scalar inputs; those that
@@ -141,9 +147,12 @@ class Replay:
         return max((len(v) for name, v in given.items() if v.ndim > (1 if name in vectors else 0)), default=1)
 
     def _batch(self, members: int) -> Batch:
-        """So many members with the parameters of the run, before time begins; kept for the next time."""
+        """So many members with the parameters of the run, before time begins; the last few are kept for the next
+        time.
+        """
         if members not in self._batches:
-            self._batches = {members: Batch(self.system, members, self._component.preset)}
+            kept = list(self._batches.items())[1 - _BATCHES :]
+            self._batches = dict(kept) | {members: Batch(self.system, members, self._component.preset)}
         batch = self._batches[members]
         batch.reset()
         for name, value in self._given.items():

@@ -11,9 +11,8 @@ import numpy as np
 
 from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.consistency import measurement_count
-from cosim.evaluation.metrics import judged_size, within
+from cosim.evaluation.metrics import judged_size
 from cosim.evaluation.roles import estimation_error
-from cosim.evaluation.spec import Phase
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.studies.measures import error_measures
@@ -91,7 +90,8 @@ class StateCost(Cost):
                 "estimates and true values: state:observer.current=motor.current."
             )
         rows = _evaluated(outcome)
-        return sum(judged_size(result.time[rows], error[rows]).rms ** 2 for error in errors)
+        time = np.ascontiguousarray(result.time[rows])
+        return sum(judged_size(time, error[rows]).rms ** 2 for error in errors)
 
 
 @dataclass(frozen=True)
@@ -282,7 +282,6 @@ def _of(result: Result, name: str) -> np.ndarray:
     return result[name]
 
 
-def _evaluated(outcome: Outcome) -> np.ndarray:
-    """Rows that count, shape (rows,)."""
-    time = outcome.result.time
-    return within(time, Phase("whole run", float(time[0]), float(time[-1])), outcome.spec.evaluate_after)
+def _evaluated(outcome: Outcome) -> slice:
+    """Rows that count: those from the start of the evaluation on."""
+    return slice(int(np.searchsorted(outcome.result.time, outcome.spec.evaluate_after)), None)

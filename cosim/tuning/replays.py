@@ -16,8 +16,8 @@ from cosim.studies.replay import Replay
 from cosim.tuning.costs import Cost, ExpectationCost
 from fmus.batch.error import BatchError
 
-VALUES = 20_000_000
-"""Of outputs that are held at a time; 160 MB."""
+BYTES = 16_000_000
+"""Of the tables of members that are stepped at a time: what a processor keeps at hand."""
 
 
 class Replays:
@@ -32,8 +32,10 @@ class Replays:
 
     def __init__(self, outcome: Outcome, observer: str) -> None:
         self.replay, self.outcome, self.observer = Replay(outcome, observer), outcome, observer
-        before = f"{observer}."
-        self._names = [n.removeprefix(before) for n in outcome.result.table.dtype.names or () if n.startswith(before)]
+        fields, before = outcome.result.table.dtype.names or (), f"{observer}."
+        own = [place for place, name in enumerate(fields) if name.startswith(before)]
+        self._own = slice(own[0], own[-1] + 1)
+        self._names = [name.removeprefix(before) for name in fields[self._own]]
 
     def outcomes(self, candidates: Sequence[Mapping[str, Any]]) -> Iterator[Outcome | str]:
         """What the run would have been with each candidate, or why it would have failed.
@@ -48,25 +50,29 @@ class Replays:
             yield next(varied) if candidate else self.outcome  # without settings: the run that is there
 
     def _varied(self, candidates: Sequence[Mapping[str, Any]]) -> Iterator[Outcome | str]:
-        """Outcomes of candidates that change something, all of them the same parameters."""
-        table = self.outcome.result.table.copy()
-        result = replace(self.outcome.result, table=table)
-        size = max(1, VALUES // (len(table) * len(self._names)))
+        """Outcomes of candidates that change something, all of them the same parameters.
+
+        Each has a copy of the table of the run, into which the members write the columns of the observer.
+        """
+        table = self.outcome.result.table
+        size = max(1, min(len(candidates), BYTES // table.nbytes))
+        tables = np.tile(table, (size, 1))
+        written = tables.view(float).reshape(size, len(table), -1)[:, :, self._own]
+        outcomes = [replace(self.outcome, result=replace(self.outcome.result, table=member)) for member in tables]
         for first in range(0, len(candidates), size):
             part = candidates[first : first + size]
-            columns = {n.partition(".")[2]: np.array([c[n] for c in part], float) for n in part[0]}
+            every = [*part, *[part[-1]] * (size - len(part))]  # a batch of another size would have to be made
+            columns = {n.partition(".")[2]: np.array([c[n] for c in every], float) for n in part[0]}
             try:
-                found = self.replay.run(self._names, columns, members=len(part))
+                self.replay.run(self._names, columns, members=size, into=written)
             except BatchError as error:
                 yield from (str(error) for _ in part)
                 continue
-            for rows in found:
-                if not np.isfinite(rows[-1]).all():
+            for rows, outcome in zip(written, outcomes[: len(part)], strict=False):
+                if np.isfinite(rows[-1]).all():
+                    yield outcome
+                else:
                     yield "a state of the observer is no finite number any more, or its parameters are refused"
-                    continue
-                for place, name in enumerate(self._names):
-                    table[f"{self.observer}.{name}"] = rows[:, place]
-                yield replace(self.outcome, result=result)
 
 
 def make_replays(base: Scenario, observer: str, cost: Cost, settings: Sequence[str]) -> Replays | None:

@@ -164,6 +164,7 @@ class Batch:
         results: Sequence[str] = (),
         inputs: Mapping[str, ArrayLike] | None = None,
         progress: Callable[[int, int], None] | None = None,
+        into: np.ndarray | None = None,
     ) -> np.ndarray:
         """Step all members through communication instants.
 
@@ -173,6 +174,8 @@ class Batch:
             inputs: values of scalar inputs by name, now and at each instant, held until the next one: shape (k + 1,),
                 or (members, k + 1) where they differ by member. Inputs not named keep what was set.
             progress: called with the number of members done and of all.
+            into: where results are written, an array or a view of the shape that is returned, of doubles of which those
+                of an instant lie side by side; a new array by default.
 
         Returns:
             Results, shape (members, k + 1, len(results)); NaN from where a member failed.
@@ -182,7 +185,7 @@ class Batch:
         """
         times = self._instants(instants)
         given = self._inputs(inputs or {}, len(times))
-        taken = np.empty((self.members, len(times), len(results)))
+        taken = self._place(into, (self.members, len(times), len(results)))
         sources = _Columns.of([self._scalar(name) for name in inputs or {}], given)
         targets = _Columns.of([self._scalar(name) for name in results], taken)
         for first in range(0, self.members, _MEMBERS_AT_A_TIME):
@@ -192,6 +195,18 @@ class Batch:
                 progress(last, self.members)
         self.time = float(times[-1])
         return taken
+
+    def _place(self, into: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
+        """Where results are written."""
+        if into is None:
+            return np.empty(shape)
+        beside = into.ndim == len(shape) and (shape[-1] < 2 or into.strides[-1] == into.itemsize)
+        if into.shape != shape or into.dtype != np.float64 or not beside:
+            raise BatchError(
+                f"{self.system.name}: results go into doubles of shape {shape}, those of an instant side by side; got "
+                f"{into.dtype} of shape {into.shape} with strides {into.strides}."
+            )
+        return into
 
     @property
     def failures(self) -> dict[int, str]:

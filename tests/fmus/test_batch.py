@@ -169,3 +169,22 @@ def test_what_cannot_be_is_refused_in_words(
 ) -> None:
     with pytest.raises(BatchError, match=said):
         ask(Batch(reference("tracker").system, 2))
+
+
+def test_results_are_written_where_the_caller_says() -> None:
+    """Into columns of a wider table, of which nothing else changes; what cannot take them is refused."""
+    batch = Batch("odometer", 3)
+    batch.set("sample_period", [0.01, 0.02, 0.05])
+    batch.start()
+    instants, wheel = np.arange(1, 9) / 32.0, {"wheel_speed": np.linspace(1.0, 2.0, 9)}
+    expected = batch.run(instants, ["reading", "reading"], wheel)
+    batch.reset()
+    batch.set("sample_period", [0.01, 0.02, 0.05])
+    batch.start()
+    table = np.full((3, 9, 5), 7.0)
+    assert batch.run(instants, ["reading", "reading"], wheel, into=table[:, :, 2:4]).base is table
+    assert table[:, :, 2:4].tobytes() == expected.tobytes()
+    assert (np.delete(table, [2, 3], axis=2) == 7.0).all()
+    for wrong in (table[:, :, :1], table[:, :, ::2][:, :, :2], table.astype(np.float32)[:, :, 2:4]):
+        with pytest.raises(BatchError, match="results go into doubles of shape"):
+            batch.run(instants + 1.0, ["reading", "reading"], wheel, into=wrong)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -216,6 +217,29 @@ def test_slopes_are_those_of_differences() -> None:
     np.testing.assert_allclose(slopes.of(alone, asked.space.named(at)), told[1:], rtol=1e-6)
     with pytest.raises(NoSlopesError, match="candidates are not run as members of a batch"):
         LikelihoodSlopes([], asked, LikelihoodCost("filter"))
+
+
+def test_members_are_stepped_in_parts_of_which_memory_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts of 5, the last one of 2: each member as alone; ten times as many need no more."""
+    outcome = drive_with_poor_guess().run()
+    monkeypatch.setattr("cosim.tuning.replays.BYTES", 5 * outcome.result.table.nbytes)
+    replays, cost = Replays(outcome, "filter"), LikelihoodCost("filter")
+    draws = np.random.default_rng(3).uniform(0.1, 1.0, 1200)
+    candidates = [{"filter.process_variance[1]": float(value)} for value in draws]
+
+    def costs(asked: list[dict[str, float]]) -> tuple[list[float], int]:
+        tracemalloc.start()
+        found = [cost.of(each) for each in replays.outcomes(asked) if isinstance(each, Outcome)]
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found, peak
+
+    few, _ = costs(candidates[:12])
+    assert few == [costs([candidate])[0][0] for candidate in candidates[:12]]
+    assert len(set(few)) == 12
+    _, small = costs(candidates[:120])
+    _, large = costs(candidates)
+    assert large < small + 100 * len(candidates)  # a number each, and its name
 
 
 class Twin(LikelihoodCost):
