@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from cosim.run.outcome import INTERRUPTED
@@ -55,44 +56,41 @@ def run_jobs(
     Raises:
         KeyboardInterrupt: a job was interrupted; it has been handed over. OutputError: the journal cannot be written.
     """
-    waiting: dict[int, int] = {}
-    done = 0
-    for number, job in enumerate(jobs):
-        entry = None if journal is None else journal.taken(job, lambda row, n=number: fits(n, row))  # type: ignore[misc]
-        if entry is None:
-            waiting[id(job)] = number
-            continue
-        done += 1
+    known = {} if journal is None else _known(jobs, journal, fits)
+    for number, entry in known.items():
         failure = None if entry["failure"] is None else Failure(entry["failure"])
-        yield Done(number, job, entry["row"], failure, entry["seconds"], resumed=True)
-    for job, ended in _tried(executor, [jobs[number] for number in waiting.values()]):
-        number = waiting[id(job)]
+        yield Done(number, jobs[number], entry["row"], failure, entry["seconds"], resumed=True)
+    numbers = {id(job): number for number, job in enumerate(jobs)}
+    waiting = [job for number, job in enumerate(jobs) if number not in known]
+    for done, (job, ended) in enumerate(_tried(executor, waiting), start=len(known) + 1):
+        number = numbers[id(job)]
         row = reduce(number, job, ended)
         if journal is not None:
             journal.add(job, row, ended.failure, ended.seconds)
-        done += 1
         yield Done(number, job, row, ended.failure, ended.seconds)
         if progress is not None:
             progress(done, len(jobs))
-        if interrupted(ended):  # who interrupts one of many means all of them
+        if _interrupted(ended):  # who interrupts one of many means all of them
             raise KeyboardInterrupt
+
+
+def _known(jobs: Sequence[Job], journal: Journal, fits: Callable[[int, Any], bool]) -> dict[int, dict[str, Any]]:
+    """Lines of the journal by the numbers of jobs that need not be done again."""
+    entries = {number: journal.taken(job, partial(fits, number)) for number, job in enumerate(jobs)}
+    return {number: entry for number, entry in entries.items() if entry is not None}
 
 
 def _tried(executor: Executor, jobs: Sequence[Job]) -> Iterator[tuple[Job, Ended]]:
     """Jobs with what they left; those that failed for a reason outside are done once more at the end."""
     again: list[Job] = []
     for job, ended in executor.each(jobs):
-        if ended.failure is not None and ended.failure.outside and not interrupted(ended):
+        if ended.failure is not None and ended.failure.outside and not _interrupted(ended):
             again.append(job)
         else:
             yield job, ended
     yield from executor.each(again)
 
 
-def interrupted(ended: Ended) -> bool:
-    """Whether somebody stopped it.
-
-    Args:
-        ended: what a job left.
-    """
+def _interrupted(ended: Ended) -> bool:
+    """Whether somebody stopped it."""
     return ended.failure is not None and ended.failure.reason == INTERRUPTED

@@ -157,7 +157,7 @@ def seed_study(
         resume=resume,
         retry=retry,
         scheduler=scheduler,
-        measures=seed_measures,
+        measures=_seed_measures,
     )
     rows = [SeedRow(run.settings["seed"], _errors(run.measures), run.failure) for run in result.runs]
     if all(row.failure is not None for row in rows):
@@ -165,7 +165,7 @@ def seed_study(
     return SeedStudy(report_spec(scenario.table()), rows)
 
 
-def seed_measures(outcome: Outcome) -> dict[str, float]:
+def _seed_measures(outcome: Outcome) -> dict[str, float]:
     """The measures of a sweep, and for each observer and phase ``observer.phase.speed_error_max`` [m/s]; none for a
     phase that the run did not reach.
 
