@@ -84,7 +84,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """What the search found, as it is written in the folder.
+    """What the search that the options ask for has found, as it is written in the folder.
 
     Raises:
         CosimError: nothing can be tuned.
