@@ -157,9 +157,6 @@ def calibrate(
         noise: standard deviations of the measured signals by name; what is left out is estimated from the residuals.
         level: probability with which an interval covers, between 0 and 1.
 
-    Returns:
-        The calibration.
-
     Raises:
         CalibrationError: a parameter changes nothing that was measured, the model gives no numbers, or too few samples.
     """
@@ -171,23 +168,27 @@ def calibrate(
         raise CalibrationError(
             f"{np.isfinite(measured).sum()} measured values for {len(names)} parameters; expected more of them."
         )
-    limits = [runs.bounds.get(name, (-np.inf, np.inf)) for name in names]
-    low, high = np.array(limits).T
-    found = _fit(runs, recorded, start, measured, noise=_deviations(noise, recorded), low=low, high=high)
+    bounds = np.array([runs.bounds.get(name, (-np.inf, np.inf)) for name in names]).T
+    found = _fit(runs, recorded, start, measured, noise=_deviations(noise, recorded), low=bounds[0], high=bounds[1])
     _demand_effects(found, names, recorded)
-    units = {name: runs.unit(name) for name in names}
-    known = {name: recorded.units.get(name, "1") for name in recorded.measured}
-    known = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in known.items()}
-    recorded = replace(recorded, units=known)  # a table without units has those of the model
+    return _calibration(runs, start, found, recorded, level, bounds)
+
+
+def _calibration(
+    runs: Runs, start: Mapping[str, float], found: Fit, recorded: RecordedSignals, level: float, bounds: Array
+) -> Calibration:
+    """What a fit shows; signals of a table without units have those of the model."""
+    names, units = tuple(start), {name: recorded.units.get(name, "1") for name in recorded.measured}
+    units = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in units.items()}
     return Calibration(
         names,
-        units,
+        {name: runs.unit(name) for name in names},
         dict(start),
         found,
-        recorded,
+        replace(recorded, units=units),
         level,
         tuple(runs.hidden(found, names, recorded, level)),
-        (*runs.remarks(found, names, recorded), *_remarks(found, names, recorded, low, high)),
+        (*runs.remarks(found, names, recorded), *_remarks(found, names, recorded, *bounds)),
         runs.parameter_lines(dict(zip(names, found.parameters.tolist(), strict=True))),
     )
 

@@ -88,9 +88,6 @@ def sort_columns(
         outputs: units by the names of the signals that the model has. inputs: that it takes.
         selection: what is used. discrete: inputs that are no continuous ones.
 
-    Returns:
-        The columns.
-
     Raises:
         CalibrationError: a signal was not recorded, or nothing is in the part.
     """
@@ -99,17 +96,18 @@ def sort_columns(
     rows = _rows_of(recording.time, selection.begin, selection.end, source)
     driving, constants = _driving(list(units), source, inputs, selection.inputs)
     ends = _interval_ends(recording, driving, rows, said_of(selection.between, list(driving), source), discrete)
-
-    def sampled(names: Mapping[str, str]) -> dict[str, Array]:
-        return {name: np.asarray(recording[column], dtype=float)[rows.first] for name, column in names.items()}
-
     return RecordedSignals(
         recording.time[rows.first],
-        sampled(chosen),
-        sampled(driving) | {name: np.full(len(rows.first), value) for name, value in constants.items()},
+        _sampled(recording, chosen, rows),
+        _sampled(recording, driving, rows) | {name: np.full(len(rows.first), v) for name, v in constants.items()},
         {name: units[column] for name, column in chosen.items()},
         ends,
     )
+
+
+def _sampled(recording: Result, columns: Mapping[str, str], rows: _Rows) -> dict[str, Array]:
+    """Values of columns at the instants, by the names of the model."""
+    return {name: np.asarray(recording[column], dtype=float)[rows.first] for name, column in columns.items()}
 
 
 def _driving(

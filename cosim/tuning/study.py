@@ -90,8 +90,7 @@ class Study:
             start=self.asked.start,
             best=self.asked.start if better is None else better,
             runs=self.evaluator.runs,
-            how=("as members of a batch over the inputs of the observer" if self.evaluator.replayed else how)
-            + gradients,
+            how=(_REPLAYED if self.evaluator.replayed else how) + gradients,
             warnings=[*remarks, *self._warnings(shown, at_best)],
             fixed=why,
             interrupted=interrupted,
