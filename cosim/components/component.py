@@ -18,7 +18,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from cosim.components.described import DescribedComponent
 from cosim.components.start_values import StartValue
 from cosim.components.surroundings import Surroundings
-from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
+from cosim.diagnostics.call_statistics import CallStatistics, count_methods
 from cosim.diagnostics.messages import LogChoice, MessageLog
 from cosim.errors import CouplingError, RunError, nearest
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
@@ -185,7 +185,7 @@ class Component(_DifferentiableComponent):
         # says where it stands [s] while somebody else than Python steps it
         self.clock: Callable[[], float] | None = None
         self.log: _LogSwitch | None = None
-        self.call_statistics = new_call_statistics()
+        self.call_statistics = _new_call_statistics()
         self.trespasses: dict[str, str] = {}
         self._numbers, self._call_numbers = LAST_CALL.numbers(name), dict[str, int]()
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
@@ -361,3 +361,11 @@ class Component(_DifferentiableComponent):
 
     def explained(self, what: str, error: Exception, t: float | None = None) -> Exception:  # noqa: D102 - see Instance
         return error if isinstance(error, RunError) else super().explained(what, error, t)
+
+
+_KINDS = ("get", "set", "event", "save", "restore", "release")
+
+
+def _new_call_statistics() -> dict[str, CallStatistics]:
+    """Tallies of a component that has not been called yet."""
+    return {kind: CallStatistics() for kind in _KINDS}

@@ -57,23 +57,6 @@ def held_signals(
     return frozenset(c.source_variable for c in connections if holds(c))
 
 
-def settle_recordings(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
-    """Columns of tables of which nobody said whether they are held: they are where a target of theirs is discrete.
-
-    Args:
-        components: by name. connections: checked.
-
-    Raises:
-        CouplingError: a column that is said to run on lines has a discrete target.
-    """
-    for c in connections:
-        source = components.get(c.source[0])
-        if isinstance(source, RecordingComponent):
-            target = components[c.target[0]].variables[c.target[1]]
-            flows = is_continuous(target) and not c.table
-            source.connected(c.source[1], flows=flows, target=".".join(c.target))
-
-
 def recorded_order(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[tuple[str, str]]:
     """Pairs (source, target) of connections that were fresh in a run a part of which is played back: without that part
     there are fewer loops, and another order would make other signals held.

@@ -25,43 +25,6 @@ that do.
 """
 
 
-def non_numeric_cells(connections: Sequence[Connection]) -> tuple[Cells, dict[Node, int]]:
-    """The array of objects, shape (2 * number of exact sources,), and where each source is in it.
-
-    Args:
-        connections: of the run.
-    """
-    sources = list(dict.fromkeys(c.source for c in connections if c.exact))
-    return np.empty(2 * len(sources), dtype=object), {source: i for i, source in enumerate(sources)}
-
-
-def with_non_numeric(
-    read_numbers: Callable[[], None], component: Component, places: Mapping[Node, int], cells: Cells
-) -> Callable[[], None]:
-    """A call that reads a component's numbers, and its exact sources into the cells where it has any.
-
-    Args:
-        read_numbers: reads the numeric outputs. places: column of each signal in the row of values.
-    """
-    wanted: dict[str, list[tuple[int, int]]] = {}
-    for (owner, name), place in places.items():
-        if owner == component.name:
-            element = component.variables.element(name)
-            wanted.setdefault(element.variable.name, []).append((element.index or 0, place))
-    if not wanted:
-        return read_numbers
-    reads = [(component.exact_reader(name), entries) for name, entries in wanted.items()]
-
-    def read() -> None:
-        read_numbers()
-        for call, entries in reads:
-            values = call()
-            for index, place in entries:
-                cells[place] = values[index]
-
-    return read
-
-
 def non_numeric_inputs(
     component: Component, connections: Sequence[Connection], places: Mapping[Node, int], cells: Cells
 ) -> NonNumericInputs | None:

@@ -18,7 +18,7 @@ from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.inputs import connected_inputs
 from cosim.coupling.instants import Signal
-from cosim.coupling.non_numeric import non_numeric_cells, non_numeric_inputs, with_non_numeric
+from cosim.coupling.non_numeric import Cells, Node, non_numeric_inputs
 from cosim.coupling.planned import PlannedComponent, PlannedInterpolator
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
@@ -153,7 +153,7 @@ def make_plan(
         CouplingError: a variable to record does not exist or is not a number.
     """
     connections = _in_order(connections, components, order)
-    cells, places = non_numeric_cells(connections)
+    cells, places = _non_numeric_cells(connections)
     hidden = local_sources(connections, components)
     read = [(components[n], _names_to_read(components[n], (extra or {}).get(n, ()), hidden.get(n, ()))) for n in order]
     signals, columns, spans = _layout([*read, *([(still, still.names("output"))] if still is not None else [])])
@@ -164,7 +164,7 @@ def make_plan(
     steps = []
     for component, names in read:
         span = spans[component.name]
-        reader = with_non_numeric(component.reader(names, values[span]), component, places, cells)
+        reader = _with_non_numeric(component.reader(names, values[span]), component, places, cells)
         non_numeric = non_numeric_inputs(component, connections, places, cells)
         inputs = connected_inputs(component, connections, columns, twice, non_numeric)
         steps.append(PlannedComponent(component, values[span], reader, inputs, span, continuous[span]))
@@ -229,3 +229,32 @@ def _info(component: Component, name: str) -> SignalInfo:
         variable.description or "",
         component.can_be_missing(name),
     )
+
+
+def _with_non_numeric(
+    read_numbers: Callable[[], None], component: Component, places: Mapping[Node, int], cells: Cells
+) -> Callable[[], None]:
+    """A call that reads a component's numbers, and its exact sources into the cells where it has any."""
+    wanted: dict[str, list[tuple[int, int]]] = {}
+    for (owner, name), place in places.items():
+        if owner == component.name:
+            element = component.variables.element(name)
+            wanted.setdefault(element.variable.name, []).append((element.index or 0, place))
+    if not wanted:
+        return read_numbers
+    reads = [(component.exact_reader(name), entries) for name, entries in wanted.items()]
+
+    def read() -> None:
+        read_numbers()
+        for call, entries in reads:
+            values = call()
+            for index, place in entries:
+                cells[place] = values[index]
+
+    return read
+
+
+def _non_numeric_cells(connections: Sequence[Connection]) -> tuple[Cells, dict[Node, int]]:
+    """The array of objects, shape (2 * number of exact sources,), and where each source is in it."""
+    sources = list(dict.fromkeys(c.source for c in connections if c.exact))
+    return np.empty(2 * len(sources), dtype=object), {source: i for i, source in enumerate(sources)}

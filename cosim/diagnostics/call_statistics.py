@@ -14,7 +14,6 @@ from typing import Any
 from cosim.diagnostics.sampled_times import BINS, bin_of, typical_seconds
 
 EARLY, EVERY = 3, 64  # the third call is timed, the first ones are not like the others; then every 64th
-KINDS = ("get", "set", "event", "save", "restore", "release")
 _OF_METHOD = {
     "notify": "event",
     "handle_event": "event",
@@ -125,20 +124,3 @@ def count_methods(cls: type) -> None:
         method = getattr(cls, name, None)
         if callable(method) and not hasattr(method, "counted_as") and not hasattr(method, "__isabstractmethod__"):
             setattr(cls, name, counted(method, kind))
-
-
-def new_call_statistics() -> dict[str, CallStatistics]:
-    """Tallies of a component that has not been called yet."""
-    return {kind: CallStatistics() for kind in KINDS}
-
-
-def call_statistics_table(
-    steps: int, seconds: float, call_statistics: dict[str, CallStatistics]
-) -> dict[str, dict[str, float]]:
-    """Calls and seconds by kind, plain data; kinds that never occurred are left out.
-
-    Args:
-        steps: calls of doStep. seconds: in them [s]. call_statistics: of all other kinds.
-    """
-    table: dict[str, dict[str, float]] = {"doStep": {"calls": steps, "seconds": seconds}} if steps else {}
-    return table | {kind: {"calls": t.count, "seconds": t.seconds} for kind, t in call_statistics.items() if t.count}

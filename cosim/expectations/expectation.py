@@ -95,3 +95,31 @@ class LimitedExpectation(WindowExpectation):
         if self.max is None and self.rms is None:
             raise ValueError("give 'max', 'rms' or both")
         return self
+
+
+class IndicatorExpectation(Expectation):
+    """An expectation of an indicator, which is on above a threshold."""
+
+    signal: str
+    threshold: float | None = None
+
+    def prepare(self, before: Before) -> Self:
+        """The signal exists, and its threshold is known."""
+        checked = super().prepare(before)
+        before.unit(self.signal)
+        if self.threshold is not None:
+            return checked
+        return checked.model_copy(update={"threshold": before.threshold(self.signal)})
+
+
+class PairExpectation(WindowExpectation):
+    """An expectation of a signal beside another one of the same dimension."""
+
+    signal: str
+    reference: str
+
+    def prepare(self, before: Before) -> Self:
+        """Both signals exist, and have one dimension."""
+        super().prepare(before)
+        before.demand_same_dimension(self.signal, self.reference)
+        return self

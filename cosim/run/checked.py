@@ -6,15 +6,20 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 
+from cosim.master.algorithms.choose import choose_algorithm
 from cosim.run.balise_service import BaliseRoles, balise_roles
 from cosim.run.checked_observers import Certificates, check_observers
-from cosim.run.checked_tables import Stated, complete_tables, parse_tables
+from cosim.run.checked_tables import Stated, complete_tables
+from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled, couple
+from cosim.run.layouts import make_layout
 from cosim.run.loaded_components import LoadedComponents, load_components
 from cosim.run.network_remarks import network_warnings
 from cosim.run.remarks import Remarks
-from cosim.run.step_schedule import StepSchedule, make_schedule
+from cosim.run.step_schedule import StepSchedule, stepping_groups
 from cosim.run.task import RunTask
+from cosim.scenario.scenario_tables import MasterTable
+from cosim.scenario.schema import ScenarioTable
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks,
     Raises:
         CosimError: something in the scenario cannot be.
     """
-    stated = parse_tables(task, remarks)
+    stated = _parse_tables(task, remarks)
     loaded = load_components(task, building, remarks, resources)
     coupled = couple(task, stated.links, loaded.components)
     if coupled.network is not None:
@@ -54,6 +59,37 @@ def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks,
         remarks.warn(*network_warnings(coupled.network, task.table, loaded.components, task.where))
     balises = balise_roles(task.table.balises, loaded.components, task.where)
     task = complete_tables(task, coupled, balises, remarks)
-    schedule = make_schedule(task.table, coupled, balises)
+    schedule = _make_schedule(task.table, coupled, balises)
     certificates = check_observers(task, coupled, stated, balises.receivers, remarks)
     return Checked(task, stated, loaded, coupled, balises, schedule, certificates)
+
+
+def _parse_tables(task: RunTask, remarks: Remarks) -> Stated:
+    """What can be checked before a component is loaded."""
+    table = task.table
+    remarks.warn(*_idle_settings(table.master))
+    layout = None
+    if table.balises is not None:
+        layout = make_layout(table.balises, table.start, table.stop, task.folder, task.where)
+    return Stated(layout, parse_connections(table.connections, task.where))
+
+
+def _idle_settings(table: MasterTable) -> list[str]:
+    """What the user set that has no effect beside the other settings, in words."""
+    needs = {
+        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
+        "tolerance": ("control", "doubling", table.control == "doubling"),
+        "smallest_step": ("control", "doubling", table.control == "doubling"),
+    }
+    return [
+        f"master.{key} has no effect without master.{other} = '{value}'."
+        for key, (other, value, works) in needs.items()
+        if key in table.model_fields_set and not works
+    ]
+
+
+def _make_schedule(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles) -> StepSchedule:
+    """Algorithm and order of a scenario."""
+    groups = stepping_groups(table, coupled, balises)
+    choice = choose_algorithm(table.master.algorithm, groups, coupled.components)
+    return StepSchedule(choice, [name for group in groups for name in group.names])

@@ -13,13 +13,11 @@ from cosim.coupling.connection import Link
 from cosim.errors import CosimError, ScenarioError
 from cosim.expectations.before import Before
 from cosim.run.balise_service import BaliseRoles
-from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled
-from cosim.run.layouts import Layout, make_layout
+from cosim.run.layouts import Layout
 from cosim.run.remarks import Remarks
 from cosim.run.signal_roles import check_roles, inferred_roles
 from cosim.run.task import RunTask
-from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
 from plant_models.explained_error import explained
 
@@ -81,23 +79,6 @@ class Stated:
     links: Sequence[Link]
 
 
-def parse_tables(task: RunTask, remarks: Remarks) -> Stated:
-    """What can be checked before a component is loaded.
-
-    Args:
-        task: of the run. remarks: of the run.
-
-    Raises:
-        ScenarioError: a layout or a connection that cannot be.
-    """
-    table = task.table
-    remarks.warn(*_idle_settings(table.master))
-    layout = None
-    if table.balises is not None:
-        layout = make_layout(table.balises, table.start, table.stop, task.folder, task.where)
-    return Stated(layout, parse_connections(table.connections, task.where))
-
-
 def complete_tables(task: RunTask, coupled: Coupled, balises: BaliseRoles, remarks: Remarks) -> RunTask:
     """Check roles and expectations against the components, and fill in what was left open.
 
@@ -123,17 +104,3 @@ def complete_tables(task: RunTask, coupled: Coupled, balises: BaliseRoles, remar
 def _with_roles(table: ScenarioTable, roles: Mapping[str, str]) -> ScenarioTable:
     """The scenario whose report has these roles too."""
     return table.model_copy(update={"report": table.report.model_copy(update=dict(roles))}) if roles else table
-
-
-def _idle_settings(table: MasterTable) -> list[str]:
-    """What the user set that has no effect beside the other settings, in words."""
-    needs = {
-        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
-        "tolerance": ("control", "doubling", table.control == "doubling"),
-        "smallest_step": ("control", "doubling", table.control == "doubling"),
-    }
-    return [
-        f"master.{key} has no effect without master.{other} = '{value}'."
-        for key, (other, value, works) in needs.items()
-        if key in table.model_fields_set and not works
-    ]

@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cosim.components.component import Component
+from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import ClockConnection, connect_clocks
 from cosim.coupling.connection import Connection, Link, connect
-from cosim.coupling.instants import settle_recordings
-from cosim.coupling.plan import Plan, make_plan
+from cosim.coupling.instants import is_continuous
 from cosim.network.outputs import NAME as NETWORK
 from cosim.run.network import Network, make_network
 from cosim.run.network_connections import connect_over
-from cosim.run.signal_roles import ROLES
 from cosim.run.task import RunTask
-from cosim.scenario.schema import ScenarioTable
 from plant_models.hybrid.units import Unit
 
 
@@ -69,35 +67,15 @@ def couple(task: RunTask, links: Sequence[Link], components: Mapping[str, Compon
         connections = routed = connect(pairs, components)
     else:
         network, connections, routed = connect_over(network, task.table, pairs, components, task.where)
-    settle_recordings(components, routed)
+    _settle_recordings(components, routed)
     return Coupled(components, connections, routed, clocks, network)
 
 
-def plan_run(table: ScenarioTable, coupled: Coupled, order: Sequence[str]) -> Plan:
-    """The plan of a run; the components must be instantiated.
-
-    Args:
-        table: the scenario, with its roles. coupled: its components and connections. order: of execution.
-
-    Raises:
-        CouplingError: a variable to record does not exist or is not a number.
-    """
-    recorded, network = _signals_to_record(table), coupled.network
-    if network is not None:
-        for name, signals in network.hidden(coupled.components).items():
-            recorded[name] += [signal for signal in signals if signal not in recorded[name]]
-    outputs = None if network is None else network.outputs
-    return make_plan(coupled.sources, coupled.routed, order, recorded, coupled.clocks, outputs)
-
-
-def _signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
-    """What is recorded besides the outputs, by component: what its table, balises, report and expectations name."""
-    record = {name: list(component.record) for name, component in table.components.items()}
-    used = [getattr(table.report, role) for role in ROLES]
-    used += [] if table.balises is None else [table.balises.position, table.balises.speed, table.balises.odometer]
-    used += [getattr(item, key, None) for item in table.expect for key in ("signal", "reference")]
-    for name in filter(None, used):
-        component, _, signal = name.partition(".")
-        if component in record and signal not in record[component]:
-            record[component].append(signal)
-    return record
+def _settle_recordings(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
+    """Columns of tables of which nobody said whether they are held: they are where a target of theirs is discrete."""
+    for c in connections:
+        source = components.get(c.source[0])
+        if isinstance(source, RecordingComponent):
+            target = components[c.target[0]].variables[c.target[1]]
+            flows = is_continuous(target) and not c.table
+            source.connected(c.source[1], flows=flows, target=".".join(c.target))

@@ -14,14 +14,9 @@ from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
 from cosim.components.description import read_description
-from cosim.components.fmi3 import FMI3Component
-from cosim.components.logged_slave import log_calls
 from cosim.components.start_values import StartValue, start_values
-from cosim.coupling.instants import followed
-from cosim.diagnostics.call_log import CallLog
 from cosim.errors import CouplingError, ScenarioError
 from cosim.run.component_models import LATE_PARAMETERS, component_factories
-from cosim.run.coupled import Coupled
 from cosim.run.remarks import Remarks
 from cosim.run.run_seeds import component_seed
 from cosim.run.task import RunTask
@@ -124,32 +119,6 @@ def _remark(component: Component, remarks: Remarks) -> None:
     doubled = doubled_names(component.description)
     if doubled is not None and not any(doubled in reported for reported in remarks.warnings):
         remarks.warn(f"{component.name}: {doubled}")
-
-
-def instantiate_components(
-    table: ScenarioTable, coupled: Coupled, starts: Mapping[str, Mapping[str, StartValue]], call_log: CallLog | None
-) -> None:
-    """Instantiate the components, and set their start values.
-
-    Args:
-        table: the scenario. coupled: its components and connections. starts: values by component and name.
-        call_log: where calls are logged; None for nowhere.
-
-    Raises:
-        CosimError: a component cannot be instantiated, or refuses a value.
-    """
-    moving = followed(coupled.components, coupled.connections)
-    every = table.master.inputs != "hold"
-    for name, component in coupled.components.items():
-        if isinstance(component, FMI3Component):
-            own = [c for c in coupled.connections if c.target[0] == name and (every or c.source_variable in moving)]
-            component.request_intermediate_updates([c.target[1] for c in own])
-        component.choose_log(table.components[name].log)
-        if call_log is not None:
-            log_calls(component, call_log)
-        component.instantiate()
-        for parameter, value in starts[name].items():
-            component.set_start(parameter, value)
 
 
 def _free(components: Mapping[str, Component]) -> None:

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from cosim.components.component import Component
+from cosim.components.fmi3 import FMI3Component
+from cosim.components.logged_slave import log_calls
 from cosim.components.recording import RecordingComponent
-from cosim.coupling.plan import Plan
+from cosim.components.start_values import StartValue
+from cosim.coupling.instants import followed
+from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from cosim.results.stream import Stream
 from cosim.run.checked import Checked
-from cosim.run.coupled import Coupled, plan_run
+from cosim.run.coupled import Coupled
 from cosim.run.coupling_warnings import coupling_warnings
-from cosim.run.loaded_components import instantiate_components
-from cosim.run.master_setup import make_master
+from cosim.run.master_setup import make_master, make_recorder
 from cosim.run.remarks import Remarks
 from cosim.run.services import Services, make_services
-from cosim.run.streaming import Streaming, begin_stream
+from cosim.run.signal_roles import ROLES, report_spec
+from cosim.run.streaming import Streaming
+from cosim.run.summary import first_summary
 from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import ComponentTable
+from cosim.scenario.schema import ScenarioTable
 
 Progress = Callable[[float, float], None]
 
@@ -71,14 +77,14 @@ def make_ready(
         CosimError: a component cannot be instantiated, or cannot do what is asked for.
     """
     table = checked.task.table
-    instantiate_components(table, checked.coupled, checked.loaded.starts, call_log)
-    plan = plan_run(table, checked.coupled, checked.schedule.order)
+    _instantiate_components(table, checked.coupled, checked.loaded.starts, call_log)
+    plan = _plan_run(table, checked.coupled, checked.schedule.order)
     resources.callback(close, plan)
     _remark_coupling(checked, plan, remarks)
     services = make_services(checked, plan, remarks)
     master = make_master(checked.task, plan, services, checked.schedule.algorithm, progress)
     remarks.note(*_master_notes(master))
-    stream = None if streaming is None else begin_stream(streaming, checked, services, master, remarks)
+    stream = None if streaming is None else _begin_stream(streaming, checked, services, master, remarks)
     return Ready(checked, services, master, stream)
 
 
@@ -137,3 +143,61 @@ def _recording_notes(components: Mapping[str, Component], tables: Mapping[str, C
         if said:
             notes.append(f"{name}: {'; '.join(said)}. Where that is wrong say so by 'interpolation'.")
     return notes
+
+
+def _plan_run(table: ScenarioTable, coupled: Coupled, order: Sequence[str]) -> Plan:
+    """The plan of a run; the components must be instantiated."""
+    recorded, network = _signals_to_record(table), coupled.network
+    if network is not None:
+        for name, signals in network.hidden(coupled.components).items():
+            recorded[name] += [signal for signal in signals if signal not in recorded[name]]
+    outputs = None if network is None else network.outputs
+    return make_plan(coupled.sources, coupled.routed, order, recorded, coupled.clocks, outputs)
+
+
+def _signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
+    """What is recorded besides the outputs, by component: what its table, balises, report and expectations name."""
+    record = {name: list(component.record) for name, component in table.components.items()}
+    used = [getattr(table.report, role) for role in ROLES]
+    used += [] if table.balises is None else [table.balises.position, table.balises.speed, table.balises.odometer]
+    used += [getattr(item, key, None) for item in table.expect for key in ("signal", "reference")]
+    for name in filter(None, used):
+        component, _, signal = name.partition(".")
+        if component in record and signal not in record[component]:
+            record[component].append(signal)
+    return record
+
+
+def _instantiate_components(
+    table: ScenarioTable, coupled: Coupled, starts: Mapping[str, Mapping[str, StartValue]], call_log: CallLog | None
+) -> None:
+    """Instantiate the components, and set their start values."""
+    moving = followed(coupled.components, coupled.connections)
+    every = table.master.inputs != "hold"
+    for name, component in coupled.components.items():
+        if isinstance(component, FMI3Component):
+            own = [c for c in coupled.connections if c.target[0] == name and (every or c.source_variable in moving)]
+            component.request_intermediate_updates([c.target[1] for c in own])
+        component.choose_log(table.components[name].log)
+        if call_log is not None:
+            log_calls(component, call_log)
+        component.instantiate()
+        for parameter, value in starts[name].items():
+            component.set_start(parameter, value)
+
+
+def _begin_stream(
+    streaming: Streaming, checked: Checked, services: Services, master: Master, remarks: Remarks
+) -> Stream:
+    """From here on what is recorded, delivered and logged is in the folder as well."""
+    table, signals = checked.task.table, master.plan.signals
+    summary = first_summary(checked.task, master.plan) | {"report": asdict(report_spec(table))}
+    summary |= {"certificates": checked.certificates, "warnings": remarks.warnings, "notes": remarks.notes}
+    events = [] if services.balises is None else services.balises.mailbox.log
+    logs = [component.messages for component in checked.coupled.components.values()]
+    folder, begun = streaming
+    packets = None if services.packets is None else services.packets.settled
+    stream = Stream(folder, signals, checked.coupled.unit, summary, lambda: events, logs, packets)
+    master.recorder = make_recorder(table, signals, 0, stream)
+    begun()
+    return stream

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from cosim.coupling.graph import Group, execution_groups
 from cosim.coupling.instants import recorded_order
 from cosim.coupling.strong import topological
-from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
+from cosim.master.algorithms.choose import AlgorithmChoice
 from cosim.run.balise_service import BaliseRoles
 from cosim.run.coupled import Coupled
 from cosim.scenario.schema import ScenarioTable
@@ -24,20 +24,6 @@ class StepSchedule:
 
     algorithm: AlgorithmChoice
     order: Sequence[str]
-
-
-def make_schedule(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles) -> StepSchedule:
-    """Algorithm and order of a scenario.
-
-    Args:
-        table: the scenario. coupled: its components and connections. balises: who has to do with them.
-
-    Raises:
-        CouplingError: as for `execution_groups`; the algorithm cannot step these components.
-    """
-    groups = stepping_groups(table, coupled, balises)
-    choice = choose_algorithm(table.master.algorithm, groups, coupled.components)
-    return StepSchedule(choice, [name for group in groups for name in group.names])
 
 
 def stepping_groups(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles) -> list[Group]:

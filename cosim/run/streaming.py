@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.errors import OutputError
 from cosim.results.results_folder import check_writable
-from cosim.results.stream import Stream
 from cosim.run.made_from import renewed
-from cosim.run.master_setup import make_recorder
-from cosim.run.signal_roles import report_spec
-from cosim.run.summary import first_summary
 
 if TYPE_CHECKING:
-    from cosim.master.master import Master
-    from cosim.run.checked import Checked
     from cosim.run.outcome import Outcome
-    from cosim.run.remarks import Remarks
-    from cosim.run.services import Services
     from cosim.scenario.origin import Origin
 
 Streaming = tuple[Path, Callable[[], None]]
@@ -53,31 +45,6 @@ def where_to(
         folder = Path(stream).absolute()  # an FMU may change the working directory
         return folder, _streaming_to(folder, origin)
     return None, None if spare is None else (Path(spare).absolute(), lambda: None)
-
-
-def begin_stream(
-    streaming: Streaming, checked: Checked, services: Services, master: Master, remarks: Remarks
-) -> Stream:
-    """From here on what is recorded, delivered and logged is in the folder as well.
-
-    Args:
-        streaming: folder, and what is called then. checked: task and components. services: of the run.
-        master: whose recorder is exchanged. remarks: of the run so far.
-
-    Raises:
-        OutputError: the folder cannot be written.
-    """
-    table, signals = checked.task.table, master.plan.signals
-    summary = first_summary(checked.task, master.plan) | {"report": asdict(report_spec(table))}
-    summary |= {"certificates": checked.certificates, "warnings": remarks.warnings, "notes": remarks.notes}
-    events = [] if services.balises is None else services.balises.mailbox.log
-    logs = [component.messages for component in checked.coupled.components.values()]
-    folder, begun = streaming
-    packets = None if services.packets is None else services.packets.settled
-    stream = Stream(folder, signals, checked.coupled.unit, summary, lambda: events, logs, packets)
-    master.recorder = make_recorder(table, signals, 0, stream)
-    begun()
-    return stream
 
 
 def ending(

@@ -9,7 +9,7 @@ from typing import Any
 from cosim.components.component import Component
 from cosim.components.start_values import StartValue
 from cosim.coupling.plan import Plan
-from cosim.diagnostics.call_statistics import call_statistics_table
+from cosim.diagnostics.call_statistics import CallStatistics
 from cosim.evaluation.balise_gaps import gap_errors
 from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.fault_detection import fault_detection
@@ -93,7 +93,7 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "source": component.source,
         "calls": component.calls,
         "seconds": component.seconds,
-        "cost": call_statistics_table(component.calls, component.seconds, component.call_statistics),
+        "cost": _call_statistics_table(component.calls, component.seconds, component.call_statistics),
         "messages": [message.text for message in component.messages.kept()[-MESSAGES_SHOWN:]],
         "message_counts": dict(component.messages.counts),
         "events": None if outcomes is None and not missed else {**(outcomes or {}), **missed},
@@ -121,3 +121,15 @@ def judged_summary(result: Result, spec: ReportSpec) -> dict[str, Any]:
     if filters := filter_consistency(result, spec):
         found["consistency"] = [one.to_data() for one in filters]
     return found
+
+
+def _call_statistics_table(
+    steps: int, seconds: float, call_statistics: dict[str, CallStatistics]
+) -> dict[str, dict[str, float]]:
+    """Calls and seconds by kind, plain data; kinds that never occurred are left out.
+
+    Args:
+        steps: calls of doStep. seconds: in them [s]. call_statistics: of all other kinds.
+    """
+    table: dict[str, dict[str, float]] = {"doStep": {"calls": steps, "seconds": seconds}} if steps else {}
+    return table | {kind: {"calls": t.count, "seconds": t.seconds} for kind, t in call_statistics.items() if t.count}

@@ -34,25 +34,6 @@ def forward_curves(points: Sequence[tuple[float, float]]) -> list[Curve]:
     return pieces
 
 
-def back_curve(points: Sequence[tuple[float, float]]) -> Curve:
-    """Along right angles with rounded corners.
-
-    Args:
-        points: corners of the wire in the figure.
-    """
-    vertices, codes = [points[0]], [Curve.MOVETO]
-    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
-        vertices += [_towards(corner, before), corner, _towards(corner, after)]
-        codes += [Curve.LINETO, Curve.CURVE3, Curve.CURVE3]
-    return Curve([*vertices, points[-1]], [*codes, Curve.LINETO])
-
-
-def _towards(corner: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
-    length = abs(other[0] - corner[0]) + abs(other[1] - corner[1])
-    share = min(CORNER, length / 2) / length if length else 0.0
-    return corner[0] + share * (other[0] - corner[0]), corner[1] + share * (other[1] - corner[1])
-
-
 @dataclass(frozen=True)
 class Size:
     """What a box must hold.

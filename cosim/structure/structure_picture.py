@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.patches import Circle, FancyBboxPatch, PathPatch, Polygon
+from matplotlib.path import Path as Curve
 from matplotlib.textpath import TextPath
 
 from cosim.drawing.style import (
@@ -40,7 +41,7 @@ from cosim.drawing.style import (
 )
 from cosim.errors import OutputError
 from cosim.structure.picture_layout import EVENT_PORT, lay_out
-from cosim.structure.shapes import CORNER, FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire, back_curve, forward_curves
+from cosim.structure.shapes import CORNER, FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire, forward_curves
 
 if TYPE_CHECKING:
     from cosim.structure.structure_data import Link, Part, StructureData
@@ -292,7 +293,7 @@ def _draw_feedthrough(ax: Axes, structure: StructureData, part: Part, box: Box) 
 def _draw_wire(ax: Axes, wire: Wire, drawn: set[object]) -> None:
     """Draw what another wire from the same output has not drawn already: dashes laid over one another look solid."""
     kind = wire.edge.kind
-    pieces = [back_curve(wire.points)] if wire.back else forward_curves(wire.points)
+    pieces = [_back_curve(wire.points)] if wire.back else forward_curves(wire.points)
     style = (0, (4, 2)) if kind == "event" else "-"
     width = 1.9 if kind == "loop" else 1.2
     for piece in pieces:
@@ -350,3 +351,18 @@ def _draw_key(ax: Axes, kinds: Sequence[str], x: float, y: float) -> None:
 def _plain(text: str) -> str:
     """A text that matplotlib does not take for mathematics."""
     return text.replace("$", r"\$")
+
+
+def _back_curve(points: Sequence[tuple[float, float]]) -> Curve:
+    """Along right angles with rounded corners."""
+    vertices, codes = [points[0]], [Curve.MOVETO]
+    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
+        vertices += [_towards(corner, before), corner, _towards(corner, after)]
+        codes += [Curve.LINETO, Curve.CURVE3, Curve.CURVE3]
+    return Curve([*vertices, points[-1]], [*codes, Curve.LINETO])
+
+
+def _towards(corner: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    length = abs(other[0] - corner[0]) + abs(other[1] - corner[1])
+    share = min(CORNER, length / 2) / length if length else 0.0
+    return corner[0] + share * (other[0] - corner[0]), corner[1] + share * (other[1] - corner[1])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Self
 import numpy as np
 
 from cosim.errors import ScenarioError
-from cosim.expectations.expectation import WindowExpectation
+from cosim.expectations.expectation import PairExpectation
 from cosim.expectations.judged import Judged, at, with_unit
 from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import bounded, difference
@@ -22,18 +22,15 @@ AS_PRINTED = "_as_printed"
 """How outputs end that show what a source prints, and bound nothing."""
 
 
-class BoundExpectation(WindowExpectation):
+class BoundExpectation(PairExpectation):
     """The error of a signal never exceeds a bound that another signal tells."""
 
     check: Literal["bound"]
-    signal: str
-    reference: str
     bound: str
 
     def prepare(self, before: Before) -> Self:
         """The three signals exist, and have one dimension."""
         super().prepare(before)
-        before.demand_same_dimension(self.signal, self.reference)
         before.demand_same_dimension(self.signal, self.bound)
         if self.bound.endswith(AS_PRINTED):
             raise ScenarioError(

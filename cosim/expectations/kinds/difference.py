@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Literal
 
-from cosim.expectations.expectation import LimitedExpectation
+from cosim.expectations.expectation import LimitedExpectation, PairExpectation
 from cosim.expectations.judged import Judged
 from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import difference, judge_sizes
 
-if TYPE_CHECKING:
-    from cosim.expectations.before import Before
 
-
-class DifferenceExpectation(LimitedExpectation):
+class DifferenceExpectation(PairExpectation, LimitedExpectation):
     """Two signals stay close to each other."""
 
     check: Literal["difference"]
-    signal: str
-    reference: str
-
-    def prepare(self, before: Before) -> Self:
-        """Both signals exist, and have one dimension."""
-        super().prepare(before)
-        before.demand_same_dimension(self.signal, self.reference)
-        return self
 
     def judge(self, run: JudgedRun) -> list[Judged]:
         """One signal minus another."""

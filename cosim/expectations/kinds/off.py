@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 
-from cosim.expectations.expectation import WindowExpectation
+from cosim.expectations.expectation import IndicatorExpectation, WindowExpectation
 from cosim.expectations.indicator_levels import held, threshold_of
 from cosim.expectations.judged import Judged, at, given
 from cosim.expectations.judged_run import JudgedRun, span
 
-if TYPE_CHECKING:
-    from cosim.expectations.before import Before
 
-
-class OffExpectation(WindowExpectation):
+class OffExpectation(IndicatorExpectation, WindowExpectation):
     """An indicator never goes on."""
 
     check: Literal["off"]
-    signal: str
-    threshold: float | None = None
-
-    def prepare(self, before: Before) -> Self:
-        """The signal exists, and its threshold is known."""
-        super().prepare(before)
-        before.unit(self.signal)
-        if self.threshold is not None:
-            return self
-        return self.model_copy(update={"threshold": before.threshold(self.signal)})
 
     def judge(self, run: JudgedRun) -> list[Judged]:
         """Never on within the window."""

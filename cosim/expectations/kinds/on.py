@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cosim.expectations.expectation import Expectation
+from cosim.expectations.expectation import IndicatorExpectation
 from cosim.expectations.indicator_levels import ROUNDING, first_on, threshold_of
 from cosim.expectations.judged import Judged, given
 from cosim.expectations.judged_run import JudgedRun, span
@@ -15,16 +15,14 @@ if TYPE_CHECKING:
     from cosim.expectations.before import Before
 
 
-class OnExpectation(Expectation):
+class OnExpectation(IndicatorExpectation):
     """An indicator is on at a time at the latest, from the start of the window on; one that is on there already is on
     in time.
     """
 
     check: Literal["on"]
-    signal: str
     start: float | None = Field(default=None, alias="from")
     before: float
-    threshold: float | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> OnExpectation:
@@ -33,13 +31,10 @@ class OnExpectation(Expectation):
         return self
 
     def prepare(self, before: Before) -> Self:
-        """The signal exists, and its threshold is known."""
+        """The instants lie within the run, the signal exists, and its threshold is known."""
         before.demand_within("from", self.start)
         before.demand_within("before", self.before)
-        before.unit(self.signal)
-        if self.threshold is not None:
-            return self
-        return self.model_copy(update={"threshold": before.threshold(self.signal)})
+        return super().prepare(before)
 
     def judge(self, run: JudgedRun) -> list[Judged]:
         """On at `before` at the latest; an indicator that is on when the window begins is on in time."""
