@@ -7,40 +7,20 @@ The printed bounds are correct and far too small to design with: they are here s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
 import scipy
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.finding import Finding, as_printed
 from fmu_observer.certificates.gap_finding import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import HighGainBounds, high_gain_bounds
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.models.observer_model import shift_matrix
 
 _SHAPE = (2.0, 1.0)  # K of the train observers, Bouchama 2024, (3.29)
-_THETAS = (1.0, 2.0, 4.0, 5.0, 8.0)  # [1/s], those of the table
-
-
-@dataclass(frozen=True)
-class DesignBoundRow:
-    """One line of the table of bounds: the longest gap each formula allows at one gain.
-
-    Attributes:
-        theta: high gain [1/s]. by_1_52, by_3_32, by_3_67, by_3_87: longest gap by that formula [s]; negative where the
-            gain is too small for the formula.
-        constant: first unstable constant gap, exact [s]. aperiodic: longest gap certified for every mixture of gaps
-        [s].
-    """
-
-    theta: float
-    by_1_52: float
-    by_3_32: float
-    by_3_67: float
-    by_3_87: float
-    constant: float
-    aperiodic: float
 
 
 def lipschitz_constant(mass: float, davis_b: float, davis_c: float, top_speed: float) -> float:
@@ -97,7 +77,7 @@ def smallest_theta_3_31(lipschitz: float) -> float:
 
 
 def longest_gap_3_32(theta: float, lipschitz: float) -> float:
-    """``(theta - 2 beta/theta) / (2 sqrt(5) theta^2 sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.32).
+    """``(theta - 2 beta/theta) / (2 sqrt(5) theta^2 sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.32), (3.87).
 
     The eigenvalues are those of `gain_matrix`, and ``sqrt(5) = |K|`` of K = (2, 1). Negative below
     `smallest_theta_3_31`.
@@ -105,7 +85,7 @@ def longest_gap_3_32(theta: float, lipschitz: float) -> float:
     Args:
         theta: high gain [1/s]. lipschitz: beta [1/s].
     """
-    return longest_gap_3_87(theta, lipschitz)
+    return (theta - 2.0 * lipschitz / theta) / (2.0 * theta**2 * _gain_size())
 
 
 def longest_gap_3_67(theta: float, lipschitz: float = 0.0) -> float:
@@ -120,61 +100,32 @@ def longest_gap_3_67(theta: float, lipschitz: float = 0.0) -> float:
     return (theta - 2.0 * lipschitz / theta) / (2.0 * theta * (theta + lipschitz) * _gain_size())
 
 
-def longest_gap_3_87(theta: float, lipschitz: float) -> float:
-    """``(theta - 2 beta/theta) / (2 theta^2 |K| sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.87): (3.32) once
-    more.
+def sampled_findings(theta: float, lipschitz: float = 0.0) -> tuple[Finding, ...]:
+    """Printed bounds of the gap beside the exact limits of the double integrator with K = (2, 1), at one high gain.
 
     Args:
-        theta: high gain [1/s]. lipschitz: beta [1/s].
-    """
-    return (theta - 2.0 * lipschitz / theta) / (2.0 * theta**2 * _gain_size())
+        theta: high gain [1/s], positive. lipschitz: Lipschitz constant of the resistance [1/s], in the formulas and as
+            a drag slope between 0 and it in the exact limits.
 
-
-def bound_table(thetas: Sequence[float] = _THETAS, lipschitz: float = 0.0) -> tuple[DesignBoundRow, ...]:
-    """Printed bounds beside the exact limits of the double integrator with K = (2, 1).
-
-    Args:
-        thetas: high gains [1/s], positive. lipschitz: Lipschitz constant of the resistance [1/s], in the formulas and
-            as a drag slope between 0 and it in the exact limits.
+    Returns:
+        By (1.52), (3.32) and (3.87), (3.67); a bound is negative where the gain is too small for its formula. Then
+        mixed gaps and the constant one.
 
     Raises:
-        ValueError: a gain is not positive.
+        ValueError: the gain is not positive.
     """
-    return tuple(_row(float(theta), lipschitz) for theta in thetas)
-
-
-def bound_text(rows: Sequence[DesignBoundRow]) -> str:
-    """The table as plain text, one line a gain, all gaps in seconds.
-
-    Args:
-        rows: one for each gain.
-    """
-    head = (
-        f"{'theta':>6} {'(1.52)':>8} {'(3.32)':>8} {'(3.67)':>8} {'(3.87)':>8} {'mixed gaps':>11} {'constant gap':>13}"
-    )
-    lines = [
-        f"{row.theta:6.3g} {row.by_1_52:8.4f} {row.by_3_32:8.4f} {row.by_3_67:8.4f} {row.by_3_87:8.4f} "
-        f"{row.aperiodic:11.4f} {row.constant:13.4f}"
-        for row in rows
-    ]
-    return "\n".join([head, *lines])
-
-
-def _row(theta: float, lipschitz: float) -> DesignBoundRow:
     if not theta > 0.0:
         raise ValueError(f"Bounds: theta must be positive [1/s], got {theta!r}.")
     gain, decay = (theta * _SHAPE[0], theta**2 * _SHAPE[1]), theta * _SHAPE[0]
     vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, decay) for s in sorted({0.0, lipschitz}))
     exact = certify_sampled_error(vertices, 2.0 / theta, "double integrator with drag")
-    return DesignBoundRow(
-        theta,
-        by_1_52=longest_gap_1_52(theta, lipschitz),
-        by_3_32=longest_gap_3_32(theta, lipschitz),
-        by_3_67=longest_gap_3_67(theta, lipschitz),
-        by_3_87=longest_gap_3_87(theta, lipschitz),
-        constant=exact.condition(CONSTANT_GAP).limit,
-        aperiodic=exact.limit,
-    )
+    printed = {
+        "(1.52)": longest_gap_1_52(theta, lipschitz),
+        "(3.32), (3.87)": longest_gap_3_32(theta, lipschitz),
+        "(3.67)": longest_gap_3_67(theta, lipschitz),
+    }
+    bounds = (as_printed("gap", value, "", f"Bouchama 2024, {formula}") for formula, value in printed.items())
+    return (*bounds, replace(exact, holds=None, demand=None), exact.condition(CONSTANT_GAP))
 
 
 def _bounds(theta: float, lipschitz: float, K: Sequence[float], mu: float) -> HighGainBounds:
