@@ -17,14 +17,14 @@ from math import inf, sqrt
 
 import numpy as np
 
-from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
 from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.quadratic import (
+    Decrease,
     QuadraticCondition,
-    common_quadratic_form,
+    best_decrease,
     flow_condition,
     inequalities,
     transition_condition,
@@ -139,20 +139,19 @@ def certify_adapting_gain(adaptation: GainAdaptation, max_gap: float, error_mode
     horizon = max(2.0 * max_gap, _LONGEST_X / adaptation.theta_min)
     unstable_x = first_unstable_gap(adaptation.vertices, horizon * adaptation.theta_min)
     constant = unstable_x / (adaptation.theta_min if unstable_x > adaptation.ratio else adaptation.theta_max)
-    margin, P = _common_decrease(adaptation, max_gap)
-    holds = margin > MARGIN
+    found = _common_decrease(adaptation, max_gap)
     limit = _aperiodic_limit(adaptation, min(constant, horizon))
     x = adaptation.constant_speed_x(max_gap)
     return gap_finding(
         max_gap,
         horizon,
         constant_limit=constant,
-        mixed_limit=max(limit, max_gap) if holds else limit,
+        mixed_limit=max(limit, max_gap) if found.holds else limit,
         growth=max(vertex.spectral_radius(x) for vertex in adaptation.vertices),
-        decrease=margin,
-        holds=holds,
+        decrease=found.margin,
+        holds=found.holds,
         error_model=error_model,
-        matrix=rows_of(P),
+        matrix=rows_of(found.P),
     )
 
 
@@ -161,37 +160,32 @@ def _aperiodic_limit(adaptation: GainAdaptation, bound: float) -> float:
     """Longest gap [s] covered, by bisection: what can occur up to a gap can occur up to every longer one; inf if all
     are.
     """
-    if _common_decrease(adaptation, bound)[0] > MARGIN:
+    if _common_decrease(adaptation, bound).holds:
         return inf
 
     def covered(longest: float) -> bool:
-        return _common_decrease(adaptation, longest)[0] > MARGIN
+        return _common_decrease(adaptation, longest).holds
 
     return bisected(covered, 0.0, bound, width=_LIMIT_TOLERANCE, least=_SMALLEST_LIMIT * bound)[0]
 
 
 @lru_cache(maxsize=256)
-def _common_decrease(adaptation: GainAdaptation, max_gap: float) -> tuple[float, np.ndarray | None]:
+def _common_decrease(adaptation: GainAdaptation, max_gap: float) -> Decrease:
     """Best recomputed relative decrease over everything that can occur up to `max_gap`, and its P."""
     cells = _cells(adaptation, max_gap)
     if cells.changing[0] and (cells.smallest[0] < 1.0 or cells.largest[0] > 1.0):
-        return -inf, None  # changes of the gain without any time to correct: nothing here covers them
+        return Decrease(-inf, None)  # changes of the gain without any time to correct: nothing here covers them
     grids = [_Grid(vertex, cells) for vertex in adaptation.vertices]
     sought = reduce(QuadraticCondition.joined, (grid.condition(range(0, _CELLS, _CELLS // _COARSE)) for grid in grids))
-    best: tuple[float, np.ndarray | None] = (-inf, None)
-    for _ in range(_CUTS):
-        candidate = common_quadratic_form(sought)
-        if candidate is None:
-            break
-        judged = [grid.judge(candidate.P) for grid in grids]
-        margin = -max(largest for largest, _ in judged)
-        if margin > best[0]:
-            best = (margin, candidate.P)
-        if margin > MARGIN or candidate.margin <= MARGIN:
-            break
-        worst = sorted({cell for _, cell in judged})
-        sought = reduce(QuadraticCondition.joined, (grid.condition(worst) for grid in grids), sought)
-    return best
+
+    def recomputed(P: np.ndarray) -> tuple[float, list[int]]:
+        found = [grid.largest(P) for grid in grids]
+        return -max(largest for largest, _ in found), sorted({cell for _, cell in found})
+
+    def refined(known: QuadraticCondition, worst: list[int]) -> QuadraticCondition:
+        return reduce(QuadraticCondition.joined, (grid.condition(worst) for grid in grids), known)
+
+    return best_decrease(sought, recomputed, refined, _CUTS)
 
 
 def _cells(adaptation: GainAdaptation, max_gap: float) -> _Cells:
@@ -227,7 +221,7 @@ class _Grid:
         parts += [self._changed(ends - 1 + end, change[chosen]) for change in self._changes for end in (0, 1)]
         return reduce(QuadraticCondition.joined, parts)
 
-    def judge(self, P: np.ndarray) -> tuple[float, int]:
+    def largest(self, P: np.ndarray) -> tuple[float, int]:
         """Largest eigenvalue on the grid with a bound for what lies between its points, and the cell where it is
         largest.
         """

@@ -6,7 +6,6 @@ It uses the exact transitions of `gap_error` and the candidates of `quadratic`, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache, reduce
 from math import inf
 
@@ -17,30 +16,23 @@ from fmu_observer.certificates.finding import Finding, remark
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap, rows_of
 from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.quadratic import (
+    MARGIN,
+    Decrease,
     QuadraticCondition,
-    common_quadratic_form,
+    best_decrease,
     flow_condition,
     inequalities,
+    largest_between,
     transition_condition,
 )
 from fmu_observer.certificates.switching_error import SwitchingError
 
-# smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
-MARGIN = 1e-6
 _SHORTEST_HORIZON = 20.0  # [s]
 _COARSE, _FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
 _CUTS = 4
 _SMALLEST_LIMIT = 1e-4  # of the constant limit: below it no aperiodic limit was found
 _LARGEST_GROWTH = 1e60  # over a gap: more is beyond what a quadratic form in floating point can judge
 _LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
-
-
-@dataclass(frozen=True)
-class Decrease:
-    """The best common quadratic decrease found: recomputed margin, and P in the observer's own coordinates."""
-
-    margin: float
-    P: np.ndarray | None
 
 
 def certify_sampled_error(
@@ -64,7 +56,7 @@ def certify_sampled_error(
     horizon = _longest_searched(max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
     found = common_decrease(vertices, max_gap, switching)
-    holds = found.margin > MARGIN
+    holds = found.holds
     limit = aperiodic_limit(vertices, horizon, switching)
     return gap_finding(
         max_gap,
@@ -107,8 +99,8 @@ def with_switching_noted(found: Finding, vertices: tuple[GapError, ...], what: s
     assert found.demand is not None, "a finding about a gap"
     covered = "covered too"
     if _left_out(vertices[0], found.demand):
-        covered = "not judged"
-    elif common_decrease(vertices, found.demand, True).margin <= MARGIN:
+        covered = "not evaluated"
+    elif not common_decrease(vertices, found.demand, True).holds:
         limit = aperiodic_limit(vertices, _longest_searched(found.demand), switching=True)
         covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap that was tried"
     return found.also(remark(f"{what} that change within a gap are {covered}"))
@@ -125,11 +117,11 @@ def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: b
         vertices: error equations of the vertices.
     """
     bound = min(first_unstable_gap(vertices, horizon), horizon)
-    if bound == horizon and common_decrease(vertices, horizon, switching).margin > MARGIN:
+    if bound == horizon and common_decrease(vertices, horizon, switching).holds:
         return inf
 
     def covered(longest: float) -> bool:
-        return common_decrease(vertices, longest, switching).margin > MARGIN
+        return common_decrease(vertices, longest, switching).holds
 
     return bisected(covered, 0.0, bound, width=_LIMIT_TOLERANCE, least=_SMALLEST_LIMIT * bound)[0]
 
@@ -139,7 +131,7 @@ def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: b
     """Seek one P for all vertices and all gaps in (0, longest] on a coarse grid, and recompute on a fine one.
 
     Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid. What is switching
-    is judged at the centre of the vertices, with the most that changes within a gap may add to it.
+    is evaluated at the centre of the vertices, with the most that changes within a gap may add to it.
     """
     scale = _scaling(vertices)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -148,23 +140,17 @@ def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: b
         return Decrease(-inf, None)
     sought = _pick(fine, range(0, _FINE + 1, _FINE // _COARSE))
     inclusion = SwitchingError.between(vertices) if switching else None
-    judged = fine if inclusion is None else [_conditions(inclusion.centre, longest, _FINE, scale)]
-    best = Decrease(-inf, None)
-    for _ in range(_CUTS):
-        candidate = common_quadratic_form(sought)
-        if candidate is None:
-            break
-        values = [inequalities(condition, candidate.P) for condition in judged]
+    evaluated = fine if inclusion is None else [_conditions(inclusion.centre, longest, _FINE, scale)]
+
+    def recomputed(P: np.ndarray) -> tuple[float, list[int]]:
+        values = [inequalities(condition, P) for condition in evaluated]
         if inclusion is not None:
-            values[0] += _growth(inclusion, candidate.P / np.outer(scale, scale), longest)[:, None, None] * candidate.P
-        margin = -max(_largest_between(v) for v in values)
-        if margin > best.margin:
-            best = Decrease(margin, candidate.P / np.outer(scale, scale))
-        if margin > MARGIN or candidate.margin <= MARGIN:
-            break
+            values[0] += _growth(inclusion, P / np.outer(scale, scale), longest)[:, None, None] * P
         worst = {int(np.linalg.eigvalsh(v)[:, -1].argmax()) for v in values}
-        sought = sought.joined(_pick(fine, sorted(worst)))
-    return best
+        return -max(largest_between(v) for v in values), sorted(worst)
+
+    found = best_decrease(sought, recomputed, lambda known, worst: known.joined(_pick(fine, worst)), _CUTS)
+    return found.unscaled(scale)
 
 
 def _growth(inclusion: SwitchingError, P: np.ndarray, longest: float) -> np.ndarray:
@@ -188,16 +174,6 @@ def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray)
     gaps, matrices = vertex.transitions(longest, count)
     start = flow_condition(limit * scaling / vertex.rate)
     return start.joined(transition_condition(matrices * scaling, vertex.rate * gaps))
-
-
-def _largest_between(values: np.ndarray) -> float:
-    """Largest eigenvalue on the grid and between its points.
-
-    Between two points a smooth matrix lies below its chord plus ``d^2/8`` of the norm of its second derivative, and
-    that is what the second differences on the grid estimate.
-    """
-    bend = np.linalg.norm(np.diff(values, 2, axis=0), axis=(1, 2)).max()
-    return float(np.linalg.eigvalsh(values)[:, -1].max() + 0.125 * bend)
 
 
 def _pick(conditions: list[QuadraticCondition], indices: Sequence[int]) -> QuadraticCondition:

@@ -6,15 +6,42 @@ is only a candidate: what counts is the largest eigenvalue recomputed by the cal
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
+from typing import TypeVar
 
 import clarabel
 import numpy as np
 import scipy
 
 from plant_models.hybrid import Array
+
+_Worst = TypeVar("_Worst")
+
+# smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
+MARGIN = 1e-6
+
+
+@dataclass(frozen=True)
+class Decrease:
+    """The best common quadratic decrease found.
+
+    Attributes:
+        margin: recomputed; -inf where there is no candidate. P: of the function, shape (n, n).
+    """
+
+    margin: float
+    P: np.ndarray | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the function falls."""
+        return self.margin > MARGIN
+
+    def unscaled(self, scale: np.ndarray) -> Decrease:
+        """The same in the coordinates whose units have the sizes `scale`, shape (n,)."""
+        return self if self.P is None else Decrease(self.margin, self.P / np.outer(scale, scale))
 
 
 @dataclass(frozen=True)
@@ -112,6 +139,45 @@ def common_quadratic_form(condition: QuadraticCondition) -> QuadraticForm | None
         return None
     P = _unpack(solution[:size], n)
     return QuadraticForm(P, float(solution[size])) if np.linalg.eigvalsh(P)[0] > 0.0 else None
+
+
+def best_decrease(
+    sought: QuadraticCondition,
+    recomputed: Callable[[np.ndarray], tuple[float, _Worst]],
+    refined: Callable[[QuadraticCondition, _Worst], QuadraticCondition],
+    rounds: int,
+) -> Decrease:
+    """The best form of a few rounds, in each of which the inequalities that the last one did not cover are added.
+
+    Args:
+        sought: inequalities of the first round. recomputed: the margin at P over all inequalities there are, and where
+            it is smallest. refined: the inequalities of the next round. rounds: at most so many.
+    """
+    best = Decrease(-inf, None)
+    for _ in range(rounds):
+        candidate = common_quadratic_form(sought)
+        if candidate is None:
+            break
+        margin, worst = recomputed(candidate.P)
+        if margin > best.margin:
+            best = Decrease(margin, candidate.P)
+        if margin > MARGIN or candidate.margin <= MARGIN:
+            break
+        sought = refined(sought, worst)
+    return best
+
+
+def largest_between(values: np.ndarray) -> float:
+    """Largest eigenvalue of matrices on grids and between their points, shape (..., points, n, n).
+
+    Between two points a smooth matrix lies below its chord plus ``d^2/8`` of the norm of its second derivative, and
+    that is what the second differences on the grid estimate.
+
+    Args:
+        values: symmetric, on grids of equidistant points.
+    """
+    bend = np.linalg.norm(np.diff(values, 2, axis=-3), axis=(-2, -1)).max()
+    return float(np.linalg.eigvalsh(values)[..., -1].max() + 0.125 * bend)
 
 
 def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:

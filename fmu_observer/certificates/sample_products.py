@@ -13,15 +13,16 @@ from math import ceil, inf
 import numpy as np
 import scipy
 
-from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
 from fmu_observer.certificates.gap_finding import gap_finding
 from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.certificates.quadratic import (
+    Decrease,
     QuadraticCondition,
-    common_quadratic_form,
+    best_decrease,
     inequalities,
+    largest_between,
     transition_condition,
 )
 
@@ -96,18 +97,18 @@ def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str
     unstable = np.flatnonzero(~(radii < 1.0))
     searched = int(unstable[0]) if unstable.size else len(radii)
     covered = _aperiodic_samples(error, searched)
-    margin, P = _common_decrease(error, samples)
+    found = _common_decrease(error, samples)
     return gap_finding(
         max_gap,
         horizon,
         constant_limit=float((unstable[0] + 1) * error.period) if unstable.size else inf,
         mixed_limit=inf if covered == len(radii) else covered * error.period,
         growth=float(radii[samples - 1]),
-        decrease=margin,
-        holds=margin > MARGIN,
+        decrease=found.margin,
+        holds=found.holds,
         error_model=error_model,
         remarks=("at most one balise in an odometer period",),
-        matrix=rows_of(P),
+        matrix=rows_of(found.P),
     )
 
 
@@ -117,12 +118,12 @@ def _aperiodic_samples(error: TwoRateError, most: int) -> int:
 
     Any gap up to m periods holds at most m - 1 samples before the one in which the balise falls.
     """
-    if most == 0 or _common_decrease(error, most)[0] > MARGIN:
+    if most == 0 or _common_decrease(error, most).holds:
         return most
     low, high = 0, most
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if _common_decrease(error, middle)[0] > MARGIN else (low, middle)
+        low, high = (middle, high) if _common_decrease(error, middle).holds else (low, middle)
     return low
 
 
@@ -136,7 +137,7 @@ def _constant_radii(error: TwoRateError, samples: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=256)
-def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarray | None]:
+def _common_decrease(error: TwoRateError, samples: int) -> Decrease:
     """Best recomputed relative decrease over all products of up to `samples` samples, and its P."""
     scale = _scaling(error, samples)
     fine = error.products(samples, _FINE_PHASES) * (scale[None, :] / scale[:, None])
@@ -145,27 +146,18 @@ def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarr
     places = np.arange(len(condition.w)).reshape(shape[:2])
     coarse = places[:: max(1, samples // 8), :: _FINE_PHASES // _COARSE_PHASES]
     chosen = set(map(int, coarse.ravel()))
-    best: tuple[float, np.ndarray | None] = (-inf, None)
-    for _ in range(_CUTS):
-        candidate = common_quadratic_form(condition.picked(sorted(chosen)))
-        if candidate is None:
-            break
-        margin, worst = _recomputed(condition, candidate.P, shape[0])
-        if margin > best[0]:
-            best = (margin, candidate.P / np.outer(scale, scale))
-        if margin > MARGIN or candidate.margin <= MARGIN:
-            break
-        chosen |= worst
-    return best
 
+    def recomputed(P: np.ndarray) -> tuple[float, set[int]]:
+        values = inequalities(condition, P).reshape(*shape[:2], *P.shape)
+        largest = np.linalg.eigvalsh(values)[..., -1]
+        worst = {i * _FINE_PHASES + int(k) for i, k in enumerate(largest.argmax(axis=1))}
+        return -largest_between(values), worst
 
-def _recomputed(condition: QuadraticCondition, P: np.ndarray, samples: int) -> tuple[float, set[int]]:
-    """Margin over the fine grid and between its phases, and the worst phase of every sample count."""
-    values = inequalities(condition, P).reshape(samples, _FINE_PHASES, *P.shape)
-    largest = np.linalg.eigvalsh(values)[..., -1]
-    bend = np.linalg.norm(np.diff(values, 2, axis=1), axis=(2, 3)).max()  # see aperiodic: bound between grid points
-    worst = {i * _FINE_PHASES + int(k) for i, k in enumerate(largest.argmax(axis=1))}
-    return -float(largest.max() + 0.125 * bend), worst
+    def refined(_: QuadraticCondition, worst: set[int]) -> QuadraticCondition:
+        chosen.update(worst)
+        return condition.picked(sorted(chosen))
+
+    return best_decrease(condition.picked(sorted(chosen)), recomputed, refined, _CUTS).unscaled(scale)
 
 
 def _scaling(error: TwoRateError, samples: int) -> np.ndarray:

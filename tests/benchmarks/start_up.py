@@ -45,7 +45,7 @@ def timed(module, name, part):
             parts[part] = parts.get(part, 0.0) + process_time() - begin
     setattr(module, name, call)
 timed(loaded_components, "component_factories", "models and loading")
-timed(checked_observers, "check_certificates", "certificates")
+timed(checked_observers, "evaluate_observers", "certificates")
 timed(services, "choose_method", "probe")
 timed(Master, "run", "stepping")
 begin = process_time()

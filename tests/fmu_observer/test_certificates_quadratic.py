@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from fmu_observer.certificates import aperiodic
+from fmu_observer.certificates import quadratic
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.certificates.quadratic import QuadraticForm, common_quadratic_form, decrease, transition_condition
@@ -18,7 +18,7 @@ MODEL = SampledError.of([[0.0, 1.0], [0.0, -0.01]], (16.0, 64.0), 16.0)
 
 
 def test_a_lying_solver_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(aperiodic, "common_quadratic_form", lambda _condition: QuadraticForm(np.eye(2), 1.0))
+    monkeypatch.setattr(quadratic, "common_quadratic_form", lambda _condition: QuadraticForm(np.eye(2), 1.0))
     other = replace(MODEL, decay=16.001)  # not in the cache
     certificate = certify_sampled_error((other,), 0.4, "any")
     assert not certificate.holds
@@ -26,7 +26,7 @@ def test_a_lying_solver_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_failing_solver_certifies_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(aperiodic, "common_quadratic_form", lambda _condition: None)
+    monkeypatch.setattr(quadratic, "common_quadratic_form", lambda _condition: None)
     certificate = certify_sampled_error((replace(MODEL, decay=16.002),), 0.4, "any")
     assert not certificate.holds
     assert certificate.lyapunov_matrix == ()
