@@ -22,7 +22,8 @@ from cosim.expectations.judge import judge
 from cosim.process.interruption import Interruption
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import InFormerUnits, in_si
-from cosim.run.network_remarks import network_summary
+from cosim.run.network_remarks import network_summary, packet_gaps
+from cosim.run.observer_findings import GapSeen, findings_after
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.run.premises import premise_findings
 from cosim.run.ready import Ready
@@ -58,28 +59,6 @@ def _largest_gap(services: Services, start: float, telegrams: Sequence[BaliseRec
         return None
     stamps = sorted(telegram.stamp for telegram in telegrams if telegram.kind == "true")
     return max((b - a for a, b in pairwise([start, *stamps])), default=None)
-
-
-def _certificates_after(
-    certificates: Mapping[str, dict[str, Any]], services: Services, gap: float | None
-) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Certificates with the longest gap that receivers of telegrams met.
-
-    Args:
-        certificates: by component. services: of the run. gap: the longest between balises [s], None for none.
-
-    Returns:
-        Certificates by component, and warnings of gaps beyond what is certified.
-    """
-    found, beyond, receivers = dict(certificates), list[str](), _receivers(services)
-    for name, certificate in certificates.items():
-        if name not in receivers:
-            continue
-        limit = certificate["certified_up_to"]
-        found[name] = certificate | {"largest_gap_seen": gap}
-        if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:
-            beyond.append(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
-    return found, beyond
 
 
 def _balise_summary(services: Services, gap: float | None) -> dict[str, Any]:
@@ -265,7 +244,10 @@ def _summary(
     """What is known of a run once it is over."""
     start = ready.master.axis.start
     gap = _largest_gap(ready.services, start, result.events)
-    certificates, beyond = _certificates_after(ready.checked.certificates, ready.services, gap)
+    gaps = {name: GapSeen(gap, "balises") for name in _receivers(ready.services)}
+    if ready.coupled.network is not None:
+        gaps = packet_gaps(ready.coupled.network, result.packets, start) | gaps
+    certificates, beyond = findings_after(ready.checked.certificates, gaps)
     remarks.warn(*beyond)
     remarks.note(*_missed_samples(ready.coupled.components))
     found = _balise_summary(ready.services, gap)

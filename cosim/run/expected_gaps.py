@@ -1,4 +1,4 @@
-"""Gaps before the run: how long each observer must expect to wait for a sample, whatever tells it of samples."""
+"""Gaps before the run: how long each observer must expect to wait for a sample, whatever brings it samples."""
 
 from __future__ import annotations
 

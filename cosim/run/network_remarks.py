@@ -9,10 +9,12 @@ from typing import Any
 
 from cosim.components.component import Component
 from cosim.errors import ScenarioError
+from cosim.evaluation.event_counts import USED
 from cosim.network.service import ages
 from cosim.network.settings import NetworkSettings
 from cosim.results.result_data import PacketRecord
 from cosim.run.network import Network
+from cosim.run.observer_findings import GapSeen
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON
@@ -47,7 +49,7 @@ def _one_a_step(component: Component, period: float, step: float) -> list[str]:
     if not one_a_step or period >= step:
         return []
     return [
-        f"{component.name} takes whole communication steps and can be told of one packet in each: of packets every "
+        f"{component.name} takes whole communication steps and can be notified of one packet in each: of packets every "
         f"{period:g} s ever more wait. Use a step that is no longer."
     ]
 
@@ -57,8 +59,8 @@ def _too_late(component: Component, own: ComponentTable, settings: NetworkSettin
     name, (shortest, longest) = component.name, settings.delay_range
     if component.kind == "FMU" and "late_policy" not in component.variables:
         text = (
-            f"{name} is told of packets late, and is an FMU without the parameter late_policy: what it does with their "
-            f"stamps is its own choice."
+            f"{name} is notified of packets late, and is an FMU without the parameter late_policy: what it does with "
+            f"their stamps is its own choice."
         )
         return [text] if longest > 0.0 else []
     if own.late_policy not in (None, "replay"):
@@ -89,6 +91,21 @@ def network_summary(network: Network, records: Sequence[PacketRecord], start: fl
             node.name: _counts([r for r in records if r.node == node.name]) | old[node.name] for node in settings.nodes
         },
     }
+
+
+def packet_gaps(network: Network, records: Sequence[PacketRecord], start: float) -> dict[str, GapSeen]:
+    """The longest time between packets that a component used, of those that are notified of packets.
+
+    Args:
+        network: of the run. records: of the run. start: of the run [s].
+    """
+    names, found = [node.name for node in network.settings.nodes], dict[str, GapSeen]()
+    for listener in network.listeners:
+        name, nodes = listener.component, {names[i] for i in listener.nodes}
+        stamps = sorted(r.stamp for r in records if r.node in nodes and r.outcomes.get(name) in USED)
+        gap = max((b - a for a, b in pairwise([start, *stamps])), default=None)
+        found[name] = max(found.get(name, GapSeen(None, "packets")), GapSeen(gap, "packets"), key=lambda g: g[0] or 0.0)
+    return found
 
 
 def _counts(records: Sequence[PacketRecord]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, astuple, replace
 from itertools import islice
 from math import inf, isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from cosim.errors import CertificateError
 from cosim.run.component_models import given_parameters, make_system, values_in_use
@@ -72,6 +72,35 @@ def evaluate_observers(
         texts = "\n".join([*about_gaps, *others])
         raise CertificateError(f"{where}: certificates = 'require' and not all hold.\n{texts}")
     return certificates, [*about_gaps, *others]
+
+
+class GapSeen(NamedTuple):
+    """The longest gap between samples that an observer met [s], None for no sample; and what it lies between."""
+
+    seconds: float | None
+    between: str
+
+
+def findings_after(
+    certificates: Mapping[str, dict[str, Any]], gaps: Mapping[str, GapSeen]
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Findings held against the gaps of a run.
+
+    Args:
+        certificates: as `evaluate_observers` gives them. gaps: that occurred, by component.
+
+    Returns:
+        The same with what was seen, and warnings of gaps beyond what is certified.
+    """
+    found, beyond = dict(certificates), list[str]()
+    for name, (gap, between) in gaps.items():
+        if name not in certificates:
+            continue
+        found[name] = certificates[name] | {"largest_gap_seen": gap}
+        limit = certificates[name]["certified_up_to"]
+        if limit is not None and gap is not None and gap > limit and certificates[name]["holds"] is not False:
+            beyond.append(f"{name}: the longest gap between {between} was {gap:.3g} s, certified are {limit:.3g} s.")
+    return found, beyond
 
 
 def evaluated(name: str, table: ComponentTable, system: Any, gap: ExpectedGap | None) -> Evaluation:

@@ -67,7 +67,7 @@ def _counted(table: np.ndarray, name: str) -> dict[str, Any] | None:
 def _seen(
     table: np.ndarray, name: str, component: ComponentTable, connections: Sequence[Connection]
 ) -> dict[str, Any] | None:
-    """What the recorded rows tell of a train observer: each value counts until the next row."""
+    """What the recorded rows show of a train observer: each value counts until the next row."""
     system: Any = make_system(component, name) if component.observer is not None else None
     if not hasattr(system, "premise_range"):
         return None

@@ -152,6 +152,6 @@ def decaying_error(
     if turn > _LARGEST_TURN:
         raise ValueError(
             f"Certificate: the innovation lasts {turn:.3g} times the fastest time of the model; at most "
-            f"{_LARGEST_TURN:g} can be judged. Raise the decay rate, lower the exponent, or take 1 for it."
+            f"{_LARGEST_TURN:g} can be evaluated. Raise the decay rate, lower the exponent, or take 1 for it."
         )
     return DecayingError(rows_of(drift), rows_of(gain), rows_of(C), float(rate), float(exponent), levels)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, isinf, nan
+from math import inf, isfinite, isinf, isnan, nan
 from typing import Any, Literal
 
 from fmu_observer.certificates.limit_search import LimitSearch
@@ -90,7 +90,8 @@ class Finding:
         """
         conditions = tuple(map(cls.of, fields["conditions"]))
         matrix = tuple(map(tuple, fields["lyapunov_matrix"]))
-        return cls(**{**fields, "conditions": conditions, "lyapunov_matrix": matrix})
+        value = nan if isnan(fields["value"]) else fields["value"]  # the one that equals itself in comparisons
+        return cls(**{**fields, "value": value, "conditions": conditions, "lyapunov_matrix": matrix})
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data: infinite and missing numbers as None, what is empty left out."""

@@ -1,7 +1,7 @@
 """Error equations that change within a gap: how far the error may then stray from that of the centre, as a bound on
 norms.
 
-The certificates of `aperiodic` judge transitions over whole gaps, each with one generator from sample to sample. Where
+The findings of `aperiodic` are about transitions over whole gaps, each with one generator from sample to sample. Where
 slopes or weights may move at any time between those of the vertices, the flow is the differential inclusion
 ``d zeta = (G0 + D(t)) zeta`` with D(t) in the hull of the vertices' distances from the centre G0. Variation of
 constants gives the transition as that of the centre plus ``E``, and a Volterra inequality bounds E in the norm of a
@@ -48,7 +48,7 @@ class SwitchingError:
         known = [vertex for vertex in vertices if isinstance(vertex, GeneratorError | DecayingError)]
         if len(known) < len(vertices) or len({vertex.moved(known[0].generator) for vertex in known}) > 1:
             raise ValueError(
-                "Certificate: changes within a gap can be judged only where all vertices flow linearly and share one "
+                "Certificate: changes within a gap are covered only where all vertices flow linearly and share one "
                 "reset."
             )
         generators = np.stack([vertex.generator for vertex in known])

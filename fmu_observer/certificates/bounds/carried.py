@@ -3,7 +3,7 @@ three. Pure functions that CasADi can trace.
 
 Where ``P F + F' P + 2 m P <= 0`` holds for ``de = F e + w``, the level ``W = sqrt(e' P e)`` obeys
 ``dW <= -m W + |w|_P``. It needs no factor beta, neither at its start nor at a sample: a sample leaves e as it is. Only
-where one component is told the norm is left: ``|C e| <= sqrt(C inv(P) C') W``.
+where one component is asked for the norm is left: ``|C e| <= sqrt(C inv(P) C') W``.
 """
 
 from __future__ import annotations

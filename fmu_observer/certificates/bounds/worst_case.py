@@ -18,7 +18,7 @@ from fmu_observer.models.checks import check_numbers
 
 _POINTS, _FEWEST = 400, 8  # a period: errors of the trapezium rule are of the order 1e-6 of the result
 _TOTAL = 50_000  # points altogether: for short periods fewer a period, which are closer then
-_FORGOTTEN = 30.0  # time constants of the slowest pole that are looked back
+_FORGOTTEN = 30.0  # time constants of the slowest pole that are taken into account
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def worst_case(
         F: error matrix ``A - K C``, shape (n, n), Hurwitz [1/s]. K: gain on the measurement, shape (n,).
         rate: xi, largest acceleration or deceleration [m/s2]. period: between samples [s].
         since_sample: time since the last sample [s]; longer than the period where samples are missing. None: a period.
-        periods: looked back, before the gap in question; 0 for an error that is zero at the sample. None: until what
+        periods: taken into account before that gap; 0 for an error that is zero at the sample. None: until what
             was before is forgotten.
 
     Returns:

@@ -165,6 +165,7 @@ class MotorFilter(EvaluatedObserver):
             numbers={"rank": rank, "order": self.order, "smallest_singular_value": smallest} | steady,
             statement="n samples of the motor at a steady speed show all states (rank = order)",
             source=self.source,
+            kind="exact",
         )
 
     def _observability(self, speed: float, current_q: float, p: Any) -> np.ndarray:

@@ -136,6 +136,18 @@ def test_packets_too_far_apart_are_refused() -> None:
     assert outcome.result.summary["certificates"]["obs"]["max_gap"] == pytest.approx(0.1)
 
 
+def test_packets_that_were_lost_are_held_against_what_is_certified() -> None:
+    s = Scenario(stop=30.0, step=0.05)
+    s.add("p", model="pendulum").add("obs", observer="held_innovation", parameters={"theta": 5.0}, **{"as": "block3"})
+    s.connect("p.angle -> obs.sample_angle").network(nodes={"a": ["p.angle"]}, period=0.15, loss_fraction=0.4, seed=3)
+    outcome = s.run(warn=lambda _: None)
+    used = [0.0, *(p.stamp for p in outcome.result.packets if p.outcomes.get("obs") == "accepted")]
+    found = outcome.result.summary["certificates"]["obs"]
+    assert found["largest_gap_seen"] == pytest.approx(max(b - a for a, b in pairwise(used)))
+    assert found["largest_gap_seen"] > found["certified_up_to"]
+    assert any(text.startswith("obs: the longest gap between packets was 0.") for text in outcome.warnings)
+
+
 ARM: dict[str, Any] = {"options": {"model": "flexible_joint_arm"}, "parameters": {"delay": 0.15}}
 
 

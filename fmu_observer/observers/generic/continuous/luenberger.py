@@ -68,4 +68,5 @@ class Luenberger(ModelObserver):
             },
             statement="A - L C is Hurwitz (abscissa < 0); poles can be placed at will where rank = order",
             source="Bouchama 2024, (1.2)-(1.5)",
+            kind="exact",
         )

@@ -69,6 +69,7 @@ def steady_condition(
         },
         statement=_statement(model, rank, reached),
         source=source,
+        kind="exact",
     )
     return replace(found, conditions=(*found.conditions, _of_transition(error)))
 

@@ -141,6 +141,7 @@ class MultirateSylvester(GapCertified):
             statement="T solves the Sylvester equation (residual = rounding), A is Hurwitz (abscissa < 0), T_R is "
             "invertible",
             source="Bouchama 2024, (1.46)",
+            kind="exact",
         )
 
     def gap_finding(self, gap: float, p: Any) -> Finding:
