@@ -18,6 +18,7 @@ from test_fmus.events import DEEDS, hostile_fmu
 from worker_tasks import Task, square
 
 from cosim import Scenario
+from cosim.cli import main
 from cosim.errors import RunError
 from cosim.runs import keys
 from cosim.runs.engine import run_jobs
@@ -133,6 +134,16 @@ def test_functions_of_the_users_travel_and_seeds_are_the_same(
     )
     places = [[run.outcome["where.shipped"][-1] for run in sweep.run(scheduler=at).runs] for at in (address, None)]  # type: ignore[index]
     assert places == [[1.0, 1.0], [0.0, 0.0]]  # a worker reads its own copy
+    words = [
+        "sweep",
+        str(sweep.scenario.save(tmp_path / "where.toml")),
+        "--vary",
+        "stop=0.1,0.2",
+        "--table-only",
+        "--quiet",
+    ]
+    assert main([*words, "--out", str(tmp_path / "out"), "--scheduler", address]) == 0
+    assert [line["failure"] for line in read_lines(tmp_path / "out" / JOURNAL)] == [None, None]
     scenario = Scenario.load("freight_profile_d").set("stop", 5.0)
     assert seed_study(scenario, range(3), scheduler=address).each == seed_study(scenario, range(3)).each
 
