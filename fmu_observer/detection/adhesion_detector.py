@@ -33,7 +33,7 @@ MAP_SPEEDS = tuple(v / KMH for v in _MAP_KMH)
 
 
 @dataclass(frozen=True)
-class AdhesionMap:
+class _AdhesionMap:
     """Optimal slip and adhesion there over the train speed.
 
     Attributes:
@@ -167,12 +167,12 @@ _TEXTS = {
 }
 
 
-def _map_values(nominal: AdhesionMap, degraded: AdhesionMap) -> dict[str, tuple[float, ...]]:
+def _map_values(nominal: _AdhesionMap, degraded: _AdhesionMap) -> dict[str, tuple[float, ...]]:
     return dict(zip(_TEXTS, (nominal.slips, degraded.slips, nominal.peaks, degraded.peaks), strict=True))
 
 
 @lru_cache(maxsize=32)
-def adhesion_map(curve: PolachCurve, speeds: tuple[float, ...] = MAP_SPEEDS) -> AdhesionMap:
+def adhesion_map(curve: PolachCurve, speeds: tuple[float, ...] = MAP_SPEEDS) -> _AdhesionMap:
     """Map of a creep curve, each point its first peak.
 
     Args:
@@ -185,20 +185,20 @@ def adhesion_map(curve: PolachCurve, speeds: tuple[float, ...] = MAP_SPEEDS) -> 
     and k = 25.
     """
     found = [curve.peak(float(speed)) for speed in speeds]
-    return AdhesionMap(tuple(map(float, speeds)), tuple(slip for slip, _ in found), tuple(peak for _, peak in found))
+    return _AdhesionMap(tuple(map(float, speeds)), tuple(slip for slip, _ in found), tuple(peak for _, peak in found))
 
 
-def nominal_map() -> AdhesionMap:
+def nominal_map() -> _AdhesionMap:
     """Map of the dry rail, nominal adhesion."""
     return adhesion_map(POLACH_DRY)
 
 
-def degraded_map() -> AdhesionMap:
+def degraded_map() -> _AdhesionMap:
     """Map of the wet rail, degraded adhesion."""
     return adhesion_map(POLACH_WET)
 
 
-def published_map(degraded: bool) -> AdhesionMap:
+def published_map(degraded: bool) -> _AdhesionMap:
     """Table 4.5 as printed on the speeds of `MAP_SPEEDS`: linear between its six speeds, constant outside 5 to 50
     km/h.
 
@@ -213,4 +213,4 @@ def published_map(degraded: bool) -> AdhesionMap:
         else (0.3894, 0.3474, 0.3027, 0.2769, 0.2594, 0.2449)
     )
     slips_there, peaks_there = (np.interp(MAP_SPEEDS, speeds, values) for values in (slips, peaks))
-    return AdhesionMap(MAP_SPEEDS, tuple(map(float, slips_there)), tuple(map(float, peaks_there)))
+    return _AdhesionMap(MAP_SPEEDS, tuple(map(float, slips_there)), tuple(map(float, peaks_there)))

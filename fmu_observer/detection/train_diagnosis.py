@@ -12,7 +12,7 @@ import numpy as np
 from fmu_observer.detection.train_diagnosis_signals import EVENTS, INPUTS, OUTPUTS, PARAMETERS
 from fmu_observer.detection.train_efficiency import MotionWindow, Share, brake_share, traction_share
 from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, RESIDUALS, WHEEL, isolability
-from fmu_observer.detection.train_residuals import HUGE, Readings, readings, speed_ratios, voted_speed, way_ratios
+from fmu_observer.detection.train_residuals import ALIKE, HUGE, Readings, readings, tolerance, voted_speed
 from fmu_observer.detection.train_verdict import (
     alarms_after,
     availability,
@@ -22,6 +22,7 @@ from fmu_observer.detection.train_verdict import (
     wheels,
 )
 from fmu_observer.formulas.diagnosis.isolation_table import largest
+from fmu_observer.formulas.diagnosis.window_inversion import windowed_square
 from plant_models.hybrid import Array, HybridSystem, Signal, memory, state, vector
 from plant_models.hybrid.event import IGNORED, USED
 from plant_models.hybrid.option import require_whole
@@ -197,7 +198,7 @@ class TrainDiagnosis(HybridSystem):
         count = np.where(read.has_gps > 0.0, x.gps_samples + 1.0, 0.0)
         gps_full = np.where(count > x.lead_first.shape[0] + 0.5, 1.0, 0.0)
         can = availability(read, gps_full, x.telegrams, x.disagree)
-        speeds, windows = speed_ratios(x, read, speed, p)
+        speeds, windows = _speed_ratios(x, read, speed, p)
         forces, shares = self._shares(x, read, speed, u, p)
         off = np.minimum(np.abs(read.gps - x.estimated_position), _nearest_way(x, read))
         held = dict(zip(RESIDUALS, x.ratio, strict=True))
@@ -277,7 +278,7 @@ class TrainDiagnosis(HybridSystem):
         known = np.where(x.telegrams > 0.5, 1.0, 0.0)
         sound = [there * (1.0 - bad) for there, bad in zip(read.fitted, x.faulty, strict=True)]
         errors, limit = [distance - way for way in ways], p.balise_floor + p.balise_share * np.abs(distance)
-        ratios, balise = way_ratios(errors, sound, limit)
+        ratios, balise = _way_ratios(errors, sound, limit)
         gaps = [np.where(np.abs(error) > limit, 1.0, 0.0) for error in errors]
         held = dict(zip(RESIDUALS, x.ratio, strict=True))
         held |= {f"way_{name}": known * r for name, r in zip(("1", "2", "radar"), ratios, strict=True)}
@@ -338,3 +339,43 @@ def _remembered(speed_window: int, gps_window: int, force_window: int) -> tuple[
         memory("mean_other", "m/s2", 0.0, "Acceleration by electric brake and gradient", size=force_window),
         *_SHARES,
     )
+
+
+def _speed_ratios(x: Any, read: Readings, speed: Array, p: Any) -> tuple[list[Array], dict[str, Array]]:
+    """Residuals of the six pairs of sources of speed over their thresholds.
+
+    The three pairs without the satellites are root mean squares over N samples, those with them the mean over L: the
+    lead of the position over the way may not change.
+    """
+    allowed = tolerance(speed, p)
+    ratios: list[Array] = []
+    after: dict[str, Array] = {}
+    for name, i, j, threshold in (
+        ("squares_odometers", 0, 1, p.threshold_wheels),
+        ("squares_first_radar", 0, 2, p.threshold_radar),
+        ("squares_second_radar", 1, 2, p.threshold_radar),
+    ):
+        both, before = read.fitted[i] * read.fitted[j], getattr(x, name)
+        windowed = windowed_square(before, both * (read.speeds[i] - read.speeds[j]) / allowed)
+        ratios.append(np.sqrt(windowed.value / (before.shape[0] + 1.0)) / threshold)
+        after[name] = windowed.memory
+    for name, way, fitted in zip(("lead_first", "lead_second", "lead_radar"), x.way, read.fitted, strict=True):
+        now, lead = read.has_gps * (read.gps - way), getattr(x, name)
+        window = lead.shape[0] * p.sample_period
+        ratios.append(fitted * np.abs(now - lead[0]) / (window * allowed * p.threshold_gps))
+        after[name] = vector(*lead[1:], now)
+    return ratios, after
+
+
+def _way_ratios(errors: list[Array], fitted: list[Array], limit: Array) -> tuple[list[Array], Array]:
+    """Residuals of the ways from the last balise to this one over their thresholds.
+
+    Where the ways of all sources are off by much the same, the balise is; else the sources that are off.
+    """
+    ratios = [f * np.abs(error) / limit for error, f in zip(errors, fitted, strict=True)]
+    most = largest(ratios)
+    least: Array = HUGE
+    for ratio, there_is in zip(ratios, fitted, strict=True):
+        least = np.minimum(least, np.where(there_is > 0.0, ratio, HUGE))
+    alike = np.where(least < HUGE, np.where(least > ALIKE * most, 1.0, 0.0), 0.0)
+    return [(1.0 - alike) * ratio for ratio in ratios], alike * most

@@ -15,7 +15,6 @@ import numpy as np
 
 from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.augmented_gains import design_for_gap, position_gains
-from fmu_observer.design.continuous_takagi_sugeno import designed_gains
 from fmu_observer.design.decoupling import decoupled_gain
 from fmu_observer.design.extended_disturbance import extended_gain
 from fmu_observer.design.pole_placement import observer_gain
@@ -26,6 +25,7 @@ from fmu_observer.design.robust_residual import ResidualProblem, design_robust_r
 from fmu_observer.design.theorem7 import design_theorem7, largest_eta
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
+from fmu_observer.observers.generic.continuous.takagi_sugeno_luenberger import _designed_gains
 from fmu_observer.observers.train.discrete_uio import _uio_gains, _UioCovariances
 from fmu_observer.observers.train.gains.gap_aware import design_adaptive, design_high_gain, design_takagi_sugeno
 
@@ -39,7 +39,7 @@ REPEATED: dict[str, Callable[[], Any]] = {
     "pole placement, 4 states": lambda: observer_gain(CHAIN, FIRST, [-1.0, -2.0, -3.0, -4.0]),
     "augmented observer, 4 poles": lambda: position_gains([-1.0, -1.5, -2.0, -2.5]),
     "unknown-input observer, two Riccati equations": lambda: _uio_gains(_UioCovariances(), 1e-3),
-    "Takagi-Sugeno Luenberger (1.26), train": lambda: designed_gains(find_takagi_sugeno_model("takagi_sugeno_train")),
+    "Takagi-Sugeno Luenberger (1.26), train": lambda: _designed_gains(find_takagi_sugeno_model("takagi_sugeno_train")),
     "Theorem 7, train (0.1 s, 3 1/s)": lambda: design_theorem7("takagi_sugeno_train", 0.1, 3.0),
     "Theorem 7, E1 core (0.2 s, 1 1/s)": lambda: design_theorem7(
         "triangularisable_example", 0.2, 1.0, performance=False

@@ -7,10 +7,15 @@ import pytest
 from own_condition import own_condition
 from scipy.integrate import solve_ivp
 
-from fmu_observer.design.continuous_takagi_sugeno import designed_gains, placed_gains, vertex_decrease, vertex_errors
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.continuous import TakagiSugenoLuenberger
+from fmu_observer.observers.generic.continuous.takagi_sugeno_luenberger import (
+    _designed_gains,
+    _placed_gains,
+    _vertex_decrease,
+    vertex_errors,
+)
 
 POLES = np.array([-2.0, -2.5])
 
@@ -37,7 +42,7 @@ def test_the_error_is_that_of_the_blended_vertices() -> None:
     """
     observer, start = TakagiSugenoLuenberger(), np.array([2.5, -1.0])
     errors = joint(observer, start, [0.5, 1.0, 3.0])
-    closed = vertex_errors(observer.model, placed_gains(observer.model, POLES))
+    closed = vertex_errors(observer.model, _placed_gains(observer.model, POLES))
     np.testing.assert_allclose(closed[0], closed[1], atol=1e-12)
     values, vectors = np.linalg.eig(closed[0])
     for t, error in zip([0.5, 1.0, 3.0], errors, strict=True):
@@ -60,9 +65,9 @@ def test_estimated_premises_are_another_observer_that_converges_too() -> None:
 @pytest.mark.parametrize("name", sorted(TAKAGI_SUGENO_MODELS))
 def test_designed_gains_satisfy_the_inequalities_at_the_asked_decay(name: str) -> None:
     model = find_takagi_sugeno_model(name)
-    gains = designed_gains(model, decay=0.5)
+    gains = _designed_gains(model, decay=0.5)
     assert max(np.linalg.eigvals(error).real.max() for error in vertex_errors(model, gains)) < -0.5
-    found = vertex_decrease(model, gains)
+    found = _vertex_decrease(model, gains)
     assert found.margin > 0.0
     observer = TakagiSugenoLuenberger(model, gains=gains)
     assert own_condition(observer).holds
@@ -75,13 +80,13 @@ def test_equal_poles_at_the_vertices_are_not_enough_and_the_inequalities_are() -
     placed = own_condition(TakagiSugenoLuenberger(model))
     assert placed.numbers["abscissa"] == pytest.approx(-2.0, abs=1e-6)
     assert not placed.holds
-    assert own_condition(TakagiSugenoLuenberger(model, gains=designed_gains(model))).holds
+    assert own_condition(TakagiSugenoLuenberger(model, gains=_designed_gains(model))).holds
 
 
 def test_the_printed_order_of_the_product_is_no_inequality() -> None:
     """(1.26) prints L_i' C'; for one measurement and two states the shapes do not even agree."""
     model = find_takagi_sugeno_model("pendulum")
-    L = placed_gains(model, POLES)[0]
+    L = _placed_gains(model, POLES)[0]
     with pytest.raises(ValueError, match="mismatch"):
         L.T @ model.C
     assert (model.C.T @ L.T).shape == (2, 2)
@@ -98,7 +103,7 @@ def test_bad_input() -> None:
         TakagiSugenoLuenberger(blind)
     stuck = replace(model, A=np.stack([np.array([[0.0, 0.0], [s, 0.2]]) for s in (-1.0, 0.2)]))
     with pytest.raises(UnobservableError, match=r"design of pendulum, vertex 1: .*eigenvalue 0.2 1/s .*rate"):
-        designed_gains(stuck)
+        _designed_gains(stuck)
 
 
 def test_an_infeasible_decay_is_refused_with_the_nearest_one() -> None:
@@ -109,10 +114,10 @@ def test_an_infeasible_decay_is_refused_with_the_nearest_one() -> None:
         find_takagi_sugeno_model("pendulum"), A=np.stack([np.array([[0.0, 0.0], [s, -0.2]]) for s in (-1.0, 0.2)])
     )
     with pytest.raises(ValueError, match=r"no common P at the 2 vertices for decay 1 1/s. Nearest decay") as refused:
-        designed_gains(blind, 1.0)
+        _designed_gains(blind, 1.0)
     nearest = float(str(refused.value).split("found feasible: ")[1].split()[0])
     assert 0.19 < nearest <= 0.2  # ten bisections of nine decades leave 2 %
-    assert designed_gains(blind, 0.99 * nearest).shape == (2, 2, 1)
+    assert _designed_gains(blind, 0.99 * nearest).shape == (2, 2, 1)
 
 
 def test_time_outside_the_bounds_is_counted() -> None:
@@ -130,8 +135,8 @@ def test_the_margin_by_hand() -> None:
     is.
     """
     model, none = find_takagi_sugeno_model("pendulum"), np.zeros((2, 2, 1))
-    assert vertex_decrease(replace(model, A=np.stack([-np.eye(2)] * 2)), none).margin == pytest.approx(2.0, rel=1e-6)
+    assert _vertex_decrease(replace(model, A=np.stack([-np.eye(2)] * 2)), none).margin == pytest.approx(2.0, rel=1e-6)
     shear = np.array([[-1.0, 10.0], [0.0, -1.0]])
-    found = vertex_decrease(replace(model, A=np.stack([shear, shear.T])), none)
+    found = _vertex_decrease(replace(model, A=np.stack([shear, shear.T])), none)
     assert found.abscissa == pytest.approx(-1.0)
     assert found.margin <= 1e-6  # of the solver's accuracy

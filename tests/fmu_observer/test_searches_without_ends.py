@@ -24,7 +24,6 @@ from fmu_observer.certificates.printed_bounds.high_gain_theta import binomial_ga
 from fmu_observer.certificates.printed_bounds.network_bounds import largest_gain
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
-from fmu_observer.design import continuous_takagi_sugeno
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.design.proposition_4_1 import proposition_design as proposition_4_1
 from fmu_observer.design.robust_residual import residual_design as robust_residual
@@ -32,6 +31,7 @@ from fmu_observer.design.theorem7 import theorem7_design as theorem7
 from fmu_observer.models.known_models import MODELS, find_model, find_takagi_sugeno_model
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale
+from fmu_observer.observers.generic.continuous import takagi_sugeno_luenberger
 
 TRAIN = find_takagi_sugeno_model("takagi_sugeno_train")
 UNITS = [1e-6, 1e-3, 1.0, 1e3, 1e6]
@@ -129,7 +129,7 @@ def test_where_no_theta_is_enough_none_is_found(share: float, exists: bool) -> N
 @pytest.mark.parametrize(
     ("module", "proof", "answer", "ask"),
     [
-        (continuous_takagi_sugeno, "_proven", None, lambda: continuous_takagi_sugeno.designed_gains(TRAIN, 8.0)),
+        (takagi_sugeno_luenberger, "_proven", None, lambda: takagi_sugeno_luenberger._designed_gains(TRAIN, 8.0)),
         (theorem7, "_proven", None, lambda: theorem7.design_theorem7(TRAIN, 2.0, 8.0)),
         (proposition_4_1, "margins", {"": -1.0}, lambda: proposition_4_1.design_proposition_4_1(A, B[0], 8.0)),
         (robust_residual, "candidates", (), lambda: robust_residual.design_robust_residual(chapter_5(8.0))),

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_observer.formulas.signatures.envelope import (
+    _rotated,
     best_envelope,
     envelope,
     envelope_areas,
     envelope_distance,
     line_distance,
-    rotated,
 )
 
 LENGTH, THICKNESS, GAP = 4.0, 0.2, 0.5
@@ -40,8 +40,8 @@ def test_an_envelope_holds_all_its_points(seed, slabs, angle):
     points = np.random.default_rng(seed).normal(size=(2, 40))
     found = envelope(points, slabs, angle)
     assert len(found.lower) == slabs
-    turned = envelope(rotated(points, angle), slabs)  # no rounding of a second rotation
-    assert turned.contains(rotated(points, angle)).all()
+    turned = envelope(_rotated(points, angle), slabs)  # no rounding of a second rotation
+    assert turned.contains(_rotated(points, angle)).all()
     np.testing.assert_allclose(found.area, turned.area, rtol=1e-12)
     assert 0.0 <= found.area <= envelope(points, 1, angle).area * (1.0 + 1e-12)
 
@@ -58,13 +58,13 @@ def test_slabs_are_equally_populated():
 
 def test_a_turned_bar_has_its_area_at_its_own_angle():
     filled = np.random.default_rng(2).uniform(0.0, 1.0, size=(2, 2000)) * [[LENGTH], [THICKNESS]]
-    points = rotated(filled, np.radians(30.0))
+    points = _rotated(filled, np.radians(30.0))
     found = best_envelope(points, 10)
     # 200 points a slab leave 1 % of the height empty at each end, the edges less.
     assert 0.97 * LENGTH * THICKNESS < found.area < LENGTH * THICKNESS
     corners = found.corners
     assert found.contains(corners.mean(axis=2)).all()  # the middle of each slab
-    np.testing.assert_allclose(rotated(corners, found.angle)[1, :, 2], found.upper, atol=1e-12)
+    np.testing.assert_allclose(_rotated(corners, found.angle)[1, :, 2], found.upper, atol=1e-12)
     # Lying along the abscissa or standing on it, the sum is the same: both are the bar.
     assert min(abs(found.angle - np.radians(a)) for a in (60.0, 150.0)) < np.radians(2.0)
     assert envelope_areas(points, 10, np.array([0.0]))[0] > 1.5 * found.area
@@ -92,10 +92,10 @@ def test_distances_along_a_line_are_those_of_figures_4_8_and_4_9():
 
 def test_the_distance_does_not_depend_on_the_frame():
     points = np.random.default_rng(3).uniform(-2.0, 6.0, size=(2, 20))
-    straight, turned = envelope(bar(), 8), envelope(rotated(bar(), 0.7), 8, -0.7)
+    straight, turned = envelope(bar(), 8), envelope(_rotated(bar(), 0.7), 8, -0.7)
     for direction in (0.0, 0.3, 1.2):
         expected = line_distance(points, straight, direction)
-        found = line_distance(rotated(points, 0.7), turned, direction + 0.7)
+        found = line_distance(_rotated(points, 0.7), turned, direction + 0.7)
         np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from fmu_observer import OBSERVERS
 from fmu_observer.formulas.signatures import inversion
-from fmu_observer.formulas.signatures.class_distance import class_distance, envelope_numbers, line_slopes
 from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.formulas.signatures.envelope import best_envelope, line_distance
 from fmu_observer.observers.exhibits import CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature
+from fmu_observer.observers.exhibits.cascade_signature import _envelope_numbers, _line_slopes, class_distance
 from fmu_observer.observers.generic.signature.signature_observer import SignatureObserver, _blended
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
@@ -110,7 +110,7 @@ def test_a_table_that_turns_is_refused_with_quantity_and_range() -> None:
 
 def test_the_traced_distance_to_an_envelope_is_that_of_its_rectangles() -> None:
     made = best_envelope(RNG.normal(size=(2, 200)) * [[1.0], [0.3]], 10)
-    slopes, numbers = line_slopes(7), envelope_numbers(made)
+    slopes, numbers = _line_slopes(7), _envelope_numbers(made)
     angles = np.arctan2(slopes[:, 1], slopes[:, 0]) - made.angle
     for point in (*RNG.normal(size=(6, 2)), np.array([40.0, 40.0])):
         ours = np.array([class_distance(point, numbers, slope) for slope in slopes])

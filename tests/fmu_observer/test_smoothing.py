@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fmu_observer.formulas.filtering.covariance_consistency import judge, normalised_squares
-from fmu_observer.formulas.filtering.smoothing import FilterPass, extended_pass, smooth, unscented_pass
+from fmu_observer.formulas.filtering.smoothing import _FilterPass, extended_pass, smooth, unscented_pass
 
 F = np.array([[1.0, 0.1, 0.005], [0.0, 1.0, 0.1], [0.0, 0.0, 0.97]])
 H = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.2]])
@@ -28,7 +28,7 @@ def recording(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return np.array(states), np.array(states) @ H.T + noise
 
 
-def linear(samples: np.ndarray, gate: float = np.inf) -> FilterPass:
+def linear(samples: np.ndarray, gate: float = np.inf) -> _FilterPass:
     return extended_pass(START, P, lambda _, x: (F @ x, F), Q, lambda _, x: (H @ x, H), R, samples, gate)
 
 

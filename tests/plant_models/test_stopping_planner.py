@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
+from plant_models.railway.control.stopping_controller import _hardest_brake
 from plant_models.railway.control.stopping_planner import (
     BrakePlan,
     NoBrakingSolutionError,
     constant_brake,
-    hardest_brake,
     plan_stop,
     reference_motion,
     tracking_poles,
@@ -95,8 +95,8 @@ def test_without_drag_it_is_the_school_formula() -> None:
 
 def test_the_hardest_brake_is_the_plan_of_its_own_stop() -> None:
     plan = plan_stop(30.0, 100.0, drag_rate=0.1, final_speed=4.0)
-    assert hardest_brake(30.0, plan.deceleration, 0.1, 4.0).duration == pytest.approx(plan.duration, rel=1e-13)
-    assert hardest_brake(30.0, 3.0, 0.0).duration == pytest.approx(10.0, rel=1e-15)
+    assert _hardest_brake(30.0, plan.deceleration, 0.1, 4.0).duration == pytest.approx(plan.duration, rel=1e-13)
+    assert _hardest_brake(30.0, 3.0, 0.0).duration == pytest.approx(10.0, rel=1e-15)
 
 
 def test_the_reference_stays_where_it_stops() -> None:

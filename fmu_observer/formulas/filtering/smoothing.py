@@ -32,7 +32,7 @@ _Updated = tuple[np.ndarray, np.ndarray, float, int, float]
 
 
 @dataclass(frozen=True)
-class FilterPass:
+class _FilterPass:
     """A filter's way through a recording of N samples.
 
     Attributes:
@@ -71,7 +71,7 @@ class _Smoothed:
         return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", self.covariances), 0.0)))
 
 
-def smooth(passed: FilterPass) -> _Smoothed:
+def smooth(passed: _FilterPass) -> _Smoothed:
     """Correct every estimate by all that was measured after it, from the end backwards.
 
     ``G = cross inv(P(k+1|k))``, ``x(k) + G (xs(k+1) - x(k+1|k))``, ``P(k) + G (Ps(k+1) - P(k+1|k)) G'``. Where a
@@ -102,7 +102,7 @@ def extended_pass(
     samples: np.ndarray,
     gate: float | np.ndarray = np.inf,
     limit: float | np.ndarray = np.inf,
-) -> FilterPass:
+) -> _FilterPass:
     """The extended Kalman filter over a recording; for constant Jacobians the linear one.
 
     Args:
@@ -156,7 +156,7 @@ def unscented_pass(
     alpha: float = 1.0,
     beta: float = 2.0,
     kappa: float = 0.0,
-) -> FilterPass:
+) -> _FilterPass:
     """The unscented Kalman filter over a recording, points drawn again for the measurement.
 
     Args:
@@ -219,7 +219,7 @@ def _updated(after: Corrected, innovation: np.ndarray) -> _Updated:
 
 def _passed(
     start: np.ndarray, P: np.ndarray, predict: Callable[..., _Predicted], update: Callable[..., _Updated], count: int
-) -> FilterPass:
+) -> _FilterPass:
     n = len(start)
     estimates, predictions = np.empty((count, n)), np.empty((count, n))
     covariances, predicted, crosses = (np.zeros((count, n, n)) for _ in range(3))
@@ -232,7 +232,7 @@ def _passed(
         x, covariance, nis[k], degrees[k], gained = update(k, x, covariance)
         estimates[k], covariances[k] = x, covariance
         likelihood += gained
-    return FilterPass(estimates, covariances, predictions, predicted, crosses, nis, degrees, likelihood)
+    return _FilterPass(estimates, covariances, predictions, predicted, crosses, nis, degrees, likelihood)
 
 
 def _used(

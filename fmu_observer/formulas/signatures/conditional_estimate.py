@@ -19,7 +19,7 @@ _CLOSE = 1e-9
 """Centres nearer than this, in units of the ranges, count as this far apart."""
 
 
-class Located(NamedTuple):
+class _Located(NamedTuple):
     """Where points lie along a curve of classes.
 
     Attributes:
@@ -47,7 +47,7 @@ class ClassCurve:
     place_values: np.ndarray
     reach: float
 
-    def locate(self, records: np.ndarray) -> Located:
+    def locate(self, records: np.ndarray) -> _Located:
         """Value of each experiment: that of the nearest place, with the weights of (3.4.10).
 
         Args:
@@ -55,7 +55,7 @@ class ClassCurve:
         """
         return self.nearest(self.plane.points(records))
 
-    def nearest(self, points: np.ndarray) -> Located:
+    def nearest(self, points: np.ndarray) -> _Located:
         """Value at the nearest place of the curve.
 
         Args:
@@ -63,7 +63,7 @@ class ClassCurve:
         """
         away = np.hypot(*(points[:, :, None] - self.places[:, None, :]))
         place = np.argmin(away, axis=1)
-        return Located(self.place_values[place], away[np.arange(len(place)), place])
+        return _Located(self.place_values[place], away[np.arange(len(place)), place])
 
 
 def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace) -> tuple[ClassCurve, float]:

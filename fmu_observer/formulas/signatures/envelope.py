@@ -41,7 +41,7 @@ class Envelope:
         """Corners of the slabs in the frame of the points, four a slab, shape (2, q, 4)."""
         left, right = self.edges[:-1], self.edges[1:]
         turned = np.stack([[left, right, right, left], [self.lower, self.lower, self.upper, self.upper]])
-        return rotated(np.moveaxis(turned, 1, 2), -self.angle)
+        return _rotated(np.moveaxis(turned, 1, 2), -self.angle)
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         """Whether points lie in a slab or on its border.
@@ -52,20 +52,13 @@ class Envelope:
         Returns:
             Of booleans, shape (...).
         """
-        x, y = rotated(points, self.angle)[..., None]
+        x, y = _rotated(points, self.angle)[..., None]
         inside = (x >= self.edges[:-1]) & (x <= self.edges[1:]) & (y >= self.lower) & (y <= self.upper)
         return np.asarray(inside.any(axis=-1))
 
 
-def rotated(points: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Points turned about the origin, ``R_th p``: Omar 2012, section 4.5.
-
-    Args:
-        points: shape (2, ...). angle: anticlockwise [rad], a number, or shape (k,) for points of shape (2, n).
-
-    Returns:
-        Shape (2, ...), or (2, k, n).
-    """
+def _rotated(points: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
+    """Points turned about the origin, ``R_th p``: Omar 2012, section 4.5."""
     x, y = np.asarray(points, dtype=float)
     if np.ndim(angle):
         angle = np.asarray(angle)[:, None]
@@ -84,7 +77,7 @@ def envelope(points: np.ndarray, slabs: int = _SLABS, angle: float = 0.0) -> Env
     Raises:
         ValueError: there are fewer points than slabs, or points that are not finite.
     """
-    frame = rotated(_checked(points, slabs), angle)
+    frame = _rotated(_checked(points, slabs), angle)
     edges, lower, upper = _slabs(frame, slabs)
     return Envelope(float(angle), edges, lower, upper)
 
@@ -102,7 +95,7 @@ def envelope_areas(points: np.ndarray, slabs: int = _SLABS, angles: np.ndarray |
         ValueError: there are fewer points than slabs, or points that are not finite.
     """
     chosen = np.linspace(0.0, np.pi, ANGLES) if angles is None else np.asarray(angles, dtype=float)
-    edges, lower, upper = _slabs(rotated(_checked(points, slabs), chosen), slabs)
+    edges, lower, upper = _slabs(_rotated(_checked(points, slabs), chosen), slabs)
     return np.asarray(np.sum(np.diff(edges) * (upper - lower), axis=-1))
 
 
@@ -157,7 +150,7 @@ def line_distance(points: np.ndarray, envelope: Envelope, direction: float | np.
         Shape (...), or (..., k) [1]: infinite where the line has nothing in common with the envelope, or a length of 0
         [ours: the thesis does not say].
     """
-    x, y = rotated(points, envelope.angle)[..., None, None]  # lines and slabs behind
+    x, y = _rotated(points, envelope.angle)[..., None, None]  # lines and slabs behind
     turned = np.atleast_1d(np.asarray(direction, dtype=float))[:, None] + envelope.angle
     last = np.arange(len(envelope.lower)) == len(envelope.lower) - 1  # a line on the border of two slabs is in one
     across = _interval(envelope.edges[:-1] - x, envelope.edges[1:] - x, np.cos(turned), last)

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.formulas.signatures.class_distance import class_distance, envelope_numbers, line_slopes
-from fmu_observer.formulas.signatures.envelope import best_envelope
+from fmu_observer.formulas.signatures.envelope import Envelope, best_envelope
 from fmu_observer.formulas.signatures.inversion import curve_distances, interpolated, nearest_two, place_on_curve
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from fmu_observer.observers.generic.signature.signature_observer import InvertedWindow, SignatureObserver
@@ -16,6 +15,10 @@ from plant_models.exhibits.three_state_cascade import ThreeStateCascade
 from plant_models.hybrid import Array
 from plant_models.hybrid.option import require_chosen, require_whole
 from plant_models.hybrid.scan import enclosed, scan
+
+_NO_LINE = 1e9
+"""Distance along a line that misses the envelope; finite, so that it traces."""
+
 
 ORDER, POINTS = 67, 34  # printed N and M; N_O = 101
 SIZE = 3.0  # printed set [-3, 3]^3
@@ -32,7 +35,7 @@ class _CascadeTables(NamedTuple):
 
     Attributes:
         middles: median points, a pair of arrays for each value of x2, shape (x1, x3) each. chords: from the first to
-            the last point, for each x2 and x1, shape (2, x3). envelopes: of each value of x2, see `envelope_numbers`.
+            the last point, for each x2 and x1, shape (2, x3). envelopes: of each value of x2, see `_envelope_numbers`.
         signatures: all, shape (2, M, x1, x2, x3).
     """
 
@@ -125,7 +128,7 @@ class CascadeSignature(SignatureObserver):
 
     def _read(self, window: Array) -> tuple[Array, ...]:
         """First, both middle, and last points of the signature, and the distances to the classes."""
-        eps, slopes = EPS[self.scaling], line_slopes(DIRECTIONS)
+        eps, slopes = EPS[self.scaling], _line_slopes(DIRECTIONS)
         rows = [(np.asarray(numbers), slope) for numbers in self.tables.envelopes for slope in slopes]
         starts = (0, POINTS // 2 - 1, POINTS // 2, POINTS - 1)
 
@@ -164,7 +167,45 @@ class CascadeSignature(SignatureObserver):
             [(middles[0, :, j], middles[1, :, j]) for j in count],
             [[chords[:, i, j] for i in count] for j in count],
             np.array(
-                [envelope_numbers(best_envelope(signatures[:, :, :, j].reshape(2, -1), SLABS, angles)) for j in count]
+                [_envelope_numbers(best_envelope(signatures[:, :, :, j].reshape(2, -1), SLABS, angles)) for j in count]
             ),
             signatures,
         )
+
+
+def _envelope_numbers(envelope: Envelope) -> np.ndarray:
+    """An envelope as one row: cosine and sine of its angle, edges, lower and upper bounds; shape (3 q + 3,)."""
+    turn = [np.cos(envelope.angle), np.sin(envelope.angle)]
+    return np.concatenate([turn, envelope.edges, envelope.lower, envelope.upper])
+
+
+def class_distance(point: Array, numbers: Array, slope: Array) -> Array:
+    """Distance of a point to an envelope along a line, the smallest of which over several lines is (4.5.18): Omar 2012,
+    (4.5.15)-(4.5.16).
+
+    Args:
+        point: shape (2,). numbers: see `_envelope_numbers`. slope: cosine and sine of the line's direction in the
+            envelope's frame, neither of them 0, shape (2,); see `_line_slopes`.
+
+    Returns:
+        A number [1]; 0 in the envelope, `_NO_LINE` where the line misses it.
+    """
+    slabs = (len(numbers) - 3) // 3
+    x = numbers[0] * point[0] - numbers[1] * point[1]
+    y = numbers[1] * point[0] + numbers[0] * point[1]
+    across = (numbers[2 : slabs + 3] - x) / slope[0]
+    lower, upper = ((numbers[k * slabs + 3 : (k + 1) * slabs + 3] - y) / slope[1] for k in (1, 2))
+    begin = np.maximum(np.minimum(across[:-1], across[1:]), np.minimum(lower, upper))
+    end = np.minimum(np.maximum(across[:-1], across[1:]), np.maximum(lower, upper))
+    whole = np.sum(np.maximum(end - begin, 0.0))
+    nearest = np.min(np.where(end >= begin, np.maximum(np.maximum(begin, -end), 0.0), _NO_LINE))
+    share = np.where(whole > 0.0, nearest / np.where(whole > 0.0, whole, 1.0), _NO_LINE)
+    return np.where(nearest > 0.0, np.minimum(share, _NO_LINE), 0.0)
+
+
+def _line_slopes(directions: int) -> np.ndarray:
+    """Slopes of lines for `class_distance`, half a step beside the axes so that none is parallel to an edge, shape
+    (directions, 2).
+    """
+    angles = (np.arange(directions) + 0.5) * np.pi / directions
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -14,6 +14,9 @@ from fmu_observer.formulas.diagnosis.window_inversion import Alarm, judge
 from fmu_observer.observers.exhibits.drive_train_residuals import (
     DRIVE_MEMORY,
     DRIVE_PARAMETERS,
+    GAINS,
+    GAINS_PERIOD,
+    WINDOW,
     end_shaft_block,
     sample_speeds,
     sample_torque,
@@ -34,13 +37,7 @@ from fmu_observer.observers.exhibits.pitch_residuals import (
     trusted,
     trusted_pitches,
 )
-from fmu_observer.observers.exhibits.wind_turbine_limits import (
-    WARNINGS,
-    grid_requirements,
-    period_requirements,
-    repeats,
-    warned,
-)
+from fmu_observer.observers.exhibits.wind_turbine_limits import WARNINGS, repeats, warned
 from plant_models.exhibits.wind_turbine.rotor import Rotor
 from plant_models.hybrid import (
     Array,
@@ -231,7 +228,7 @@ class WindTurbineDiagnosis(HybridSystem):
             f"{name} must be above zero: any reading would be a fault": np.where(getattr(p, name) > 0.0, 1.0, 0.0)
             for name, *_ in _LIMITS
         }
-        return super().requirements(p) | dict(limits) | grid_requirements(p) | period_requirements(p)
+        return super().requirements(p) | dict(limits) | _grid_requirements(p) | _period_requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""
@@ -349,3 +346,28 @@ def _alarms(m: Any, exceeds: Sequence[Array], t: Array, p: Any) -> list[Alarm]:
         )
         for i, kind in enumerate(kinds)
     ]
+
+
+def _grid_requirements(p: Any) -> dict[str, Array]:
+    """Grids of the efficiency that rise."""
+    return {
+        "grid_highest must be above grid_lowest: the grid of the efficiency rises": np.where(
+            p.grid_highest > p.grid_lowest, 1.0, 0.0
+        ),
+        "most_efficiency must be above least_efficiency: the grid lies between them": np.where(
+            p.most_efficiency > p.least_efficiency, 1.0, 0.0
+        ),
+    }
+
+
+def _period_requirements(p: Any) -> dict[str, Array]:
+    """Gains of the torsion that belong to the sample period."""
+    own: Array = 0.0  # 1 where gains other than the default ones were given
+    for i in range(WINDOW):
+        own = np.maximum(own, np.where(np.abs(p.rotor_speed_gain[i] - GAINS[0, i]) > 1e-9 * abs(GAINS[0, i]), 1.0, 0.0))
+    fits = np.where(np.abs(p.sample_period - GAINS_PERIOD) <= 1e-9, 1.0, 0.0)
+    text = (
+        f"sample_period must be {GAINS_PERIOD:g} s, for which the default gains of the torsion are made; for another "
+        "one give rotor_speed_gain, generator_speed_gain, rotor_torque_gain, generator_torque_gain of torsion_gains()"
+    )
+    return {text: np.maximum(own, fits)}

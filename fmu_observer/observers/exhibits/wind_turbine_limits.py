@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.observers.exhibits.drive_train_residuals import GAINS, GAINS_PERIOD, WINDOW
+from fmu_observer.observers.exhibits.drive_train_residuals import WINDOW
 from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS
 from plant_models.hybrid import Array, OutputWarning, discrete_output
 
@@ -61,45 +61,6 @@ WARNINGS = (
         ),
     ),
 )
-
-
-def grid_requirements(p: Any) -> dict[str, Array]:
-    """Grids of the efficiency that rise.
-
-    Args:
-        p: parameters with `EFFICIENCY_PARAMETERS`.
-
-    Returns:
-        By text: 1 where it is fulfilled, else 0.
-    """
-    return {
-        "grid_highest must be above grid_lowest: the grid of the efficiency rises": np.where(
-            p.grid_highest > p.grid_lowest, 1.0, 0.0
-        ),
-        "most_efficiency must be above least_efficiency: the grid lies between them": np.where(
-            p.most_efficiency > p.least_efficiency, 1.0, 0.0
-        ),
-    }
-
-
-def period_requirements(p: Any) -> dict[str, Array]:
-    """Gains of the torsion that belong to the sample period.
-
-    Args:
-        p: parameters with `DRIVE_PARAMETERS` and `sample_period`.
-
-    Returns:
-        By text: 1 where it is fulfilled, else 0.
-    """
-    own: Array = 0.0  # 1 where gains other than the default ones were given
-    for i in range(WINDOW):
-        own = np.maximum(own, np.where(np.abs(p.rotor_speed_gain[i] - GAINS[0, i]) > 1e-9 * abs(GAINS[0, i]), 1.0, 0.0))
-    fits = np.where(np.abs(p.sample_period - GAINS_PERIOD) <= 1e-9, 1.0, 0.0)
-    text = (
-        f"sample_period must be {GAINS_PERIOD:g} s, for which the default gains of the torsion are made; for another "
-        "one give rotor_speed_gain, generator_speed_gain, rotor_torque_gain, generator_torque_gain of torsion_gains()"
-    )
-    return {text: np.maximum(own, fits)}
 
 
 def repeats(m: Any, u: Any, starts: Array) -> Array:

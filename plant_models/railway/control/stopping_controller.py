@@ -22,13 +22,7 @@ from plant_models.hybrid import (
     parameter,
 )
 from plant_models.railway.control.logic import either, every, holds, some
-from plant_models.railway.control.stopping_planner import (
-    NEVER,
-    BrakePlan,
-    constant_brake,
-    hardest_brake,
-    reference_motion,
-)
+from plant_models.railway.control.stopping_planner import NEVER, BrakePlan, constant_brake, reference_motion
 
 ROLLS_AWAY = 10.0  # times the speed of standstill: a train that was held and runs so fast is planned for anew
 
@@ -241,7 +235,7 @@ def _planned(x: Any, due: Array, recovered: Array, t: Array, u: Any, p: Any) -> 
     distance = p.stop_position - u.estimated_position
     largest = p.effort_limit * p.brake_coefficient / p.mass
     wanted = constant_brake(u.estimated_speed, distance, drag_rate, p.final_speed)
-    hardest = hardest_brake(u.estimated_speed, largest, drag_rate, p.final_speed)
+    hardest = _hardest_brake(u.estimated_speed, largest, drag_rate, p.final_speed)
     faster = holds(u.estimated_speed > p.final_speed)
     behind = every(faster, holds(distance <= 0.0))
     limited = some(behind, every(wanted.possible, holds(wanted.deceleration > largest)))
@@ -264,3 +258,12 @@ def _feedforward(x: Any, t: Array, p: Any) -> Array:
     """Effort of the plan [N]; after its end what keeps the final speed. A stop is braked for until the train stands."""
     over = every(holds(t - x.plan_start >= x.plan_duration), holds(p.final_speed > 0.0))
     return either(over, p.davis_b * p.final_speed, -x.plan_deceleration * p.mass) / p.brake_coefficient
+
+
+def _hardest_brake(speed: Array, deceleration: Array, drag_rate: Array, final_speed: Array = 0.0) -> BrakePlan:
+    """The plan of a given brake, wherever it ends: for a mark that is too near for the brake there is."""
+    change = np.maximum(speed - final_speed, 0.0)
+    x = drag_rate * change / (drag_rate * final_speed + deceleration)
+    small = x < 1e-8
+    per = np.where(small, 1.0 - 0.5 * x, np.log1p(x) / np.where(small, 1.0, x))
+    return BrakePlan(deceleration, per * change / (drag_rate * final_speed + deceleration), 1.0)

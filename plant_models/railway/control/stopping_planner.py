@@ -230,20 +230,6 @@ def _newton_step(w: Array, share: Array, left: Array, ratio: Array) -> Array:
     return value / slope
 
 
-def hardest_brake(speed: Array, deceleration: Array, drag_rate: Array, final_speed: Array = 0.0) -> BrakePlan:
-    """The plan of a given brake, wherever it ends: for a mark that is too near for the brake there is.
-
-    Args:
-        speed: v_0 [m/s]. deceleration: ``b U`` of the brake, positive [m/s2]. drag_rate: w_1 [1/s]. final_speed: v_f
-            [m/s].
-    """
-    change = np.maximum(speed - final_speed, 0.0)
-    x = drag_rate * change / (drag_rate * final_speed + deceleration)
-    small = x < 1e-8
-    per = np.where(small, 1.0 - 0.5 * x, np.log1p(x) / np.where(small, 1.0, x))
-    return BrakePlan(deceleration, per * change / (drag_rate * final_speed + deceleration), 1.0)
-
-
 def reference_motion(
     time: Array, speed: Array, position: Array, plan: BrakePlan, drag_rate: Array
 ) -> tuple[Array, Array]:

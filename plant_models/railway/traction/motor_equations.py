@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import Array, PeriodicEvent, Signal, input_signal, output_signal, parameter
+from plant_models.hybrid import Array, PeriodicEvent, input_signal, parameter
 from plant_models.railway.traction.transforms import to_rotor
 
 STATE_NAMES = ("current_d", "current_q", "speed", "angle")
@@ -63,41 +63,6 @@ TRACTION_200_KW: Mapping[str, float] = {
     "viscous_friction": 0.02,
 }
 """A motor of about 200 kW at 1500 rpm with 1500 V direct voltage; all numbers are ours."""
-
-
-def motor_inputs(frame: str) -> tuple[Signal, ...]:
-    """Inputs of a motor: voltages of both axes and the torque of the load.
-
-    Args:
-        frame: of the voltages, ``rotor`` or ``stator``.
-
-    Returns:
-        The declared signals, held between communication points.
-    """
-    return (
-        *(input_signal(f"voltage_{axis}", "V", 0.0, f"Voltage along {axis}") for axis in AXES[frame]),
-        input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, C_r"),
-    )
-
-
-def motor_outputs(frame: str) -> tuple[Signal, ...]:
-    """Outputs of a motor: state, torque and measured currents.
-
-    Args:
-        frame: of the measured currents, ``rotor`` or ``stator``. They are continuous signals also where they
-            are sampled, so that a master hands them on within the step of the sample.
-
-    Returns:
-        The declared signals.
-    """
-    return (
-        output_signal("current_d", "A", "Current along d"),
-        output_signal("current_q", "A", "Current along q"),
-        output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
-        output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
-        output_signal("torque", "N.m", "Electromagnetic torque C_em"),
-        *(output_signal(f"measured_current_{axis}", "A", f"Measured current along {axis}") for axis in AXES[frame]),
-    )
 
 
 def rotor_voltages(frame: str, u: Any, angle: Array) -> tuple[Array, Array]:

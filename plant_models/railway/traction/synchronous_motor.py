@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, Signal, memory, state
+from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, memory, output_signal, state
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.traction.motor_equations import (
     AXES,
@@ -21,8 +21,6 @@ from plant_models.railway.traction.motor_equations import (
     Frame,
     electromagnetic_torque,
     euler_step,
-    motor_inputs,
-    motor_outputs,
     motor_rates,
     process_noise,
     rotor_voltages,
@@ -79,7 +77,7 @@ class SynchronousMotor(HybridSystem):
             self.state_signal("electrical_angle", "rad", 0.0, "Electrical angle of the rotor"),
             *(_measured_memory(frame) if self.sampled else ()),
         )
-        self.inputs, self.outputs = motor_inputs(frame), motor_outputs(frame)
+        self.inputs, self.outputs = _motor_inputs(frame), _motor_outputs(frame)
         super().__init__(**{option: value for option, value in chosen.items() if option in self.option_choices})
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -184,4 +182,24 @@ def _measured_currents(frame: str, state: tuple[Array, Array, Array, Array], u: 
     return (
         first + np.sqrt(p.measurement_variance[0]) * u.measurement_noise_1,
         second + np.sqrt(p.measurement_variance[1]) * u.measurement_noise_2,
+    )
+
+
+def _motor_inputs(frame: str) -> tuple[Signal, ...]:
+    """Inputs of a motor: voltages of both axes and the torque of the load."""
+    return (
+        *(input_signal(f"voltage_{axis}", "V", 0.0, f"Voltage along {axis}") for axis in AXES[frame]),
+        input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, C_r"),
+    )
+
+
+def _motor_outputs(frame: str) -> tuple[Signal, ...]:
+    """Outputs of a motor: state, torque and measured currents."""
+    return (
+        output_signal("current_d", "A", "Current along d"),
+        output_signal("current_q", "A", "Current along q"),
+        output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
+        output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
+        output_signal("torque", "N.m", "Electromagnetic torque C_em"),
+        *(output_signal(f"measured_current_{axis}", "A", f"Measured current along {axis}") for axis in AXES[frame]),
     )

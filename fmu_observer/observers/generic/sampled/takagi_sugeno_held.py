@@ -38,7 +38,7 @@ SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certi
 _SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
 
 
-class TakagiSugenoHeld(GatedObserver, GapCertified):
+class _TakagiSugenoHeld(GatedObserver, GapCertified):
     """Base of ``dxh = sum_i h_i [A_i xh + B_i u - L_i eta]``, ``eta = C xh - y`` set at samples and held between them.
 
     All measurements of the model are sampled together, at the event of the model or, where `periodic` is set, at a
@@ -188,7 +188,7 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         return matrix_parameter("gain", gains, text)
 
 
-class TakagiSugenoAperiodic(TakagiSugenoHeld):
+class TakagiSugenoAperiodic(_TakagiSugenoHeld):
     """Takagi-Sugeno observer at aperiodic samples, innovation and weights held: Bouchama 2024, (1.55).
 
     ``dxh = sum_i h_i(z(t_k)) [A_i xh + B_i u + L_i (y(t_k) - C xh(t_k))]`` on ``[t_k, t_k+1)``. Weights and innovation
@@ -224,7 +224,7 @@ class TakagiSugenoAperiodic(TakagiSugenoHeld):
         return "what the premises change within a gap, an input to the error"
 
 
-class TakagiSugenoPeriodic(TakagiSugenoHeld):
+class TakagiSugenoPeriodic(_TakagiSugenoHeld):
     """Takagi-Sugeno observer at periodic samples, innovation held: Bouchama 2024, (1.38)-(1.41).
 
     ``dxh = sum_i h_i(zh) [A_i xh + B_i u + L_i (y(kT) - C xh(kT))]`` on ``[kT, (k+1) T)``. The printed bracket is
