@@ -28,7 +28,7 @@ _UNSEEN = 1e12
 _REPEATS = 3  # the noise is estimated anew after each fit
 
 
-def serial_correlation(residuals: Array) -> float:
+def _serial_correlation(residuals: Array) -> float:
     """Correlation of neighbouring residuals.
 
     Args:
@@ -56,7 +56,7 @@ def samples_per_independent(residuals: Array, parameters: float) -> float:
     count, found, size = len(residuals), 1.0, 1
     while size == 1 or count >= _FEWEST_MEANS * size:
         means = residuals[: count // size * size].reshape(-1, size).mean(axis=1)
-        correlation = serial_correlation(means)
+        correlation = _serial_correlation(means)
         if correlation > (_CHANCE if size == 1 else _LATER_CHANCE) / np.sqrt(len(means)):
             correlation = min(correlation + parameters * (1.0 + correlation) / len(means), _ALMOST_ONE)
             share = size * float(np.mean(means**2) / np.mean(residuals**2))
@@ -214,7 +214,7 @@ def _fit(residuals: _Residuals, start: Array, noise: Array | None) -> Fit:
     alike = np.array([samples_per_independent(row, share) for row, share in zip(sampled, shares, strict=True)])
     shown = _deviations(left, known, shares * alike / np.maximum(counts, 1))
     covariance = _covariance(slopes, weights, shown**2 * alike, sizes)
-    correlation = np.array([serial_correlation(row) for row in sampled])
+    correlation = np.array([_serial_correlation(row) for row in sampled])
     freedom = max(1, int(counts.sum()) - len(start))
     return Fit(
         parameters, covariance, sizes, left, shown, correlation, alike, slopes, freedom, residuals.runs, converged

@@ -33,7 +33,7 @@ _ROWS = 500
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class _Evaluated:
     """The cost of one candidate with one seed.
 
     Args:
@@ -62,17 +62,17 @@ class _Evaluate:
     observer: str | None = None
     with_signals: bool = False
 
-    def __call__(self, outcome: Outcome) -> Evaluated | None:
+    def __call__(self, outcome: Outcome) -> _Evaluated | None:
         if outcome.failure is not None:
             return None
         signals = _signals(outcome, self.observer, self.cost).tolist() if self.with_signals else None
         try:
             cost = self.cost.of(outcome)
         except ScenarioError as error:
-            return Evaluated(missing=str(error))
+            return _Evaluated(missing=str(error))
         if isfinite(cost):
-            return Evaluated(cost, signals=signals)
-        return Evaluated(inf, *_not_finite(outcome, self.cost, cost), signals)
+            return _Evaluated(cost, signals=signals)
+        return _Evaluated(inf, *_not_finite(outcome, self.cost, cost), signals)
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Evaluator(AbstractContextManager["Evaluator"]):
         self.directory, self.runs, self.replayed = directory, 0, False
         self.failures: dict[str, list[str]] = {}
         self._journal = Journal(directory, resume=resume, retry=retry)
-        self._known: dict[str, Evaluated] = {}
+        self._known: dict[str, _Evaluated] = {}
         self._contents: dict[int, str] = {}
         self._bases: dict[int, Scenario] = {}
         self._replays: dict[int, Replays] = {}
@@ -194,7 +194,7 @@ class Evaluator(AbstractContextManager["Evaluator"]):
 
     def _evaluated(
         self, jobs: Sequence[_Evaluation], label: Mapping[str, Any], step: Callable[[], None] = lambda: None
-    ) -> list[Evaluated]:
+    ) -> list[_Evaluated]:
         """What became of each job, those that are alike done once; they are in the journal as soon as they are done."""
         alike = dict[str, int]()
         for job in jobs:
@@ -217,7 +217,7 @@ class Evaluator(AbstractContextManager["Evaluator"]):
         job, row = done.job, done.row
         assert isinstance(job, _Evaluation)
         self.runs += not done.resumed
-        found = Evaluated(inf, done.failure.reason) if done.failure is not None else Evaluated(**row["evaluated"])
+        found = _Evaluated(inf, done.failure.reason) if done.failure is not None else _Evaluated(**row["evaluated"])
         self._known[job.key] = found if found.cost is not None else replace(found, cost=inf)
         if found.why is not None:
             values = ", ".join(f"{name} = {value:.6g}" for name, value in (job.candidate or {}).items())

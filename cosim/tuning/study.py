@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from inspect import signature
 from typing import Any
 
@@ -12,7 +12,6 @@ from cosim.simulation.scenario import Scenario
 from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.identifiability import Directions, covariances, directions, neighbours
 from cosim.tuning.parameters import Tunable
-from cosim.tuning.search_progress import Bar, Progress
 from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
 from cosim.tuning.tuning_result import Searched, Tuning
 from fmu_observer.design.optimisers.known_optimisers import find_optimiser
@@ -20,7 +19,8 @@ from fmu_observer.design.optimisers.methods.likelihood_gradient import Likelihoo
 from fmu_observer.design.optimisers.optimiser import Optimiser
 from fmu_observer.design.optimisers.search_space import SearchSpace
 
-ITERATIONS = "iterations.jsonl"
+Progress = Callable[[int, int, str], None]
+_ITERATIONS = "iterations.jsonl"
 _REPLAYED = "as members of a batch over the inputs of the observer"
 _NEAR_BOUND = 1e-3
 """Share of the range of a parameter within which a value counts as standing at its end."""
@@ -57,7 +57,7 @@ class Study:
         self.method, self.iterations = method, iterations
         self.options = {name: value for name, value in options.items() if name != "gradients"}  # found out here
         self.done: list[Searched] = []
-        self._bar = Bar(progress)
+        self._bar = _Bar(progress)
         self._slopes: LikelihoodSlopes | None = None
         _make_optimiser(method, asked.space, 0, options)  # refused before anything is run
 
@@ -99,7 +99,7 @@ class Study:
 
     def _search_all(self, searches: int, fixed: Mapping[str, float]) -> bool:
         """Search as often as asked for, or until somebody interrupts; whether somebody did."""
-        (self.evaluator.directory / ITERATIONS).unlink(missing_ok=True)
+        (self.evaluator.directory / _ITERATIONS).unlink(missing_ok=True)
         try:
             for seed in range(searches):
                 self._search(seed, self.asked.space.without(fixed), fixed)
@@ -153,7 +153,7 @@ class Study:
             counts.append(optimiser.evaluations)
             best = self._whole(fixed, space.named(optimiser.best))
             entry = label | {"evaluations": optimiser.evaluations, "cost": optimiser.best_cost, "best": best}
-            write_line(self.evaluator.directory / ITERATIONS, entry)
+            write_line(self.evaluator.directory / _ITERATIONS, entry)
             self.done = [*(s for s in self.done if s.seed != seed), Searched(seed, best, costs, counts)]
 
     def _differentiated(self) -> str:
@@ -209,6 +209,32 @@ class Study:
         later = [] if at_best is None else at_best.warnings()
         texts += [f"At the best candidate: {text}" for text in later if text not in texts]
         return texts + [f"{len(runs)} runs failed: {why}; {runs[0]}" for why, runs in self.evaluator.failures.items()]
+
+
+class _Bar:
+    """What is to come is known as far as populations have one size.
+
+    Args:
+        progress: called with runs done, runs in all as far as known, and what is done; None for nobody.
+    """
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.text = ""
+        self._progress, self._done, self._total = progress, 0, 0
+
+    def expect(self, now: int, later: int) -> None:
+        """Before a population.
+
+        Args:
+            now: runs of it. later: populations of this search after it.
+        """
+        self._total = self._done + now * (1 + later)
+
+    def step(self) -> None:
+        """A run is done."""
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done, max(self._total, self._done), self.text)
 
 
 def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, str]) -> list[str]:

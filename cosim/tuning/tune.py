@@ -16,10 +16,9 @@ from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost, make_cost
 from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.parameters import Bounds, Tunable, tunable
-from cosim.tuning.search_progress import Progress
 from cosim.tuning.seeded_scenarios import Seeded, seeded, why_whole, with_observer
 from cosim.tuning.shifted_seeds import drawn, with_seed
-from cosim.tuning.study import Study
+from cosim.tuning.study import Progress, Study
 from cosim.tuning.tuning_files import write_tuning
 from cosim.tuning.tuning_result import Tuning
 
