@@ -226,4 +226,6 @@ def test_missing_samples_do_not_end_a_chunk(follower: Path, tmp_path: Path) -> N
     python, compiled = both(scenario)
     assert python.failure is None
     assert_same(python, compiled)
-    assert steps_compiled(compiled) == COUNT
+    chunks: list[float] = []
+    scenario.run(progress=lambda t, _: chunks.append(t), warn=lambda _: None)
+    assert len(chunks) <= 4  # of 1, 8 and the other 3 steps, and the end

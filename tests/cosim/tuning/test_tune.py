@@ -224,7 +224,7 @@ def test_members_are_stepped_in_parts_of_which_memory_does_not_grow(monkeypatch:
     outcome = drive_with_poor_guess().run()
     monkeypatch.setattr("cosim.tuning.replays.BYTES", 5 * outcome.result.table.nbytes)
     replays, cost = Replays(outcome, "filter"), LikelihoodCost("filter")
-    draws = np.random.default_rng(3).uniform(0.1, 1.0, 1200)
+    draws = np.random.default_rng(3).uniform(0.1, 1.0, 500)
     candidates = [{"filter.process_variance[1]": float(value)} for value in draws]
 
     def costs(asked: list[dict[str, float]]) -> tuple[list[float], int]:
@@ -237,7 +237,7 @@ def test_members_are_stepped_in_parts_of_which_memory_does_not_grow(monkeypatch:
     few, _ = costs(candidates[:12])
     assert few == [costs([candidate])[0][0] for candidate in candidates[:12]]
     assert len(set(few)) == 12
-    _, small = costs(candidates[:120])
+    _, small = costs(candidates[:50])
     _, large = costs(candidates)
     assert large < small + 100 * len(candidates)  # a number each, and its name
 
