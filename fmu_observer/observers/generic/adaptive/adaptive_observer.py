@@ -36,7 +36,7 @@ from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.generic.adaptive.adaptive_search import adaptive_search
+from fmu_observer.observers.generic.adaptive.adaptive_limits import adaptive_search
 from fmu_observer.observers.model_signals import arrival_event, estimate_outputs, estimate_states
 from plant_models.hybrid import Array, HybridSystem, Runtime, Signal, output_signal, parameter, scalar_names
 
