@@ -28,7 +28,7 @@ from cosim.report.figures.main_picture import main_picture
 from cosim.scenario import network_table, schema
 from cosim.scenario import scenario_tables as tables
 from cosim.scenario.model_name import ModelName
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent

@@ -16,7 +16,7 @@ from cosim.run.component_models import given_parameters, make_system, values_in_
 from cosim.run.expected_gaps import ExpectedGap
 from cosim.scenario.scenario_tables import ComponentTable
 from fmu_observer.certificates.finding import Finding
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, DECREASE, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, DECREASE, GROWTH
 from fmu_observer.observers.evaluated_observer import OTHER_GAINS
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity

@@ -20,7 +20,7 @@ import numpy as np
 from fmu_observer.certificates.bisection import bisected
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
-from fmu_observer.certificates.gap_finding import gap_finding
+from fmu_observer.certificates.gap_findings import gap_finding
 from fmu_observer.certificates.quadratic import (
     Decrease,
     QuadraticCondition,

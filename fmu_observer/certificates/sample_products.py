@@ -15,7 +15,7 @@ import scipy
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
-from fmu_observer.certificates.gap_finding import gap_finding
+from fmu_observer.certificates.gap_findings import gap_finding
 from fmu_observer.certificates.matrix_exponential import small_exponential
 from fmu_observer.certificates.quadratic import (
     Decrease,

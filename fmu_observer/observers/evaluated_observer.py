@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.finding import Finding
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, explained_gaps
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, explained_gaps
 from fmu_observer.observers.innovation_gate import GATE_PARAMETERS
 from fmu_observer.observers.parameter_values import Value, parameter_values, replaced_parameters
 from plant_models.hybrid import HybridSystem, Signal

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.certificates.finding import Finding
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
 from fmus.documentation.licences import licence_files, model_terms
 from fmus.documentation.prose import blocks, pieces

@@ -10,7 +10,7 @@ from adaptive_runs import Samples, motion
 from own_condition import own_condition
 from scipy.integrate import solve_ivp
 
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.formulas.adaptation.adaptive_law import _own_excitation, smallest_eigenvalue
 from fmu_observer.models.known_models import find_state_affine_model

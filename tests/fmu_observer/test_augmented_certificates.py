@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from fmu_observer.certificates.aperiodic import aperiodic_limit
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, GROWTH
 from fmu_observer.design.augmented_gains import (
     UNIT_POLES,
     _noise_to_speed,

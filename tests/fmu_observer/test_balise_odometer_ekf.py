@@ -8,7 +8,7 @@ import scipy
 from observer_runner import SystemRunner
 
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates.gap_finding import DECREASE, GROWTH
+from fmu_observer.certificates.gap_findings import DECREASE, GROWTH
 from fmu_observer.observers.train.balise_odometer_ekf import transition
 
 MASS, DRAG, EFFORT, PERIOD = 50e3, 800.0, 20e3, 0.1

@@ -10,7 +10,7 @@ from sampled_runner import SampledRunner, chain, true_motion
 from scipy.linalg import expm, solve_discrete_are
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, DECREASE, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, DECREASE, GROWTH
 from fmu_observer.certificates.impulsive_error import ImpulsiveError, row_echelon
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sampled_error import SampledError

@@ -7,7 +7,7 @@ import pytest
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, DECREASE, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, DECREASE, GROWTH
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo
 

@@ -8,7 +8,7 @@ import pytest
 from observer_runner import TRAIN_OBSERVERS
 
 from fmu_observer.certificates.finding import Finding
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, GROWTH
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
 from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, TakagiSugenoCdo, TrainObserver
 

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.aperiodic import certify_sampled_error, common_decrease
-from fmu_observer.certificates.gap_finding import DECREASE
+from fmu_observer.certificates.gap_findings import DECREASE
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sampled_error import SampledError

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
 from fmu_observer.certificates.aperiodic import certify_sampled_error
-from fmu_observer.certificates.gap_finding import explained_gaps
+from fmu_observer.certificates.gap_findings import explained_gaps
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit

@@ -19,7 +19,7 @@ from fmu_observer.block import make_block
 from fmu_observer.certificates.aperiodic import certify_sampled_error, common_decrease
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
 from fmu_observer.certificates.switching_error import SwitchingError
 from fmu_observer.formulas.correction.innovation_decay import innovation_left

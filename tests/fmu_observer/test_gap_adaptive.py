@@ -16,7 +16,7 @@ from observer_runner import DAVIS_A, DAVIS_B, DAVIS_C, INERTIA, MASS, RADIUS, St
 from scipy.linalg import eigh, expm
 
 from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, GROWTH
 from fmu_observer.observers.train import AdaptiveGainCdo, DifferentiatorCdo, TrainObserver
 from plant_models.hybrid import Runtime
 

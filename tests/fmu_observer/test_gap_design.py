@@ -15,7 +15,7 @@ from own_condition import other_gains
 from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates.gap_finding import GROWTH
+from fmu_observer.certificates.gap_findings import GROWTH
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import rounded_down
 from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver

@@ -7,7 +7,7 @@ from sampled_runner import SampledRunner, chain, true_motion
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, GROWTH
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observers.generic.sampled import RiccatiHighGain
 

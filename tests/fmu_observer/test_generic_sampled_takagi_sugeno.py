@@ -12,7 +12,7 @@ from own_condition import own_condition
 from sampled_runner import SampledRunner, aperiodic_instants, true_motion
 from scipy.linalg import expm
 
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, GROWTH
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.observers.generic.sampled import TakagiSugenoAperiodic, TakagiSugenoPeriodic

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from observer_runner import SteadyMotion, in_step
 
-from fmu_observer.certificates.gap_finding import DECREASE
+from fmu_observer.certificates.gap_findings import DECREASE
 from fmu_observer.observers.train import MultirateCdo
 from plant_models.hybrid import scalar_names
 

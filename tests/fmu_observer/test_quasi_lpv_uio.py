@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cosim import Scenario
-from fmu_observer.certificates.gap_finding import GROWTH
+from fmu_observer.certificates.gap_findings import GROWTH
 from fmu_observer.design.quasi_lpv_published import PUBLISHED, SECTION_3_3_4
 from fmu_observer.observers.train import OdometerReset, QuasiLpvUio
 from fmu_observer.observers.train.quasi_lpv_uio import speed_errors

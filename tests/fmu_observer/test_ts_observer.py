@@ -13,7 +13,7 @@ from own_condition import own_condition
 from takagi_sugeno_runs import PLANTS, errors, final_quarter, sampling
 
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import GROWTH
+from fmu_observer.certificates.gap_findings import GROWTH
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.exhibits.four_state_example import triangularisable_chain
 from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model

@@ -16,7 +16,7 @@ from fmpy import read_model_description
 from lxml import etree, html
 
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.documentation.licences import licence_files, licence_texts
 from fmus.documentation.page import page

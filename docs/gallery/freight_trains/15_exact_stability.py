@@ -9,7 +9,7 @@ import numpy as np
 from shared.sheet import Sheet
 
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.observers.generic.sampled import GeneralTakagiSugenoCdo
 from fmu_observer.observers.train import TakagiSugenoCdo
 

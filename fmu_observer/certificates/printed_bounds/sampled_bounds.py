@@ -15,7 +15,7 @@ import scipy
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.finding import Finding, as_printed
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import HighGainBounds, high_gain_bounds
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.models.observer_model import shift_matrix

@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
-from fmu_observer.certificates.gap_finding import gap_finding
+from fmu_observer.certificates.gap_findings import gap_finding
 from fmu_observer.formulas.filtering.kalman import (
     correct,
     integrated_noise,

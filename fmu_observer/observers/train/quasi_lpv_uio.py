@@ -9,7 +9,7 @@ import numpy as np
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import first_unstable_gap, rows_of
-from fmu_observer.certificates.gap_finding import gap_finding
+from fmu_observer.certificates.gap_findings import gap_finding
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.periodic import PeriodicStability, periodic_stability
 from fmu_observer.certificates.polytope import polytope_stability

@@ -14,7 +14,7 @@ import scipy
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
-from fmu_observer.certificates.gap_finding import gap_finding
+from fmu_observer.certificates.gap_findings import gap_finding
 from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,

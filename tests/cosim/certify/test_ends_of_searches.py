@@ -16,7 +16,7 @@ from cosim.certify.simulated_limit import reach
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.finding import limit_found, to_simulate
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, explained_gaps, gap_finding
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, explained_gaps, gap_finding
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.observers.generic.adaptive.adaptive_observer import SHORTEST, _longest_kept
 from fmu_observer.observers.generic.delayed import DelayedStateObserver

@@ -7,7 +7,7 @@ import pytest
 
 from cosim.certify import keeps_plant, simulated, simulated_limit
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.certificates.limit_search import LimitSearch
 from fmu_observer.observers.generic.sampled import OutputPredictor
 from fmu_observer.observers.train import DelayedTrainObserver, MultirateCdo

@@ -24,7 +24,7 @@ from cosim.run import observer_findings
 from cosim.run.expected_gaps import ExpectedGap
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.finding import Finding
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, gap_finding
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, gap_finding
 from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal
 

@@ -14,7 +14,7 @@ import numpy as np
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.finding import Finding, as_printed, condition_found, limit_found, to_simulate
 from fmu_observer.certificates.gap_error import first_unstable_gap
-from fmu_observer.certificates.gap_finding import with_limit
+from fmu_observer.certificates.gap_findings import with_limit
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.formulas.adaptation.adaptive_law import (

@@ -12,7 +12,7 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
 from fmu_observer.certificates.finding import Finding, as_printed, condition_found
 from fmu_observer.certificates.gap_error import GapError
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DecayBounds, decay_bounds
 from fmu_observer.formulas.correction.innovation_decay import ELAPSED, decay_parameters, innovation_left

@@ -8,7 +8,7 @@ import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.finding import Finding, condition_found
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP, GROWTH
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP, GROWTH
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.models.known_models import find_model
 from fmu_observer.models.observer_model import ObserverModel

@@ -16,7 +16,7 @@ import numpy as np
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.finding import Finding, as_printed, to_simulate
 from fmu_observer.certificates.gap_error import GapError
-from fmu_observer.certificates.gap_finding import CONSTANT_GAP
+from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.models.observer_model import ObserverModel, shift_matrix
 from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
