@@ -207,7 +207,11 @@ class RecordedLocaliser(Localiser):
 
 
 def recorded_crossing(record: BaliseRecord) -> Crossing:
-    """The crossing of a recorded telegram."""
+    """The crossing of a recorded telegram.
+
+    Args:
+        record: the telegram.
+    """
     return Crossing(record.stamp, record.position, record.identity, record.location_accuracy, record.method)
 
 

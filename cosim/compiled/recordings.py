@@ -72,7 +72,7 @@ class NativeRecording:
     def __init__(self, slave: RecordingSlave, library: Any) -> None:
         self.recording = recording = slave.recording
         self._library = library
-        self._arrays = [
+        self._arrays: list[np.ndarray] = [
             np.ascontiguousarray(recording.time, dtype=np.float64),
             np.ascontiguousarray(recording.values, dtype=np.float64),
             np.ascontiguousarray(recording.held, dtype=np.uint8),

@@ -56,7 +56,10 @@ class ObserverRuns:
     found: dict[str, ObserverRun] = field(default_factory=dict)
 
     def run(self, listeners: Sequence[Listener]) -> None:
-        """Run all of them.
+        """Run them all.
+
+        Args:
+            listeners: the observers.
 
         Raises:
             KeyboardInterrupt: somebody interrupts.

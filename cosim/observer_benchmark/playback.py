@@ -244,7 +244,7 @@ def needed_components(parts: ScenarioParts, listener: Listener) -> list[str]:
     """Names of the recorded components that an observer needs beside it.
 
     Args:
-        parts: of the scenario.
+        parts: of the scenario. listener: the observer.
 
     Raises:
         ScenarioError: it listens to itself.
@@ -261,7 +261,11 @@ def needed_components(parts: ScenarioParts, listener: Listener) -> list[str]:
 
 
 def is_over_network(parts: ScenarioParts, name: str) -> bool:
-    """Whether measurements reach an observer of this name over the network of the scenario."""
+    """Whether measurements reach an observer over the network of the scenario.
+
+    Args:
+        parts: of the scenario. name: of the observer.
+    """
     network = parts.table.network
     return network is not None and (network.receivers is None or name in network.receivers)
 
