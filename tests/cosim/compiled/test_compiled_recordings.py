@@ -121,7 +121,7 @@ def tables(draw: st.DrawFn, names: Sequence[str], *, whole: bool = False) -> Tab
     return Table(time, columns, of_run)
 
 
-def telegram(number: int, stamp: float, late: float, kind: str) -> BaliseRecord:
+def telegram(number: int, stamp: float, late: float, kind: Any) -> BaliseRecord:
     delivered = float("nan") if kind == "missed" else stamp + late
     return BaliseRecord(
         stamp, delivered, f"B{number}", 10.0 * number, 10.0 * number + 0.1, 0.4, 5.0 + number, kind, "rollback", 1e-9
