@@ -61,6 +61,9 @@ class ObserverRuns:
         Args:
             listeners: the observers.
 
+        Args:
+            listeners: observers beside the recording.
+
         Raises:
             KeyboardInterrupt: somebody interrupts.
         """

@@ -28,8 +28,8 @@ from plant_models.explained_error import explained
 try:
     import cloudpickle
     import distributed
-except ImportError as error:
-    raise OutputError("--scheduler needs dask.distributed: pip install 'fmu-observer[cluster]'") from error
+except ImportError:  # an optional extra; who names a scheduler is refused in words
+    distributed = None
 
 _PATIENCE = 30.0
 """How long is waited for the scheduler, and for a first worker of it [s]."""
@@ -83,10 +83,13 @@ class Cluster(AbstractContextManager["Cluster"]):
         address: of the scheduler, ``tcp://host:8786``.
 
     Raises:
+        OutputError: dask.distributed is not installed.
         RunError: the scheduler is not reached, has no workers, or one of them has other versions of the packages.
     """
 
     def __init__(self, address: str) -> None:
+        if distributed is None:
+            raise OutputError("--scheduler needs dask.distributed: pip install 'fmu-observer[cluster]'")
         self.address = address
         try:
             self._client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)

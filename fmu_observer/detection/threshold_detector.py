@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, discrete_output, input_signal, memory, parameter
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 
 NEVER = 1e9  # [s]
 ROUNDING = 1e-9  # [s], of summed sample periods

@@ -18,7 +18,7 @@ from fmu_observer.observers.innovation_gate import (
 )
 from plant_models.hybrid import Array, Event, HybridSystem, TriggeredEvent, input_signal
 from plant_models.hybrid.missing import or_else
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 
 GATED_EVENT = "balise"
 _REPORTED_POSITION = "balise_position"

@@ -7,13 +7,12 @@ a condition. Mirrored by `runtime_unfulfilled` of the C runtime. Knows systems, 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from sys import float_info
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_models.hybrid.signal import Signal, scalar_names
+from plant_models.hybrid.signal import scalar_names
 
 if TYPE_CHECKING:
     from plant_models.hybrid.system import HybridSystem
@@ -21,25 +20,6 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 4
 """Values that are named of one requirement, as in `runtime/model.h` of the C runtime."""
-
-
-def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
-    """Requirements that parameters are finite and lie within their `min` and `max`.
-
-    Args:
-        signals: of the parameters.
-        p: named tuple of all parameters, their values plain or traced.
-
-    Returns:
-        By text, with the name of the parameter and what is legal: 1 where it is fulfilled, else 0.
-    """
-    needed = {}
-    for signal in signals:
-        low = -float_info.max if signal.min is None else signal.min
-        high = float_info.max if signal.max is None else signal.max
-        for name, value in zip(signal.scalar_names, signal.entries(getattr(p, signal.name)), strict=True):
-            needed[f"{name} must be {signal.bounds}"] = np.where(value >= low, np.where(value <= high, 1.0, 0.0), 0.0)
-    return needed
 
 
 WORD = re.compile(r"\w+(?:\[[\d,]+\])?")

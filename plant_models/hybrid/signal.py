@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from keyword import iskeyword
+from sys import float_info
 from typing import Any, Literal
 
 import numpy as np
@@ -327,3 +328,22 @@ def scalar_names(signals: Sequence[Signal]) -> tuple[str, ...]:
 def width(signals: Sequence[Signal]) -> int:
     """Number of scalar variables of `signals`."""
     return sum(signal.width for signal in signals)
+
+
+def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
+    """Requirements that parameters are finite and lie within their `min` and `max`.
+
+    Args:
+        signals: of the parameters.
+        p: named tuple of all parameters, their values plain or traced.
+
+    Returns:
+        By text, with the name of the parameter and what is legal: 1 where it is fulfilled, else 0.
+    """
+    needed = {}
+    for signal in signals:
+        low = -float_info.max if signal.min is None else signal.min
+        high = float_info.max if signal.max is None else signal.max
+        for name, value in zip(signal.scalar_names, signal.entries(getattr(p, signal.name)), strict=True):
+            needed[f"{name} must be {signal.bounds}"] = np.where(value >= low, np.where(value <= high, 1.0, 0.0), 0.0)
+    return needed

@@ -18,7 +18,7 @@ from plant_models.hybrid.arrays import Array, of_length, vector
 from plant_models.hybrid.declaration_checks import check_declarations
 from plant_models.hybrid.declarations import Declarations
 from plant_models.hybrid.missing import is_there, or_else
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 from plant_models.hybrid.signal_layout import SignalLayout
 
 __all__ = ["HybridSystem"]

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, Signal, memory, output_signal, parameter, state
-from plant_models.hybrid.requirements import unfulfilled, within_bounds
+from plant_models.hybrid.requirements import unfulfilled
+from plant_models.hybrid.signal import within_bounds
 from plant_models.hybrid.signal_layout import SignalLayout
 from plant_models.hybrid.tracing import TracedSystem
 

@@ -28,7 +28,7 @@ from fmu_observer.observers.train.train_resistance import rolling_drag
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION, SPEED
 from plant_models.hybrid import Array, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 
 _BOUND_NUMBERS = {  # of `ErrorBounds`: by which parameter
     "period": "odometer_period",

@@ -30,7 +30,7 @@ from fmu_observer.observers.model_signals import matrix_parameter
 from plant_models.hybrid import Array, Signal, parameter, vector
 from plant_models.hybrid.missing import is_there
 from plant_models.hybrid.option import require_chosen
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 
 Form = Literal["joseph", "short", "square_root"]
 

@@ -32,7 +32,7 @@ from fmu_observer.observers.model_signals import (
 from plant_models.hybrid import Array, PeriodicEvent, Signal, discrete_output, input_signal, memory, parameter
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.noise import Purpose
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 
 DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
 VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]

@@ -35,7 +35,7 @@ from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import Array, Signal, parameter, vector
 from plant_models.hybrid.missing import is_there, or_else
 from plant_models.hybrid.option import is_number
-from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import within_bounds
 
 _TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not shown
 _PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it

@@ -28,8 +28,8 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.integration import rk4_step
-from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.scan import enclosed, scan
+from plant_models.hybrid.signal import within_bounds
 
 _OUTSIDE_CELLS = 0.5
 """Cells beyond its table from which a window counts as outside: less comes of rounding and of mild noise."""
