@@ -37,7 +37,7 @@ def main(names: list[str]) -> None:
         construct = median(cls)
         certify = (
             "-"
-            if name not in OBSERVERS or not hasattr(system, "certify")
+            if name not in OBSERVERS or not hasattr(system, "sampled_events")
             else f"{once(lambda s=system: next(s.findings(0.2))):.1f}"
         )
         columns = f"{native(system):>10.3f}{python(system):>10.2f}{1e3 * construct:>11.2f}{certify:>10}"

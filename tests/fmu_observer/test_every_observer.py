@@ -14,7 +14,7 @@ from situations import Follower, Situation, observers
 
 ALL = observers()
 SAMPLED = {name: s for name, s in ALL.items() if s.system.triggered_events}
-CERTIFIED = {name: s for name, s in SAMPLED.items() if hasattr(s.system, "certify")}
+CERTIFIED = {name: s for name, s in SAMPLED.items() if hasattr(s.system, "sampled_events")}
 
 every = pytest.mark.parametrize("name", ALL)
 DURATION = 20.0

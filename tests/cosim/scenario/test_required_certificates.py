@@ -28,7 +28,7 @@ from fmu_observer.certificates.gap_findings import CONSTANT_GAP, gap_finding
 from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal
 
-CERTIFIED = [name for name, observer in OBSERVERS.items() if hasattr(observer, "certify")]
+CERTIFIED = [name for name, observer in OBSERVERS.items() if hasattr(observer, "sampled_events")]
 TOLD = [name for name in CERTIFIED if shipped(name).triggered_events]
 
 
