@@ -5,7 +5,6 @@ from __future__ import annotations
 from fmu_observer.detection.train_isolation import FAULTS, RESIDUALS
 from fmu_observer.detection.train_residuals import ABSENT
 from plant_models.hybrid import (
-    OutputWarning,
     PeriodicEvent,
     Signal,
     TriggeredEvent,
@@ -13,6 +12,7 @@ from plant_models.hybrid import (
     input_signal,
     output_signal,
     parameter,
+    warning_output,
 )
 from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS
 
@@ -51,17 +51,14 @@ OUTPUTS = (
     discrete_output("fault", "1", "1 while a fault is detected, whether it is isolated or not"),
     discrete_output("odometer_fault", "1", "1 while the first odometer is suspected or at fault"),
     discrete_output("fault_count", "1", "How many faults are suspected or isolated"),
-    discrete_output(
+    warning_output(
         "several_faults",
-        "1",
         "1 while no single fault explains the alarms, or not that which is isolated; two odometers that are off alike "
         "under an effort that may slip both are told as the rail",
-        warning=OutputWarning(
-            "detected faults that it could not isolate: no single fault of its table moves all the residuals that are "
-            "above their thresholds. Look at the ratios: several sensors are at fault, or one in a way that the table "
-            "does not have",
-            ("fault", "fault_count"),
-        ),
+        "detected faults that it could not isolate: no single fault of its table moves all the residuals that are "
+        "above their thresholds. Look at the ratios: several sensors are at fault, or one in a way that the table "
+        "does not have",
+        ("fault", "fault_count"),
     ),
     discrete_output("detection_time", "s", "Instant of the last detection; -1 none"),
     discrete_output("confidence", "1", "1 less threshold over the weakest alarm of the verdict, 0..1"),
@@ -70,16 +67,13 @@ OUTPUTS = (
     discrete_output("traction_efficiency", "1", "Share of traction that reaches the train"),
     discrete_output("brake_performance", "1", "Share of brake force, by the measured pressure"),
     discrete_output("brake_by_demand", "1", "Share of brake force, by the demand"),
-    discrete_output(
+    warning_output(
         "isolation_limited",
-        "1",
         "1 where a sensor is missing that isolation needs",
-        warning=OutputWarning(
-            "a sensor was not connected that isolation needs: without the second odometer a fault of the first is not "
-            "told from slip of all wheels, without the radar a false balise is not told from that slip, without the "
-            "brake pressure cylinders are not told from friction; TrainDiagnosis.isolability(sensors) says more",
-            ("isolation_limited",),
-        ),
+        "a sensor was not connected that isolation needs: without the second odometer a fault of the first is not "
+        "told from slip of all wheels, without the radar a false balise is not told from that slip, without the "
+        "brake pressure cylinders are not told from friction; TrainDiagnosis.isolability(sensors) says more",
+        ("isolation_limited",),
     ),
     *(
         discrete_output(
@@ -87,17 +81,14 @@ OUTPUTS = (
         )
         for share in SHARES
     ),
-    discrete_output(
+    warning_output(
         "shares_unknown",
-        "1",
         "How many of the three shares of traction and brake are unknown",
-        warning=OutputWarning(
-            "not every share of traction and brake is known: the run is shorter than the window of force_window coarse "
-            "steps, no such effort changed the speed by least_excitation within one while the speeds agreed, or the "
-            "share lies outside of least_share to most_share, and what is told is the end",
-            ("shares_unknown", *(f"{share}_unknown" for share in SHARES)),
-            at_end=True,
-        ),
+        "not every share of traction and brake is known: the run is shorter than the window of force_window coarse "
+        "steps, no such effort changed the speed by least_excitation within one while the speeds agreed, or the "
+        "share lies outside of least_share to most_share, and what is told is the end",
+        ("shares_unknown", *(f"{share}_unknown" for share in SHARES)),
+        at_end=True,
     ),
     *(discrete_output(f"ratio_{name}", "1", f"Residual {name} over its threshold") for name in RESIDUALS),
 )

@@ -19,31 +19,25 @@ from fmu_observer.formulas.moving_horizon.gauss_newton import WindowProblem, pas
 from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, Iterated, contradicted, unsettled
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import Array, OutputWarning, discrete_output, memory
+from plant_models.hybrid import Array, discrete_output, memory, warning_output
 from plant_models.hybrid.option import is_number, require_whole
 
 TOLERANCE, _MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
 ENDED = (
     discrete_output("converged", "1", "1 where the last window was solved to the tolerance"),
-    discrete_output(
+    warning_output(
         "deadline_missed",
-        "1",
         "1 where the deadline came first",
-        warning=OutputWarning(
-            "the deadline came before the solution of its window, and the last feasible answer stands, at worst the "
-            "prediction. Allow more time, or a smaller window",
-            ("passes_used", "last_step"),
-        ),
+        "the deadline came before the solution of its window, and the last feasible answer stands, at worst the "
+        "prediction. Allow more time, or a smaller window",
+        ("passes_used", "last_step"),
     ),
-    discrete_output(
+    warning_output(
         "stopped_early",
-        "1",
         "1 where the search ended above the tolerance, but not by the deadline",
-        warning=OutputWarning(
-            "the search in its window ended above the tolerance, and its last feasible answer stands. Allow more steps "
-            "(max_iterations), or a larger tolerance",
-            ("passes_used", "last_step"),
-        ),
+        "the search in its window ended above the tolerance, and its last feasible answer stands. Allow more steps "
+        "(max_iterations), or a larger tolerance",
+        ("passes_used", "last_step"),
     ),
     discrete_output("feasible", "1", "1 where the answer keeps bounds and transitions"),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, Signal, input_signal, memory, parameter, vector
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, Signal, memory, parameter, standard_normal, vector
 
 
 class NoisyPlant(HybridSystem):
@@ -59,8 +59,8 @@ class NoisyPlant(HybridSystem):
             ),
         )
         noises = (
-            input_signal("process_normal", "1", 0.0, "Standard normal numbers", variability="discrete", size=n),
-            input_signal("measurement_normal", "1", 0.0, "Standard normal numbers", variability="discrete", size=q),
+            standard_normal("process_normal", "Standard normal numbers", size=n),
+            standard_normal("measurement_normal", "Standard normal numbers", size=q),
         )
         self.events = (PeriodicEvent("sampling", "sample_period", noises=noises, description="A sample is taken"),)
 

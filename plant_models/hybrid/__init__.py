@@ -19,7 +19,9 @@ from plant_models.hybrid.signal import (
     output_signal,
     parameter,
     scalar_names,
+    standard_normal,
     state,
+    warning_output,
     width,
 )
 from plant_models.hybrid.system import HybridSystem
@@ -55,9 +57,11 @@ __all__ = [
     "output_signal",
     "parameter",
     "scalar_names",
+    "standard_normal",
     "state",
     "traced_once",
     "vector",
+    "warning_output",
     "width",
 ]
 

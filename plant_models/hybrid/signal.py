@@ -272,6 +272,32 @@ def discrete_output(name: str, unit: str, description: str = "", **further: Any)
     return output_signal(name, unit, description, variability="discrete", **further)
 
 
+def warning_output(
+    name: str,
+    description: str,
+    text: str,
+    shows: tuple[str, ...] = (),
+    *,
+    at_end: bool = False,
+    variability: Variability = "discrete",
+) -> Signal:
+    """An output without unit that is zero where all is well, and warns where it is not.
+
+    Args:
+        name, description, variability: as of `output_signal`. text, shows, at_end: as of `OutputWarning`.
+    """
+    return output_signal(name, "1", description, variability=variability, warning=OutputWarning(text, shows, at_end))
+
+
+def standard_normal(name: str, description: str, size: int | None = None) -> Signal:
+    """A noise of a periodic event: standard normal numbers, drawn afresh at every instant.
+
+    Args:
+        name, description, size: as of `input_signal`.
+    """
+    return input_signal(name, "1", 0.0, description, size=size, variability="discrete")
+
+
 def parameter(
     name: str,
     unit: str,

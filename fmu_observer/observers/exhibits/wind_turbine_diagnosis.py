@@ -42,13 +42,13 @@ from plant_models.exhibits.wind_turbine.rotor import Rotor
 from plant_models.hybrid import (
     Array,
     HybridSystem,
-    OutputWarning,
     PeriodicEvent,
     discrete_output,
     input_signal,
     memory,
     parameter,
     vector,
+    warning_output,
 )
 
 
@@ -171,17 +171,14 @@ class WindTurbineDiagnosis(HybridSystem):
             for g in _GROUPS
         ),
         discrete_output("fault", "1", "1 while a fault is detected, whether it is isolated or not"),
-        discrete_output(
+        warning_output(
             "undecided",
-            "1",
             "Pairs of sensors of which one is at fault, not known which, or speeds of rotor and generator apart",
-            warning=OutputWarning(
-                "detected a fault that it could not isolate: two sensors of one quantity disagree by more than their "
-                "limit, and neither contradicts the model by more than its own, compare both with a third; or the two "
-                "of each speed agree, but turn the shaft by more than it can twist (ratio_shaft_angle), check the "
-                "scales of both pairs and gear_ratio",
-                ("fault", "ratio_rotor_sensors", "ratio_generator_sensors", "ratio_shaft_angle"),
-            ),
+            "detected a fault that it could not isolate: two sensors of one quantity disagree by more than their "
+            "limit, and neither contradicts the model by more than its own, compare both with a third; or the two "
+            "of each speed agree, but turn the shaft by more than it can twist (ratio_shaft_angle), check the "
+            "scales of both pairs and gear_ratio",
+            ("fault", "ratio_rotor_sensors", "ratio_generator_sensors", "ratio_shaft_angle"),
         ),
         *(
             discrete_output(

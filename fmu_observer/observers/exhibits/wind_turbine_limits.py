@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_observer.observers.exhibits.drive_train_residuals import WINDOW
 from fmu_observer.observers.exhibits.efficiency_inversion import BLOCKS
-from plant_models.hybrid import Array, OutputWarning, discrete_output
+from plant_models.hybrid import Array, warning_output
 
 _OUTSIDE_UPDATES = 12.0
 """Updates in a row without a bracket that are too many: the default grid moves from 0.97 to 0.05 in eleven."""
@@ -18,47 +18,35 @@ _REPEATED_SHARE = 0.25
 """Share of samples without a new reading that is too large; sensors read half as often repeat every second one."""
 
 WARNINGS = (
-    discrete_output(
+    warning_output(
         "efficiency_unknown",
-        "1",
         "1 until the window of the efficiency is full",
-        warning=OutputWarning(
-            f"never estimated the efficiency: the run is shorter than the {BLOCKS + 1} times update_period that its "
-            "window needs, and no loss can be seen; lower update_period, or let the run go on",
-            at_end=True,
-        ),
+        f"never estimated the efficiency: the run is shorter than the {BLOCKS + 1} times update_period that its "
+        "window needs, and no loss can be seen; lower update_period, or let the run go on",
+        at_end=True,
     ),
-    discrete_output(
+    warning_output(
         "efficiency_outside",
-        "1",
         "1 where the grid has long not bracketed the efficiency",
-        warning=OutputWarning(
-            f"took the end of its grid for the efficiency: for {_OUTSIDE_UPDATES:g} updates and more the grid "
-            "bracketed no measurement; widen it (grid_lowest, grid_highest, least_efficiency, most_efficiency), and "
-            "check wind_bias",
-            shows=("efficiency_estimate",),
-        ),
+        f"took the end of its grid for the efficiency: for {_OUTSIDE_UPDATES:g} updates and more the grid "
+        "bracketed no measurement; widen it (grid_lowest, grid_highest, least_efficiency, most_efficiency), and "
+        "check wind_bias",
+        ("efficiency_estimate",),
     ),
-    discrete_output(
+    warning_output(
         "efficiency_impossible",
-        "1",
         "1 where the efficiency is above 1 by more than its limit",
-        warning=OutputWarning(
-            "estimated an efficiency that no drive train has, more than efficiency_limit above 1: the torque of the "
-            "wind is estimated wrongly, and the alarm of the efficiency means nothing; check wind_bias and rotor data",
-            shows=("efficiency_estimate",),
-        ),
+        "estimated an efficiency that no drive train has, more than efficiency_limit above 1: the torque of the "
+        "wind is estimated wrongly, and the alarm of the efficiency means nothing; check wind_bias and rotor data",
+        ("efficiency_estimate",),
     ),
-    discrete_output(
+    warning_output(
         "readings_repeated",
-        "1",
         "1 where many samples brought no new reading",
-        warning=OutputWarning(
-            "found speeds and torque unchanged at more than a quarter of its samples: sensors are read less often than "
-            "its sample_period, or nothing moves and there is no noise; limits and gains hold for sensors that are "
-            "read at every sample",
-            at_end=True,
-        ),
+        "found speeds and torque unchanged at more than a quarter of its samples: sensors are read less often than "
+        "its sample_period, or nothing moves and there is no noise; limits and gains hold for sensors that are "
+        "read at every sample",
+        at_end=True,
     ),
 )
 

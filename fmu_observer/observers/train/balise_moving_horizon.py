@@ -39,7 +39,7 @@ from fmu_observer.observers.train.balise_odometer_ekf import (
     transition,
 )
 from fmu_observer.observers.train.train_signals import BALISE
-from plant_models.hybrid import Array, OutputWarning, discrete_output, memory, parameter, vector
+from plant_models.hybrid import Array, memory, parameter, vector, warning_output
 from plant_models.hybrid.option import require_chosen
 
 WINDOW, PASSES = 10, 2  # rows and passes unless set otherwise: small, so that it is built in a second [ours]
@@ -52,14 +52,11 @@ _WINDOW_PARAMETERS = (
     parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
 )
 
-_RESTARTS = discrete_output(
+_RESTARTS = warning_output(
     "restarts",
-    "1",
     "Times that the position began anew, since most balises were refused",
-    warning=OutputWarning(
-        "began its position anew where it had refused most of its balises and these agreed: what it told before was "
-        "off by more than its deviation. Look at the first telegrams, and at the deviations",
-    ),
+    "began its position anew where it had refused most of its balises and these agreed: what it told before was "
+    "off by more than its deviation. Look at the first telegrams, and at the deviations",
 )
 
 

@@ -9,20 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant_models.hybrid import Array, OutputWarning, output_signal
+from plant_models.hybrid import Array, warning_output
 
 _ROLL_BACK = 0.3  # [m/s] [ours]: what a wheel must turn backwards for to be no noise: six deviations of 0.05 m/s
 _FADING = 1.0  # [1/s] [ours]: of a disturbance's rate at standstill, where an observer has no rate of its own for it
 
-ROLLS_BACK = output_signal(
+ROLLS_BACK = warning_output(
     "rolls_back",
-    "1",
     "1 while the odometer says that the train rolls back",
-    warning=OutputWarning(
-        "the train rolls back: an observer whose speed follows its model alone does not, for nothing that it is told "
-        "drives a train backwards; compare position and speed with the odometer's",
-        ("position", "speed"),
-    ),
+    "the train rolls back: an observer whose speed follows its model alone does not, for nothing that it is told "
+    "drives a train backwards; compare position and speed with the odometer's",
+    ("position", "speed"),
+    variability="continuous",
 )
 
 

@@ -35,7 +35,6 @@ from fmu_observer.observers.train.train_signals import (
 )
 from plant_models.hybrid import (
     Array,
-    OutputWarning,
     PeriodicEvent,
     Signal,
     discrete_output,
@@ -44,6 +43,7 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     state,
+    warning_output,
 )
 
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
@@ -109,15 +109,12 @@ class StoppingUio(GatedObserver, GapCertified):
         discrete_output("residual_level", "m/s", "Its magnitude as the detector judges it"),
         discrete_output("odometer_fault", "1", "1 while a jam is detected"),
         discrete_output("recovering", "1", "1 while the end of a jam is awaited"),
-        discrete_output(
+        warning_output(
             "held_odometer",
-            "1",
             "1 once the odometer was seen to be held: not for this observer",
-            warning=OutputWarning(
-                "the odometer stands still and then jumps: held data look like a fault at every sample. Give it one "
-                "that is new at every sample_period, by a step that is no longer, or use quasi_lpv_uio",
-                ("speed", "residual"),
-            ),
+            "the odometer stands still and then jumps: held data look like a fault at every sample. Give it one "
+            "that is new at every sample_period, by a step that is no longer, or use quasi_lpv_uio",
+            ("speed", "residual"),
         ),
     )
     parameters = (

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, memory, output_signal, parameter, standard_normal
 
 
 class Wind(HybridSystem):
@@ -44,9 +44,7 @@ class Wind(HybridSystem):
         PeriodicEvent(
             "gust",
             "sample_period",
-            noises=(
-                input_signal("gust_noise", "1", 0.0, "Standard normal number of this gust", variability="discrete"),
-            ),
+            noises=(standard_normal("gust_noise", "Standard normal number of this gust"),),
             description="The turbulence changes",
         ),
     )

@@ -14,15 +14,16 @@ from plant_models.exhibits.wind_turbine.rotor import Rotor
 from plant_models.hybrid import (
     Array,
     HybridSystem,
-    OutputWarning,
     PeriodicEvent,
     discrete_output,
     input_signal,
     memory,
     output_signal,
     parameter,
+    standard_normal,
     state,
     vector,
+    warning_output,
 )
 
 BLADES = 3
@@ -104,15 +105,13 @@ class WindTurbine(HybridSystem):
             )
             for name, unit, n, text in _MEASURED
         ),
-        output_signal(
+        warning_output(
             "drive_train_unstable",
-            "1",
             "1 while the matrix of the drive train has an eigenvalue in the right half-plane",
-            warning=OutputWarning(
-                "the matrix of the drive train is unstable: the thesis prints it so (preset as_published), and no "
-                "drive train of that kind exists; take the preset repaired",
-                ("drive_train_unstable",),
-            ),
+            "the matrix of the drive train is unstable: the thesis prints it so (preset as_published), and no "
+            "drive train of that kind exists; take the preset repaired",
+            ("drive_train_unstable",),
+            variability="continuous",
         ),
     )
     parameters = (
@@ -145,8 +144,7 @@ class WindTurbine(HybridSystem):
             "sampling",
             "sample_period",
             noises=tuple(
-                input_signal(f"{name}_normal", "1", 0.0, "Standard normal numbers", variability="discrete", size=n or 1)
-                for name, _, n, _ in _MEASURED
+                standard_normal(f"{name}_normal", "Standard normal numbers", size=n or 1) for name, _, n, _ in _MEASURED
             ),
             description="The sensors are read",
         ),

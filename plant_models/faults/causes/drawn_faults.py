@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from plant_models.faults.fault_cause import BRAKE_RELEASED, EFFORT, RELEASE_TIME, Fault, FaultCause, one_where
-from plant_models.hybrid import Array
+from plant_models.hybrid import Array, standard_normal
 from plant_models.hybrid.event import PeriodicEvent
-from plant_models.hybrid.signal import input_signal, memory, parameter, state
+from plant_models.hybrid.signal import memory, parameter, state
 
 _NOISES = tuple(
-    input_signal(f"{what}_noise_{part}", "1", 0.0, f"Standard normal number for {text}", variability="discrete")
+    standard_normal(f"{what}_noise_{part}", f"Standard normal number for {text}")
     for what, text in (
         ("onset", "the onset of a fault"),
         ("length", "the length of a fault"),

@@ -9,9 +9,9 @@ import numpy as np
 
 from plant_models.faults.causes.gain_and_offset import GainAndOffset
 from plant_models.faults.fault_cause import Carrier, one_where
-from plant_models.hybrid import Array, vector
+from plant_models.hybrid import Array, standard_normal, vector
 from plant_models.hybrid.event import PeriodicEvent
-from plant_models.hybrid.signal import input_signal, memory, parameter
+from plant_models.hybrid.signal import memory, parameter
 
 
 class LostSamples(GainAndOffset):
@@ -30,7 +30,7 @@ class LostSamples(GainAndOffset):
             "sampling",
             "sample_period",
             None,
-            (input_signal("chance_normal", "1", 0.0, "Standard normal numbers", variability="discrete", size=2),),
+            (standard_normal("chance_normal", "Standard normal numbers", size=2),),
             "A sample is taken, or lost",
         ),
     )

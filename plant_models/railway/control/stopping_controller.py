@@ -13,13 +13,13 @@ import numpy as np
 from plant_models.hybrid import (
     Array,
     HybridSystem,
-    OutputWarning,
     PeriodicEvent,
     discrete_output,
     input_signal,
     memory,
     output_signal,
     parameter,
+    warning_output,
 )
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.stopping_planner import NEVER, BrakePlan, constant_brake, reference_motion
@@ -104,45 +104,33 @@ class StoppingController(HybridSystem):
         output_signal("position_reference", "m", "Position of the reference, now"),
         discrete_output("planned_effort", "N", "Constant effort of the plan, u*"),
         discrete_output("brake_released", "1", "1 while the brake is to be released"),
-        discrete_output(
+        warning_output(
             "no_braking_solution",
-            "1",
             "1 where the drag alone stops the train short of the mark",
-            warning=OutputWarning(
-                "no brake leads to the mark: the drag alone stops the train short of it, so it rolls; enable the "
-                "controller later",
-                ("speed_reference", "remaining_distance"),
-            ),
+            "no brake leads to the mark: the drag alone stops the train short of it, so it rolls; enable the "
+            "controller later",
+            ("speed_reference", "remaining_distance"),
         ),
-        discrete_output(
+        warning_output(
             "limited_plan",
-            "1",
             "1 where the brake is too weak: the train will pass the mark",
-            warning=OutputWarning(
-                "the mark is too near for effort_limit, or behind: the train brakes with all there is and passes it; "
-                "enable the controller sooner, or raise effort_limit",
-                ("speed_reference", "remaining_distance"),
-            ),
+            "the mark is too near for effort_limit, or behind: the train brakes with all there is and passes it; "
+            "enable the controller sooner, or raise effort_limit",
+            ("speed_reference", "remaining_distance"),
         ),
-        discrete_output(
+        warning_output(
             "stands_short",
-            "1",
             "1 where the train stands short of the mark by more than stop_tolerance",
-            warning=OutputWarning(
-                "the train stands short of the mark, and the controller may not pull it there: raise traction_limit "
-                "where it is 0, or look for what braked it beyond the plan",
-                ("remaining_distance",),
-            ),
+            "the train stands short of the mark, and the controller may not pull it there: raise traction_limit "
+            "where it is 0, or look for what braked it beyond the plan",
+            ("remaining_distance",),
         ),
-        discrete_output(
+        warning_output(
             "rolls_back",
-            "1",
             "1 where the train rolls backwards although it is to stand",
-            warning=OutputWarning(
-                "the train rolls back from where it is to stand: holding_effort is too weak for the slope, or acts too "
-                "late; raise it",
-                ("effort", "remaining_distance"),
-            ),
+            "the train rolls back from where it is to stand: holding_effort is too weak for the slope, or acts too "
+            "late; raise it",
+            ("effort", "remaining_distance"),
         ),
         discrete_output("plans", "1", "Number of plans made so far"),
         output_signal("remaining_distance", "m", "Way from the estimated position to the mark, now"),

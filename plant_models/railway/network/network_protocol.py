@@ -19,6 +19,7 @@ from plant_models.hybrid import (
     input_signal,
     memory,
     parameter,
+    standard_normal,
     vector,
 )
 from plant_models.hybrid.noise import Purpose
@@ -68,7 +69,7 @@ class NetworkProtocol(HybridSystem):
             "transmission",
             "period",
             "offset",
-            (input_signal("loss_noise", "1", 0.0, "Standard normal number of the loss", variability="discrete"),),
+            (standard_normal("loss_noise", "Standard normal number of the loss"),),
             "A node sends, and what was sent a delay ago arrives",
         ),
     )

@@ -17,6 +17,7 @@ from plant_models.hybrid import (
     input_signal,
     memory,
     parameter,
+    standard_normal,
 )
 
 
@@ -74,10 +75,8 @@ class Gps(HybridSystem):
             "sample_period",
             "sample_offset",
             noises=(
-                input_signal("drift_noise", "1", 0.0, "Standard normal number of the drift", variability="discrete"),
-                input_signal(
-                    "white_noise", "1", 0.0, "Standard normal number of the white noise", variability="discrete"
-                ),
+                standard_normal("drift_noise", "Standard normal number of the drift"),
+                standard_normal("white_noise", "Standard normal number of the white noise"),
             ),
             description="A fix is taken",
         ),

@@ -18,6 +18,7 @@ from plant_models.hybrid import (
     input_signal,
     memory,
     parameter,
+    standard_normal,
     state,
 )
 from plant_models.hybrid.option import require_chosen
@@ -73,14 +74,14 @@ class PulseOdometer(HybridSystem):
             "sampling",
             "sample_period",
             None,
-            (input_signal("sample_noise", "1", 0.0, "Standard normal number of a sample", variability="discrete"),),
+            (standard_normal("sample_noise", "Standard normal number of a sample"),),
             "The pulses are counted",
         ),
         PeriodicEvent(
             "aggregation",
             "aggregation_period",
             None,
-            (input_signal("reading_noise", "1", 0.0, "Standard normal number of a reading", variability="discrete"),),
+            (standard_normal("reading_noise", "Standard normal number of a reading"),),
             "The samples are aggregated",
         ),
     )

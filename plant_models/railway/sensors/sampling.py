@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from plant_models.hybrid import PeriodicEvent, input_signal
+from plant_models.hybrid import PeriodicEvent, standard_normal
 
-READING_NOISE = input_signal(
-    "reading_noise", "1", 0.0, "Standard normal number of this reading", variability="discrete"
-)
+READING_NOISE = standard_normal("reading_noise", "Standard normal number of this reading")
 
 
 def sampling_event(description: str, offset: str | None = None) -> PeriodicEvent:

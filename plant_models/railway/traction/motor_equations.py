@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import Array, PeriodicEvent, input_signal, parameter
+from plant_models.hybrid import Array, PeriodicEvent, parameter, standard_normal
 from plant_models.railway.traction.transforms import to_rotor
 
 STATE_NAMES = ("current_d", "current_q", "speed", "angle")
@@ -156,13 +156,9 @@ def sampling_event(name: str) -> PeriodicEvent:
         The event, of period `sample_period`.
     """
     process = tuple(
-        input_signal(f"{state}_noise", "1", 0.0, f"Standard normal number of the {state}", variability="discrete")
-        for state in STATE_NAMES
+        standard_normal(f"{state}_noise", f"Standard normal number of the {state}") for state in STATE_NAMES
     )
-    measurement = tuple(
-        input_signal(f"measurement_noise_{i}", "1", 0.0, f"Standard normal number, axis {i}", variability="discrete")
-        for i in (1, 2)
-    )
+    measurement = tuple(standard_normal(f"measurement_noise_{i}", f"Standard normal number, axis {i}") for i in (1, 2))
     return PeriodicEvent(name, "sample_period", None, (*process, *measurement), "The motor is sampled")
 
 

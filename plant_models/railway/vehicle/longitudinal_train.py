@@ -12,7 +12,6 @@ import numpy as np
 from plant_models.hybrid import (
     Array,
     HybridSystem,
-    OutputWarning,
     PeriodicEvent,
     Signal,
     input_signal,
@@ -21,6 +20,7 @@ from plant_models.hybrid import (
     parameter,
     state,
     vector,
+    warning_output,
 )
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
@@ -68,15 +68,13 @@ class _LongitudinalForces(HybridSystem):
         output_signal("resistance_force", "N", "Davis resistance, against the motion"),
         output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
         output_signal("adhesion_limit", "N", "Largest force that the rails can take"),
-        output_signal(
+        warning_output(
             "outside_fitted_range",
-            "1",
             "1 where the speed is outside the range of the Davis coefficients",
-            warning=OutputWarning(
-                "the train left the speeds from fitted_from to fitted_to in which its Davis coefficients hold, and a "
-                "set with davis_c < 0 pulls it at high speed: take another set, or set the range that you accept",
-                ("speed", "resistance_force"),
-            ),
+            "the train left the speeds from fitted_from to fitted_to in which its Davis coefficients hold, and a "
+            "set with davis_c < 0 pulls it at high speed: take another set, or set the range that you accept",
+            ("speed", "resistance_force"),
+            variability="continuous",
         ),
     )
     presets = {}

@@ -16,7 +16,7 @@ from fmu_observer.observers.model_signals import (
     estimate_outputs,
     estimate_states,
 )
-from plant_models.hybrid import Array, OutputWarning, Signal, discrete_output
+from plant_models.hybrid import Array, Signal, discrete_output, warning_output
 from plant_models.hybrid import memory as memory_signal
 
 
@@ -33,14 +33,11 @@ class Belief(NamedTuple):
     drawn: Any = None
 
 
-NOT_POSITIVE = discrete_output(
+NOT_POSITIVE = warning_output(
     "covariance_not_positive",
-    "1",
     "1 once the covariance was not positive semidefinite, or a measurement left nothing of a variance",
-    warning=OutputWarning(
-        "rounding has made its covariance none, so its estimates or deviations mean nothing: take the form joseph or "
-        "square_root, or noises and first deviations whose sizes differ less"
-    ),
+    "rounding has made its covariance none, so its estimates or deviations mean nothing: take the form joseph or "
+    "square_root, or noises and first deviations whose sizes differ less",
 )
 _ROWS = "row by row, SI units"
 

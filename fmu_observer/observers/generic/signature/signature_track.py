@@ -12,7 +12,6 @@ from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from plant_models.hybrid import (
     Array,
     HybridSystem,
-    OutputWarning,
     PeriodicEvent,
     Signal,
     discrete_output,
@@ -21,6 +20,7 @@ from plant_models.hybrid import (
     output_signal,
     parameter,
     vector,
+    warning_output,
 )
 from plant_models.hybrid.option import require_chosen, require_whole
 
@@ -105,15 +105,12 @@ class SignatureTrack(HybridSystem):
         discrete_output("abscissa", "1", "Abscissa of the newest point of S1"),
         discrete_output("ready", "1", "1 while the properties count, else 0"),
         discrete_output("noise", "1", "Deviation of the signal's noise, by third differences"),
-        discrete_output(
+        warning_output(
             "noisy",
-            "1",
             "1 while the noise is above noise_limit",
-            warning=OutputWarning(
-                "found more noise than its verdict bears: with three times noise_limit most verdicts are wrong. "
-                "Filter the signal, or widen the changes that count",
-                ("noise",),
-            ),
+            "found more noise than its verdict bears: with three times noise_limit most verdicts are wrong. "
+            "Filter the signal, or widen the changes that count",
+            ("noise",),
         ),
         output_signal("p1_changed", "1", "1 while the first parameter is judged to have changed"),
         output_signal("p2_changed", "1", "1 while the second parameter is judged to have changed"),
