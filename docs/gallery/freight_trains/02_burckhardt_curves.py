@@ -25,9 +25,7 @@ def main() -> None:
         axis.plot(100.0 * slips, curve.coefficient(slips), label=condition)
         axis.plot(100.0 * slip, peak, "k.")
     axis.set(xlabel="slip (r w - v) / v [%]", ylabel="adhesion coefficient [1]")
-    axis.grid(alpha=0.3)
-    axis.legend()
-    sheet.finish(figure)
+    sheet.finish(figure, axis, fontsize=8.5)
 
 
 if __name__ == "__main__":

@@ -101,9 +101,7 @@ def main() -> None:
             )
     axis.set(xlabel="derivative", ylabel="largest error, last 6 s [1]")
     axis.set_xticks(range(6))
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

@@ -34,9 +34,7 @@ def main() -> None:
     axis.axvline(values["bound"], color="tab:green", label="valid bound")
     axis.axvline(values["printed_bound"], color="tab:red", ls="--", label="printed bound")
     axis.set(xlabel="Lipschitz constant of phi = (0, s x1) [1/s]", ylabel="growth of the error [1/s]")
-    axis.grid(alpha=0.3)
-    axis.legend()
-    sheet.finish(figure)
+    sheet.finish(figure, axis, fontsize=8.5)
 
 
 if __name__ == "__main__":

@@ -52,9 +52,7 @@ def main() -> None:
     for i, state in enumerate(model.states):
         axis.semilogy(t, np.abs(found[:, i]) + 1e-14, lw=0.8, label=f"{state.name} [{state.unit}]")
     axis.set(xlabel="time [s]", ylabel="error of the estimate")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

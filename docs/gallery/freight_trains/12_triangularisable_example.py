@@ -69,9 +69,7 @@ def main() -> None:
             f"largest error norm, 15 to 20 s, noise up to 0.3, {label}", "1", None, final_quarter(t, found)[0], NOISY
         )
     axis.set(xlabel="time [s]", ylabel="norm of the error [1]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

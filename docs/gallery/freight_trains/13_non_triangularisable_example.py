@@ -58,9 +58,7 @@ def main() -> None:
     axes[1].set_ylim(0.0, 0.5)
     for axis in axes:
         axis.set(xlabel="time [s]", ylabel="norm of the error [1]")
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, *axes)
 
 
 if __name__ == "__main__":

@@ -81,9 +81,7 @@ def main() -> None:
         axis.semilogy(*np.transpose(solved), "o-", ms=3, label=f"eta = {eta:g} 1/s")
     axis.axvline(0.5, color="k", ls="--", lw=0.8, label="gap of the thesis, eta = 3 1/s")
     axis.set(xlabel="longest gap between balises [s]", ylabel="attenuation gamma of the train [1]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 def quickly(gap: float, eta: float) -> Theorem7Design | None:

@@ -73,10 +73,7 @@ def main() -> None:
         stable.plot(list(limits), [limit[column] for limit in limits.values()], "o-", label=words)
     stable.axhline(0.5, color="k", ls="--", lw=0.8, label="gap of the thesis")
     stable.set(xlabel="decay of the innovation eta [1/s]", ylabel="longest stable gap [s]")
-    for axis in (growth, stable):
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, growth, stable)
 
 
 if __name__ == "__main__":

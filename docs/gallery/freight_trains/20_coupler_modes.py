@@ -100,10 +100,7 @@ def main() -> None:
     ):
         speeds.plot(TIMES, 3.6 * speed, label=label)
     speeds.set(xlabel="time [s]", ylabel="speed on 8 per mille [km/h]")
-    for axis in (forces, speeds):
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, forces, speeds)
 
 
 if __name__ == "__main__":

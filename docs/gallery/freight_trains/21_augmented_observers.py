@@ -135,10 +135,7 @@ def main() -> None:
     forces.plot(way["time"][::10], true[::10] / 1e3, "k", lw=0.4, label="true")
     forces.set(xlabel="time [s]", ylabel="force of coupler and gradient [kN]")
     speeds.set(xlabel="time [s]", ylabel="speed error, Takagi-Sugeno, theta 0.5 1/s [km/h]", ylim=(1e-3, None))
-    for axis in (speeds, forces):
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, speeds, forces)
 
 
 if __name__ == "__main__":

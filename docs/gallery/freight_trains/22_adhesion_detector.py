@@ -70,9 +70,7 @@ def main() -> None:
     )
     axis.plot(kmh[4:16], 50.0 * middle[4:16], "k--", label="threshold of the rule")
     axis.set(xlabel="speed [km/h]", ylabel="slip relative to the train speed [%]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

@@ -10,10 +10,9 @@ from train_scenarios import (
     DEPARTURE,
     NOT_PRINTED,
     SOURCE,
-    SPEED_ERRORS,
+    add_speed_errors,
     figure,
     indicated,
-    mean_speed_error,
     sanding_time,
     slide,
     yes,
@@ -50,8 +49,5 @@ if __name__ == "__main__":
     sheet.add("indicator on for", "s", 15.0, lasts, BURSTS, repeats=0.05)
     sheet.add("sand requested for", "s", "requested", sanding_time(outcome), SAND, repeats=1.0)
     sheet.add("command goes on rising in slip", "", "yes", yes(bool(during > before)))
-    for name, published in (("multirate_cdo", 0.15), ("takagi_sugeno_cdo", 0.33)):
-        sheet.add(
-            f"mean speed error, {name}", "km/h", published, mean_speed_error(outcome, name), SPEED_ERRORS, repeats=0.05
-        )
+    add_speed_errors(sheet, outcome, (0.15, 0.33))
     sheet.finish(figure({"Sc2": outcome}))

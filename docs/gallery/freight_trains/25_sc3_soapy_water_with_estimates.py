@@ -8,17 +8,7 @@ from __future__ import annotations
 
 from shared.sheet import Sheet
 from shared.shipped import run
-from train_scenarios import (
-    NOT_PRINTED,
-    SOURCE,
-    figure,
-    instant,
-    lowest_limit,
-    mean_speed_error,
-    sanding_time,
-    slide,
-    yes,
-)
+from train_scenarios import NOT_PRINTED, SOURCE, add_speed_errors, figure, instant, lowest_limit, sanded, slide
 
 SEEDS = (
     "over 20 seeds of the receiver an axle passes 15 % in 14 (largest slip 13 to 25 %), and sand is asked for in 5, "
@@ -46,8 +36,6 @@ if __name__ == "__main__":
         "of 350 kN"
     )
     sheet.add("effort saturated at", "%", 17.0, 100.0 * lowest_limit(outcome), reason, repeats=0.1)
-    sheet.add("sand requested", "", "no", yes(sanding_time(outcome) > 0.0), SEEDS)
-    for name in ("multirate_cdo", "takagi_sugeno_cdo"):
-        error = mean_speed_error(outcome, name)
-        sheet.add(f"mean speed error, {name}", "km/h", None, error, "no speed error is printed for Sc3", repeats=0.05)
+    sheet.add("sand requested", "", "no", sanded(outcome), SEEDS)
+    add_speed_errors(sheet, outcome, (None, None), "no speed error is printed for Sc3")
     sheet.finish(figure({"Sc3": outcome}))

@@ -9,17 +9,7 @@ from __future__ import annotations
 
 from shared.sheet import Sheet
 from shared.shipped import run
-from train_scenarios import (
-    NOT_PRINTED,
-    SOURCE,
-    figure,
-    instant,
-    lowest_limit,
-    mean_speed_error,
-    sanding_time,
-    slide,
-    yes,
-)
+from train_scenarios import NOT_PRINTED, SOURCE, add_speed_errors, figure, instant, lowest_limit, sanded, slide, yes
 
 SEEDS = (
     "over 20 seeds of the receiver an axle passes 15 % in 1 (largest slip 11 to 17 %), and sand is asked for in none"
@@ -41,8 +31,6 @@ if __name__ == "__main__":
     reason = "the lowest limit that the controller sets itself on the slippery rail, of 350 kN"
     sheet.add("effort limited to", "%", None, 100.0 * lowest_limit(outcome), reason, repeats=0.1)
     sheet.add("command reduced in slip", "", "yes", yes(lowest_limit(outcome) < 0.5))
-    sheet.add("sand requested", "", "no", yes(sanding_time(outcome) > 0.0))
-    for name in ("multirate_cdo", "takagi_sugeno_cdo"):
-        error = mean_speed_error(outcome, name)
-        sheet.add(f"mean speed error, {name}", "km/h", None, error, "no speed error is printed for Sc4", repeats=0.05)
+    sheet.add("sand requested", "", "no", sanded(outcome))
+    add_speed_errors(sheet, outcome, (None, None), "no speed error is printed for Sc4")
     sheet.finish(figure({"Sc4": outcome}))

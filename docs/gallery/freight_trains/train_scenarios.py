@@ -6,12 +6,13 @@ scenarios judge them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
+from shared.sheet import Sheet
 
 from cosim import Outcome, Scenario
 
@@ -20,6 +21,7 @@ SOURCE = "Bouchama 2024, section 4.5, Table 4.4, Figures 4.18-4.37"
 DEPARTURE, TARGET, JUDGED_FROM, EXCESSIVE = 20.0, 850.0, 2.8, 0.15  # [s], [m], [m/s], [1]
 WATER, EFFORT_LIMIT = (20.0, 250.0), 350e3  # [m], [N]
 AXLES = range(1, 5)
+OBSERVERS = ("multirate_cdo", "takagi_sugeno_cdo")
 EFFORTS = {"command": "controller.effort", "let through": "anti_slip.effort", "adhesion": "train.adhesion_force"}
 NOT_PRINTED = (
     "rail, gradient, departure, receiver, gains and thresholds are not printed, so ours: the story can agree, instants "
@@ -80,6 +82,20 @@ def mean_speed_error(outcome: Outcome, observer: str) -> float:
     return float(3.6 * np.abs(outcome[f"{observer}.speed"] - v)[under_way].mean())
 
 
+def add_speed_errors(
+    sheet: Sheet, outcome: Outcome, published: Sequence[float | None], why: str = SPEED_ERRORS
+) -> None:
+    """Lines of a sheet: the mean speed errors of both observers.
+
+    Args:
+        sheet: of the gallery. outcome: of the run. published: what the thesis prints, an observer each. why: the reason
+        of a difference.
+    """
+    for name, printed in zip(OBSERVERS, published, strict=True):
+        error = mean_speed_error(outcome, name)
+        sheet.add(f"mean speed error, {name}", "km/h", printed, error, why, repeats=0.05)
+
+
 def indicated(outcome: Outcome) -> tuple[float, float]:
     """When the excessive-slip indicator goes on, after the departure [s] (nan: never), and for how long it is on
     [s].
@@ -101,6 +117,11 @@ def sanding_time(outcome: Outcome) -> float:
     if "controller.sanding_request" in (outcome.result.table.dtype.names or ()):
         asked = asked | (outcome["controller.sanding_request"] > 0.5)
     return float(np.trapezoid(asked.astype(float), outcome["time"]))
+
+
+def sanded(outcome: Outcome) -> str:
+    """Whether sand was asked for, in words."""
+    return yes(sanding_time(outcome) > 0.0)
 
 
 def stopped(outcome: Outcome) -> tuple[float, float]:
@@ -141,7 +162,7 @@ def _draw(column: Iterable[plt.Axes], outcome: Outcome) -> None:
     for k in AXLES:
         slips.plot(t, 100.0 * _slip(outcome[f"train.axle_speed[{k}]"], v), lw=0.6, label=f"axle {k}")
     slips.plot(t, 15.0 * (outcome["excessive_slip.slip_indicator"] - 1.0), "r", label="indicator (15 %)")
-    for name in ("multirate_cdo", "takagi_sugeno_cdo"):
+    for name in OBSERVERS:
         errors.plot(t, 3.6 * (outcome[f"{name}.speed"] - v), lw=0.7, label=name)
     words = ("speed [km/h]", "effort [kN]", "slip [%]", "speed error [km/h]")
     for axis, text in zip((speeds, efforts, slips, errors), words, strict=True):

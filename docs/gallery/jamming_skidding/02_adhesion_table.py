@@ -55,9 +55,7 @@ def main() -> None:
         if name != "dry":
             axis.plot(speeds, level * adhesion_coefficient(speeds / 3.6, 0.33), "--", label=f"0.33, {name}")
     axis.set(xlabel="speed [km/h]", ylabel="adhesion coefficient [1]", ylim=(0.0, 0.5))
-    axis.legend(fontsize=8)
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

@@ -74,10 +74,7 @@ def main() -> None:
         near = (outcome["time"] > 14.0) & (outcome["time"] < 17.5)
         right.step(outcome["time"][near], outcome["odometer.reading"][near], where="post", label=label)
     right.set(xlabel="time [s]", ylabel="reading of the odometer [m/s]")
-    for axis in (left, right):
-        axis.legend(fontsize=8)
-        axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, left, right)
 
 
 if __name__ == "__main__":

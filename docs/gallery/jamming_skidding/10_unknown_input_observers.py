@@ -85,9 +85,7 @@ def main() -> None:
         sheet.add(f"largest error of the elongation under a lost effort, {name}", "mm", None, shown, OURS, repeats=0.05)
         axis.plot(t[late], 1e3 * rows[late, 0], label=name)
     axis.set(xlabel="time [s]", ylabel="error of the coupler's elongation [mm]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

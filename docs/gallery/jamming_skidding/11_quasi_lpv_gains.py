@@ -61,9 +61,7 @@ def main() -> None:
         axis.loglog(omega, response / design.attenuation, label=f"{design.section}, vertex 1")
     axis.axhline(1.0, color="k", ls="--", lw=0.8, label="printed lambda")
     axis.set(xlabel="frequency [rad/s]", ylabel="gain from disturbance to residual over lambda [1]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 def poles(sheet: Sheet, design: QuasiLpvDesign) -> None:

@@ -67,9 +67,7 @@ def main() -> None:
     axis.plot(lengths, [p for p, _ in TOLERANT], "k.", label="fault-tolerant, published")
     axis.axhline(0.0, color="grey", lw=0.6)
     axis.set(xlabel="length of each of four jams [ms]", ylabel="position at the stop beyond the mark [m]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

@@ -61,9 +61,7 @@ def main() -> None:
     axis.plot(gaps, [bounds.exact(gap) for gap in gaps], "k--", label="exact worst case")
     axis.plot([0.4, 1.31, 2.12], list(PUBLISHED.values()), "ro", label="thesis, at the time read backwards")
     axis.set(xlabel="time since the last sample used [s]", ylabel="speed error [m/s]", ylim=(0.0, 36.0))
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

@@ -58,10 +58,7 @@ def main() -> None:
     axes[1].plot(-ages, case.acceleration(ages), lw=0.8, label="worst acceleration")
     axes[0].set(xlabel="time since the sample [s]", ylabel="speed error [m/s]")
     axes[1].set(xlabel="time before the worst error [s]", ylabel="acceleration [m/s2]")
-    for axis in axes:
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, *axes)
 
 
 if __name__ == "__main__":

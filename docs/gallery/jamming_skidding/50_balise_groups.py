@@ -44,9 +44,7 @@ def main() -> None:
     axis.step(lengths, 100.0 * (1.0 - np.arange(len(lengths)) / len(gaps)), where="post", label="of the gaps")
     axis.axvline(THESIS_SPACING, color="k", linewidth=0.8, label="spacing of the thesis")
     axis.set(xlabel="length of a gap [m]", ylabel="share in longer gaps [%]")
-    axis.grid(alpha=0.3)
-    axis.legend()
-    sheet.finish(figure)
+    sheet.finish(figure, axis, fontsize=8.5)
 
 
 if __name__ == "__main__":

@@ -44,9 +44,7 @@ def main() -> None:
         axis.plot(speeds, w0 + w1 * speeds + w2 * speeds**2, label=f"{name}, identified")
     _by_speed(sheet, rng)
     axis.set(xlabel="speed [m/s]", ylabel="resistance by mass [m/s2]")
-    axis.grid(alpha=0.3)
-    axis.legend()
-    sheet.finish(figure)
+    sheet.finish(figure, axis, fontsize=8.5)
 
 
 def _by_speed(sheet: Sheet, rng: np.random.Generator) -> None:

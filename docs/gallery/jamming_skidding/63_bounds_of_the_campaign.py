@@ -46,9 +46,7 @@ def main() -> None:
         axis.plot([table[kind][1] for kind in TABLE_5_9], [means[k] for means in TABLE_5_9.values()], "x")
     axis.set(xlabel="time without a reading [s]", ylabel="bound of the speed error [m/s]")
     axis.set_title("x: published, at the mean time of our class", fontsize=9)
-    axis.grid(alpha=0.3)
-    axis.legend()
-    sheet.finish(figure)
+    sheet.finish(figure, axis, fontsize=8.5)
 
 
 if __name__ == "__main__":

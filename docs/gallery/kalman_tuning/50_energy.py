@@ -45,9 +45,7 @@ def main() -> None:
             independent=INDEPENDENT[preset],
         )
     axis.set(xlabel="time [s]", ylabel="energy [J]")
-    axis.legend(fontsize=8)
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

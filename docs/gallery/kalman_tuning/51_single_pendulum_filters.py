@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
-from pendulums import Cell, compared
+from pendulums import Cell, compare
 from shared.sheet import Sheet
 
 NAME = "cart_pendulum"
@@ -22,9 +21,7 @@ def main() -> None:
         "One pendulum: mean squared error of the unscented over the extended filter",
         "Allaoui 2024, section IV.2.1, Figs 4.4 to 4.8",
     )
-    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
-    compared(sheet, CELLS, "remarkably below 1, in words", axis)
-    sheet.finish(figure)
+    compare(sheet, CELLS, "remarkably below 1, in words")
 
 
 if __name__ == "__main__":

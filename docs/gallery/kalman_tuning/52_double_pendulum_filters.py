@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
-from pendulums import Cell, compared
+from pendulums import Cell, compare
 from shared.sheet import Sheet
 
 NAME, FALLING = "cart_double_pendulum", (0.3, -0.2)
@@ -21,9 +20,7 @@ def main() -> None:
         "Double pendulum: mean squared error of the unscented over the extended filter",
         "Allaoui 2024, section IV.2.2, Figs 4.11 to 4.17",
     )
-    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
-    compared(sheet, CELLS, "slightly below 1, in words", axis)
-    sheet.finish(figure)
+    compare(sheet, CELLS, "slightly below 1, in words")
 
 
 if __name__ == "__main__":

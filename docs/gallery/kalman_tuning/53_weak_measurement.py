@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
-from pendulums import Cell, compared
+from pendulums import Cell, compare
 from shared.sheet import Sheet
 
 NAME = "cart_pendulum"
@@ -19,9 +18,7 @@ def main() -> None:
         "One pendulum, its angle hardly measured: mean squared error of the unscented over the extended filter",
         "Allaoui 2024, section IV.2.1; the case is ours",
     )
-    figure, axis = plt.subplots(figsize=(7, 1.8), layout="constrained")
-    compared(sheet, CELLS, "remarkably below 1, in words", axis)
-    sheet.finish(figure)
+    compare(sheet, CELLS, "remarkably below 1, in words", 1.8)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
+from shared.sheet import Sheet
 
 from fmu_observer.observers.generic.discrete import ExtendedKalmanFilter, UnscentedKalmanFilter
 from plant_models.exhibits import CartDoublePendulum, CartPendulum, StateFeedback
@@ -153,12 +154,14 @@ NOT_PRINTED = (
 )
 
 
-def compared(sheet: Any, cells: Mapping[str, tuple[Cell, float]], claim: str, axis: Any) -> None:
-    """Fill a sheet with the ratios of some cells, and draw them.
+def compare(sheet: Sheet, cells: Mapping[str, tuple[Cell, float]], claim: str, height: float = 4.0) -> None:
+    """Fill a sheet with the ratios of some cells, draw them, and finish it.
 
     Args:
-        sheet: of the gallery. cells: with the independent ratio, by words. claim: of the thesis. axis: to draw on.
+        sheet: of the gallery. cells: with the independent ratio, by words. claim: of the thesis. height: of the figure
+        [in].
     """
+    figure, axis = plt.subplots(figsize=(7, height), layout="constrained")
     for place, (words, (cell, independent)) in enumerate(cells.items()):
         found = mean_squares(cell)
         here, single = ratio(found), cell.seeds < 6
@@ -173,3 +176,4 @@ def compared(sheet: Any, cells: Mapping[str, tuple[Cell, float]], claim: str, ax
     axis.set_ylim(len(cells) - 0.5, -0.5)
     axis.set_xlabel("squared error, UKF / EKF: median and interval")
     axis.grid(alpha=0.3)
+    sheet.finish(figure)

@@ -33,9 +33,7 @@ def main() -> None:
     distance = np.abs(np.array(PUBLISHED_START) - 0.15 * rate).max()
     sheet.add("reaching time of the predictor", "s", None, 2.0 * float(np.sqrt(distance)), REACHED, independent=6.98)
     axis.set(xlabel="time [s]", ylabel="largest error of the state now", title="packet every 0.1 s, delay 0.15 s")
-    axis.legend(fontsize=8)
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

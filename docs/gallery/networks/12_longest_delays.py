@@ -79,9 +79,7 @@ def main() -> None:
             )
     axis.plot(list(SURVIVED), [m * bounds.longest_delay for m in SURVIVED], ":", label="(2.59)")
     axis.set(xlabel="predictors", ylabel="longest delay [s]", xticks=list(SURVIVED))
-    axis.legend(fontsize=8)
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axis)
 
 
 if __name__ == "__main__":

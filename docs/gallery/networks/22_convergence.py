@@ -64,9 +64,7 @@ def main() -> None:
     axes[2].set_title("with noise of variance 0.1")
     for axis in axes:
         axis.set_xlabel("time [s]")
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, *axes)
 
 
 if __name__ == "__main__":

@@ -59,10 +59,7 @@ def main() -> None:
         axes[1].semilogy(times, np.maximum(np.abs(found[:, 0]), 1e-12), ("--" if found is one else "-"), label=words)
     axes[0].set(title="error with a gain that settles", xlabel="time [s]")
     axes[1].set(title="theta = 5, eta = theta k1 = 10 1/s, every 0.3 s", xlabel="time [s]")
-    for axis in axes:
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, *axes)
 
 
 def _bounds(sheet: Sheet) -> None:
