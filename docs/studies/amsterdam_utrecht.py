@@ -7,7 +7,6 @@ out, with gains for gaps of 32 s.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from page_tables import write_table
 from turned_faults import turned
 
 from cosim import Outcome, Scenario
@@ -203,13 +203,8 @@ def main() -> None:
     if "--write" not in sys.argv:
         print("\n\n".join(made.values()))
         return
-    page = PAGE.read_text(encoding="utf-8")
     for name, text in made.items():
-        part = rf"(<!-- study: {name} -->\n).*?(<!-- end -->)"
-        page, count = re.subn(part, lambda m, new=text: f"{m[1]}{new}\n{m[2]}", page, flags=re.DOTALL)
-        if count != 1:
-            sys.exit(f"{PAGE.name} has {count} parts '<!-- study: {name} -->' ... '<!-- end -->'")
-    PAGE.write_text(page, encoding="utf-8")
+        write_table(PAGE, name, text)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ them there; that takes five minutes of one core.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import scipy
+from page_tables import write_table
 
 import fmus
 from cosim import Scenario
@@ -197,11 +197,8 @@ def main() -> None:
     found = tables()
     print("\n\n".join(found.values()))
     if "--write" in sys.argv:
-        page = PAGE.read_text(encoding="utf-8")
         for name, text in found.items():
-            part = re.compile(rf"(<!-- study: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-            page = part.sub(rf"\g<1>{text}\n\g<2>", page)
-        PAGE.write_text(page, encoding="utf-8")
+            write_table(PAGE, name, text)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ docs/images/jam_detection.png. The trains and their jams are synthetic; they are
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Sequence
 from itertools import product
@@ -16,6 +15,7 @@ from pathlib import Path
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from page_tables import write_table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "gallery"))
 
@@ -231,7 +231,6 @@ def draw(shares: dict[str, np.ndarray], path: Path = PICTURE) -> None:
 def main() -> None:
     """Write all tables into the page, and the picture."""
     found, shares = found_table()
-    text = PAGE.read_text(encoding="utf-8")
     for name, table in (
         ("rates", rates_table()),
         ("sizes", sizes_table()),
@@ -240,11 +239,8 @@ def main() -> None:
         ("stuck", stuck_table()),
         ("micro", micro_table()),
     ):
-        part = re.compile(rf"(<!-- study: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        assert part.search(text), name
-        text = part.sub(lambda m, table=table: f"{m[1]}\n{table}\n\n{m[2]}", text)
+        write_table(PAGE, name, f"\n{table}\n")
         print(table, end="\n\n")
-    PAGE.write_text(text, encoding="utf-8", newline="\n")
     draw(shares)
 
 

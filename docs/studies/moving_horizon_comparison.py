@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from moving_horizon_solvers import write_table
+from page_tables import write_table
 
 from cosim import Outcome, Scenario
 from cosim.evaluation.balise_gaps import gap_errors, largest, root_mean_square

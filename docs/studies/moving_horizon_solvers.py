@@ -7,7 +7,6 @@ window before; IPOPT and SciPy have the whole problem to themselves.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +17,7 @@ import clarabel
 import numpy as np
 import scipy.optimize
 import scipy.sparse
+from page_tables import write_table
 
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
@@ -194,20 +194,6 @@ def main() -> None:
     print(text)
     if "--write" in sys.argv:
         write_table(PAGE, "solvers", text)
-
-
-def write_table(page: Path, name: str, text: str) -> None:
-    """Put a table into its part of a page.
-
-    Args:
-        page: file. name: of the part, ``<!-- study: name -->`` to ``<!-- end -->``. text: the table.
-    """
-    part = rf"(<!-- study: {name} -->\n).*?(<!-- end -->)"
-    found = page.read_text(encoding="utf-8")
-    written, count = re.subn(part, lambda m: f"{m[1]}{text}\n{m[2]}", found, flags=re.DOTALL)
-    if count != 1:
-        sys.exit(f"{page.name} has {count} parts '<!-- study: {name} -->' ... '<!-- end -->'")
-    page.write_text(written, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ that takes half a minute of CPU. Each situation is one run with all observers in
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from page_tables import write_table
 from turned_faults import turned
 
 from cosim import Scenario
@@ -206,12 +206,7 @@ def main(words: Sequence[str]) -> None:
     """
     made = table()
     if "--write" in words:
-        text = PAGE.read_text(encoding="utf-8")
-        begin, end = "<!-- study: ratios -->\n", "\n<!-- end -->"
-        PAGE.write_text(
-            re.sub(f"{re.escape(begin)}.*?{re.escape(end)}", lambda _: begin + made + end, text, flags=re.DOTALL),
-            encoding="utf-8",
-        )
+        write_table(PAGE, "ratios", made)
 
 
 if __name__ == "__main__":

@@ -86,6 +86,15 @@ def record(rails: str, stop: float = 890.0) -> Recording:
         scenario.add(
             name, model=str(table.model), preset=table.preset, parameters=values, **{"options": dict(table.options)}
         )
+    return recorded(scenario)
+
+
+def recorded(scenario: Scenario) -> Recording:
+    """Close the loop of `train`, `driver` and `tachometer`, and run it.
+
+    Args:
+        scenario: with these components, not connected yet.
+    """
     scenario.connect(
         "driver.effort -> train.effort",
         "train.wheel_speed -> tachometer.wheel_speed",

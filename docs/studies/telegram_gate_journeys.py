@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from telegram_gate import FAMILIES, OFFSETS, Recording, Telegram, accepted_false, beside, ignored_true
+from page_tables import write_table
+from telegram_gate import FAMILIES, OFFSETS, Recording, Telegram, accepted_false, beside, ignored_true, recorded
 
 from cosim import Scenario
 from fmu_observer import OBSERVERS
@@ -97,16 +98,8 @@ def draw_journey(seed: int) -> Journey:
     made.add("driver", model="driver", options={"profile_count": len(times)}, parameters=gains | course)
     noise = {"sample_period": STEP, "noise_std": float(random.uniform(0.0, 0.05)), "seed": seed}
     made.add("tachometer", model="odometer", parameters=noise)
-    made.connect(
-        "driver.effort -> train.effort",
-        "train.wheel_speed -> tachometer.wheel_speed",
-        "tachometer.reading -> driver.odometer",
-    )
-    run = made.run(warn=lambda _text: None)
-    names = ("time", "driver.effort", "tachometer.reading", "train.position")
-    recording = Recording(*(np.asarray(run[name], dtype=float) for name in names))
     wrong = float(random.uniform(0.8, 1.2)), float(random.uniform(0.5, 1.5))
-    return Journey(recording, train, wrong, random)
+    return Journey(recorded(made), train, wrong, random)
 
 
 def _profile(random: np.random.Generator, top: float) -> tuple[list[float], list[float]]:
@@ -211,12 +204,7 @@ def main(arguments: Sequence[str]) -> None:
     made = table(study([a for a in arguments if not a.startswith("-")] or list(STUDIED)))
     print(made)
     if "--write" in arguments:
-        text = PAGE.read_text(encoding="utf-8")
-        before, _, rest = text.partition("<!-- study: journeys -->\n")
-        PAGE.write_text(
-            f"{before}<!-- study: journeys -->\n{made}\n<!-- end -->{rest.partition('<!-- end -->')[2]}",
-            encoding="utf-8",
-        )
+        write_table(PAGE, "journeys", made)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ are then counted on other journeys, rails, loads and seeds.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from page_tables import write_table
 from train_diagnosis_runs import (
     INSIDE,
     OUTSIDE,
@@ -371,13 +371,10 @@ def tables(seeds: int = SEEDS, members: int = FAULTY) -> dict[str, str]:
 def main() -> None:
     """Print the tables, or write them into the page."""
     found = tables()
-    text = PAGE.read_text(encoding="utf-8") if "--write" in sys.argv else ""
     for name, table in found.items():
         print(table, end="\n\n")
-        part = re.compile(rf"(<!-- study: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        text = part.sub(lambda m, table=table: f"{m[1]}\n{table}\n\n{m[2]}", text)
-    if "--write" in sys.argv:
-        PAGE.write_text(text, encoding="utf-8", newline="\n")
+        if "--write" in sys.argv:
+            write_table(PAGE, name, f"\n{table}\n")
 
 
 if __name__ == "__main__":

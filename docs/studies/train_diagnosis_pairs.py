@@ -8,7 +8,6 @@ them there (five minutes of CPU time).
 from __future__ import annotations
 
 import itertools
-import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from page_tables import write_table
 from train_diagnosis import PER_HOUR, SHARED, residual_recordings
 from train_diagnosis_runs import INSIDE, PERIOD, Journey, balise_places, diagnosed, recorded, sensed
 from turned_faults import Error
@@ -215,9 +215,7 @@ def main() -> None:
     for name, text in tables.items():
         print(text, end="\n\n")
         if "--write" in sys.argv:
-            page = PAGE.read_text(encoding="utf-8")
-            pattern = rf"(<!-- study: {name} -->\n\n).*?(\n\n<!-- end -->)"
-            PAGE.write_text(re.sub(pattern, rf"\g<1>{text}\g<2>", page, flags=re.DOTALL), encoding="utf-8")
+            write_table(PAGE, name, f"\n{text}\n")
 
 
 if __name__ == "__main__":

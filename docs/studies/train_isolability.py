@@ -6,12 +6,15 @@ The structural model says which variable and which fault stands in which equatio
 
 from __future__ import annotations
 
-import re
 import sys
 from pathlib import Path
 
 import faultdiagnosistoolbox as fdt
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from page_tables import write_table
 
 from fmu_observer.detection.train_isolation import SENSORS, isolability
 
@@ -107,9 +110,7 @@ def main() -> None:
     table = comparison_table()
     print(table)
     if "--write" in sys.argv:
-        part = re.compile(r"(<!-- study: isolability -->\n).*?(<!-- end -->)", re.DOTALL)
-        text = part.sub(lambda m: f"{m[1]}\n{table}\n\n{m[2]}", PAGE.read_text(encoding="utf-8"))
-        PAGE.write_text(text, encoding="utf-8", newline="\n")
+        write_table(PAGE, "isolability", f"\n{table}\n")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from page_tables import write_table
+
 from cosim import Scenario
 from cosim.studies.groups import mean_of
 from cosim.studies.measures import error_measures
@@ -176,12 +178,7 @@ def main() -> None:
     if not options.write or options.quick:
         print(made)
         return
-    page = PAGE.read_text(encoding="utf-8")
-    part = r"(<!-- study: judged -->\n).*?(<!-- end -->)"
-    page, count = re.subn(part, lambda m: f"{m[1]}{made}\n{m[2]}", page, flags=re.DOTALL)
-    if count != 1:
-        sys.exit(f"{PAGE.name} has {count} parts '<!-- study: judged -->' ... '<!-- end -->'")
-    PAGE.write_text(page, encoding="utf-8")
+    write_table(PAGE, "judged", made)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,11 @@ The limits of the diagnosis come from other runs than those that it is judged by
 
 from __future__ import annotations
 
-import re
 import sys
 from pathlib import Path
 
 import numpy as np
+from page_tables import write_table
 from wind_turbine_loop import ALARM_NAMES, DIAGNOSIS, INTERVALS, PEAKS, SPEED_SENSORS, Outcome, run_members
 
 from fmu_observer.formulas.diagnosis.thresholds import alarm_rate, proportion_interval
@@ -191,18 +191,13 @@ TABLES = {"speeds": speeds_table, "sizes": sizes_table, "limits": limits_table, 
 
 def main() -> None:
     """Print the tables, or write them into the page."""
-    page = PAGE.read_text(encoding="utf-8") if "--write" in sys.argv else ""
     for number, (name, make) in enumerate(TABLES.items(), start=1):
         print(f"{number} of {len(TABLES)}: {name}", file=sys.stderr, flush=True)
         table = make()
-        if not page:
+        if "--write" in sys.argv:
+            write_table(PAGE, name, table)
+        else:
             print(table, end="\n\n", flush=True)
-            continue
-        part = rf"(<!-- study: {name} -->\n).*?(<!-- end -->)"
-        page, count = re.subn(part, lambda m, table=table: f"{m[1]}{table}\n{m[2]}", page, flags=re.DOTALL)
-        if count != 1:
-            sys.exit(f"{PAGE.name} has {count} parts '<!-- study: {name} -->' ... '<!-- end -->'")
-        PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

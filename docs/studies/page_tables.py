@@ -1,0 +1,24 @@
+"""Where the studies put their tables: the part of a page between ``<!-- study: name -->`` and ``<!-- end -->``."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+
+def write_table(page: Path, name: str, text: str) -> None:
+    """Put a table into its part of a page.
+
+    Args:
+        page: file. name: of the part. text: the table, with the blank lines that the page has around it.
+
+    Raises:
+        SystemExit: the page has not exactly one part of that name.
+    """
+    part = rf"(<!-- study: {name} -->\n).*?(<!-- end -->)"
+    found = page.read_text(encoding="utf-8")
+    written, count = re.subn(part, lambda m: f"{m[1]}{text}\n{m[2]}", found, flags=re.DOTALL)
+    if count != 1:
+        sys.exit(f"{page.name} has {count} parts '<!-- study: {name} -->' ... '<!-- end -->'")
+    page.write_text(written, encoding="utf-8", newline="\n")
