@@ -30,14 +30,8 @@ from plant_models.hybrid import (
     parameter,
 )
 from plant_models.hybrid.missing import is_there, or_else
-from plant_models.railway.traction.motor_equations import AXES, MOTOR_PARAMETERS, TRACTION_200_KW
+from plant_models.railway.traction.motor_equations import AXES, MOTOR_PARAMETERS, STATE_OUTPUTS, TRACTION_200_KW
 
-STATES = (
-    output_signal("current_d", "A", "Current along d"),
-    output_signal("current_q", "A", "Current along q"),
-    output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
-    output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
-)
 LOAD = output_signal("load_torque", "N.m", "Torque of the load against the rotation")
 
 
@@ -64,7 +58,7 @@ class MotorFilter(EvaluatedObserver):
 
     def __init__(self, frame: str, known_load: bool, start_variance: Sequence[float], **options: Any) -> None:
         self.frame, self.known_load = frame, known_load
-        axes, estimated = AXES[frame], STATES if known_load else (*STATES, LOAD)
+        axes, estimated = AXES[frame], STATE_OUTPUTS if known_load else (*STATE_OUTPUTS, LOAD)
         self.order = n = len(estimated)
         P, text = np.diag(start_variance), "Covariance P, row by row, SI units"
         self.states = initialised_memory(

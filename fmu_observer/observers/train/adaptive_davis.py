@@ -30,14 +30,12 @@ from fmu_observer.observers.innovation_gate import gain_ratio, place_deviation
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back, stands
 from fmu_observer.observers.train.train_signals import (
     BALISE,
+    BALISE_AND_ODOMETER,
     INNOVATION_OUTPUT,
     LAST_INNOVATION,
+    MOTION,
+    MOTION_OUTPUTS,
     ODOMETER,
-    ODOMETER_READ,
-    POSITION,
-    POSITION_OUTPUT,
-    SPEED,
-    SPEED_OUTPUT,
 )
 from plant_models.hybrid import Array, Signal, input_signal, matrix, memory, output_signal, parameter, state, vector
 
@@ -54,8 +52,7 @@ def _symmetric(size: int) -> dict[str, Any]:
 
 
 _STATES = (
-    POSITION,
-    SPEED,
+    *MOTION,
     state("sensitivity", "1", 0.0, "Sensitivity lambda of position and speed, row by row", shape=(2, 3)),
     state("inverse_s", "1", np.eye(2), f"Inverse of S, {_UPPER}", **_symmetric(2)),
     state("elapsed", "s", 0.0, "Time since the last sample"),
@@ -133,8 +130,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         ODOMETER,
     )
     outputs = (
-        POSITION_OUTPUT,
-        SPEED_OUTPUT,
+        *MOTION_OUTPUTS,
         INNOVATION_OUTPUT,
         output_signal("position_deviation", "m", "Standard deviation of the position's error"),
         *(output_signal(n, unit, f"Estimated coefficient {n[6]}") for n, unit in zip(NAMES, UNITS, strict=True)),
@@ -159,10 +155,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         parameter("minimum_speed", "m/s", 2.0, "Speed below which coefficients are held", min=0.1),
         *ADAPTIVE,
     )
-    events = (
-        BALISE,
-        ODOMETER_READ,
-    )
+    events = BALISE_AND_ODOMETER
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         known, since = _parts_of(x)
@@ -179,7 +172,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         rates = predicted - gain @ now.innovation + sensitivity @ now.rates
         d_inverse = p.mu * inverse_s + drift @ inverse_s + inverse_s @ drift.T - gain @ gain.T
         return {
-            **named_as((POSITION, SPEED), rates),
+            **named_as(MOTION, rates),
             "sensitivity": matrix(d_sensitivity[0], d_speed),
             "inverse_s": d_inverse,
             **_moving_values(moving),
@@ -213,7 +206,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         begun = covariance_at_first(before, row, row, deviation**2, _SIZES)
         excitation = excitation_now(known, since, p.excitation_time)
         return {
-            **named_as((POSITION, SPEED), estimate),
+            **named_as(MOTION, estimate),
             **_just_sampled(),
             "sensitivity": matrix(*sensitivity),
             "corrections": now.values,

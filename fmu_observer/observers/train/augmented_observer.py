@@ -19,7 +19,7 @@ from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
-from fmu_observer.observers.train.train_signals import POSITION, SPEED
+from fmu_observer.observers.train.train_signals import MOTION, SPEED
 from plant_models.hybrid import (
     Array,
     PeriodicEvent,
@@ -108,8 +108,7 @@ class AugmentedTrainObserver(TrainObserver):
             self.inputs = (*self.inputs, _FIX_POSITION)
         self.estimator_events = (GPS if fixes == "event" else _SAMPLED_FIX, *self.own_events)
         self.estimator_states = (
-            POSITION,
-            SPEED,
+            *MOTION,
             state("unknown_acceleration", "m/s2", 0.0, "Acceleration by coupler and gradient, delta"),
             state("unknown_jerk", "m/s3", 0.0, "Its rate"),
             state("position_innovation", "m", 0.0, "Position error seen at the last balise or fix, decaying since"),

@@ -28,14 +28,13 @@ from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from fmu_observer.observers.train.train_signals import (
     BALISE,
+    BALISE_AND_ODOMETER,
     INNOVATION_OUTPUT,
     LAST_INNOVATION,
+    MOTION,
+    MOTION_OUTPUTS,
     ODOMETER,
-    ODOMETER_READ,
-    POSITION,
-    POSITION_OUTPUT,
     SPEED,
-    SPEED_OUTPUT,
     TRAIN_PARAMETERS,
 )
 from plant_models.hybrid import (
@@ -141,8 +140,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         ODOMETER,
     )
     outputs: tuple[Signal, ...] = (
-        POSITION_OUTPUT,
-        SPEED_OUTPUT,
+        *MOTION_OUTPUTS,
         output_signal("disturbance", "m/s2", "Estimated acceleration that effort and resistance do not explain"),
         output_signal("creep", "m/s", "Estimated creep of the wheel, odometer minus speed"),
         INNOVATION_OUTPUT,
@@ -152,10 +150,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         discrete_output("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations"),
         discrete_output("odometer_fault", "1", "1 while the last reading was not used"),
     )
-    events = (
-        BALISE,
-        ODOMETER_READ,
-    )
+    events = BALISE_AND_ODOMETER
     parameters: tuple[Signal, ...] = OWN_PARAMETERS
     presets = {
         # ours: for the position error on the line Amsterdam - Utrecht with drawn faults, see docs/tuning_the_train.md
@@ -184,8 +179,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         """States of the observer itself, estimates first."""
         start, text = np.diag([d**2 for d in FIRST_DEVIATIONS]), "Covariance at the last event, upper triangle"
         return (
-            POSITION,
-            SPEED,
+            *MOTION,
             state("estimated_disturbance", "m/s2", 0.0, "Unknown acceleration d"),
             state("estimated_creep", "m/s", 0.0, "Creep z of the wheel"),
             memory("estimate_covariance", "1", start, text, shape=(ORDER, ORDER), symmetric=True),

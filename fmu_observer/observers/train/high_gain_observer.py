@@ -18,7 +18,7 @@ from fmu_observer.formulas.correction.innovation_decay import HIGH_GAIN_K, corre
 from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
-from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
+from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, MOTION, POSITION, SPEED
 from fmu_observer.observers.train.wheel_stage import WheelStage
 from plant_models.hybrid import Array, Signal, parameter
 
@@ -45,7 +45,7 @@ class HighGainTrainObserver(TrainObserver):
     frictions = (SPEED.name,)
 
     def __init__(self, **options: Any) -> None:
-        self.estimator_states = (POSITION, SPEED, self.innovation_state, *self.gain_states, *self.stage.states)
+        self.estimator_states = (*MOTION, self.innovation_state, *self.gain_states, *self.stage.states)
         self.estimator_parameters = (*self.gain_parameters(), *self.stage.parameters)
         self.estimator_events = self.stage.events
         super().__init__(**options)

@@ -29,14 +29,13 @@ from fmu_observer.observers.innovation_gate import known_accuracy
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_signals import (
     BALISE,
+    BALISE_AND_ODOMETER,
     BALISES_USED,
     INNOVATION_OUTPUT,
     LAST_INNOVATION,
+    MOTION_OUTPUTS,
     ODOMETER,
-    ODOMETER_READ,
     POSITION,
-    POSITION_OUTPUT,
-    SPEED_OUTPUT,
 )
 from plant_models.hybrid import Array, Signal, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.hybrid.option import require_chosen
@@ -122,14 +121,13 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     internal_step = 1e-2
     frictions = (SPEED.name,)
     weighing = "position"
-    events = (BALISE, ODOMETER_READ)
+    events = BALISE_AND_ODOMETER
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort as commanded: traction positive, brake negative"),
         ODOMETER,
     )
     outputs = (
-        POSITION_OUTPUT,
-        SPEED_OUTPUT,
+        *MOTION_OUTPUTS,
         INNOVATION_OUTPUT,
         output_signal("disturbance", "m/s2", "Estimated deceleration by what the model does not know"),
         output_signal("residual", "m/s", "M times odometer minus estimated speed"),

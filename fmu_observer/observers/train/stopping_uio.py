@@ -29,9 +29,8 @@ from fmu_observer.observers.train.train_signals import (
     BALISES_USED,
     INNOVATION_OUTPUT,
     LAST_INNOVATION,
+    MOTION_OUTPUTS,
     POSITION,
-    POSITION_OUTPUT,
-    SPEED_OUTPUT,
 )
 from plant_models.hybrid import (
     Array,
@@ -100,8 +99,7 @@ class StoppingUio(GatedObserver, GapCertified):
         input_signal("odometer", "m/s", 0.0, "Speed, new every 1 to 2 ms"),
     )
     outputs = (
-        POSITION_OUTPUT,
-        SPEED_OUTPUT,
+        *MOTION_OUTPUTS,
         output_signal("disturbance", "m/s2", "Estimated acceleration that the model does not know, forward > 0"),
         INNOVATION_OUTPUT,
         discrete_output("balises", "1", "Number of balises used so far"),

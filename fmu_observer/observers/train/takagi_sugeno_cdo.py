@@ -13,7 +13,7 @@ from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.design.certified_gains import balise_family, certified_gains
 from fmu_observer.observers.evaluated_observer import Evaluate
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
-from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, POSITION, SPEED
+from fmu_observer.observers.train.train_signals import BALISE_INNOVATION, MOTION, POSITION, SPEED
 from plant_models.hybrid import Array, memory, parameter
 from plant_models.hybrid.option import require_chosen
 
@@ -63,7 +63,7 @@ class TakagiSugenoCdo(TrainObserver):
     description = "Takagi-Sugeno continuous-discrete observer of the train, odometer and balises"
     source = "Bouchama 2024, (3.44)-(3.48)"
     frictions = (SPEED.name,)
-    estimator_states = (POSITION, SPEED, BALISE_INNOVATION)
+    estimator_states = (*MOTION, BALISE_INNOVATION)
     estimator_parameters = (
         parameter("innovation_decay", "1/s", 9.9, "Decay rate eta of the balise gain since the last balise", min=0.0),
         parameter("premise_min", "m/s", 5.0, "Speed of the first vertex", min=0.0),

@@ -21,7 +21,7 @@ from fmu_observer.detection.slip_indicator import (
 from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back
-from fmu_observer.observers.train.train_signals import BALISE, POSITION_OUTPUT, SPEED_OUTPUT, TRAIN_PARAMETERS
+from fmu_observer.observers.train.train_signals import BALISE, MOTION_OUTPUTS, TRAIN_PARAMETERS
 from plant_models.hybrid import (
     Array,
     PeriodicEvent,
@@ -75,8 +75,7 @@ class TrainObserver(GatedObserver, GapCertified):
         input_signal("odometer", "m/s", 0.0, "Odometer speed r w"),
     )
     outputs: tuple[Signal, ...] = (
-        POSITION_OUTPUT,
-        SPEED_OUTPUT,
+        *MOTION_OUTPUTS,
         *SLIP_OUTPUTS,
         output_signal("adhesion_force", "N", "Estimated adhesion force between wheels and rails"),
         output_signal("innovation", "m", "Estimated minus true position at the last balise, as it acts now"),

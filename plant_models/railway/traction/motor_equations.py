@@ -10,10 +10,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import Array, PeriodicEvent, parameter, standard_normal
+from plant_models.hybrid import Array, PeriodicEvent, input_signal, output_signal, parameter, standard_normal
 from plant_models.railway.traction.transforms import to_rotor
 
 STATE_NAMES = ("current_d", "current_q", "speed", "angle")
+STATE_OUTPUTS = (
+    output_signal("current_d", "A", "Current along d"),
+    output_signal("current_q", "A", "Current along q"),
+    output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
+    output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
+)
+TORQUE = output_signal("torque", "N.m", "Electromagnetic torque C_em")
+LOAD_TORQUE = input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, C_r")
 PUBLISHED_NOISE = {"process_variance": (1e-3, 1e-3, 1e-3, 1e-3), "measurement_variance": (0.1, 0.1)}
 """Variances of one sample as the tables of the thesis demand them: not deviations, not densities."""
 NOISE_PARAMETERS = (

@@ -14,9 +14,12 @@ from plant_models.hybrid.option import require_chosen
 from plant_models.railway.traction.motor_equations import (
     AXES,
     FRAMES,
+    LOAD_TORQUE,
     MOTOR_PARAMETERS,
     NOISE_PARAMETERS,
     PUBLISHED_NOISE,
+    STATE_OUTPUTS,
+    TORQUE,
     TRACTION_200_KW,
     Frame,
     electromagnetic_torque,
@@ -189,17 +192,14 @@ def _motor_inputs(frame: str) -> tuple[Signal, ...]:
     """Inputs of a motor: voltages of both axes and the torque of the load."""
     return (
         *(input_signal(f"voltage_{axis}", "V", 0.0, f"Voltage along {axis}") for axis in AXES[frame]),
-        input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, C_r"),
+        LOAD_TORQUE,
     )
 
 
 def _motor_outputs(frame: str) -> tuple[Signal, ...]:
     """Outputs of a motor: state, torque and measured currents."""
     return (
-        output_signal("current_d", "A", "Current along d"),
-        output_signal("current_q", "A", "Current along q"),
-        output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
-        output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
-        output_signal("torque", "N.m", "Electromagnetic torque C_em"),
+        *STATE_OUTPUTS,
+        TORQUE,
         *(output_signal(f"measured_current_{axis}", "A", f"Measured current along {axis}") for axis in AXES[frame]),
     )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
-from plant_models.railway.traction.motor_equations import MOTOR_PARAMETERS
+from plant_models.railway.traction.motor_equations import LOAD_TORQUE, MOTOR_PARAMETERS, STATE_OUTPUTS, TORQUE
 from plant_models.railway.traction.transforms import park
 
 THIRD = 2.0 * float(np.pi) / 3.0
@@ -39,15 +39,12 @@ class ThreePhaseMotor(HybridSystem):
     )
     inputs = (
         *(input_signal(f"voltage_{phase}", "V", 0.0, f"Voltage of phase {phase}") for phase in PHASES),
-        input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, C_r"),
+        LOAD_TORQUE,
     )
     outputs = (
         *(output_signal(f"current_{phase}", "A", f"Current of phase {phase}") for phase in PHASES),
-        output_signal("current_d", "A", "Current along d"),
-        output_signal("current_q", "A", "Current along q"),
-        output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
-        output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
-        output_signal("torque", "N.m", "Electromagnetic torque C_em"),
+        *STATE_OUTPUTS,
+        TORQUE,
     )
     parameters = (
         parameter("cyclic_inductance", "H", 0.0121, "L_s - M_s", min=1e-9),

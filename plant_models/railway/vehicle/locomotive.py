@@ -13,7 +13,8 @@ from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.adhesion.law import ADHESION_LAWS
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
-from plant_models.railway.vehicle.resistance import GRAVITY, gradient_resistance, moving_resistance
+from plant_models.railway.vehicle.resistance import gradient_resistance, moving_resistance
+from plant_models.railway.vehicle.train_signals import DOWNHILL_PULL, FREE_FALL, POINT_OUTPUTS, POINT_STATES, SLIP_FLOOR
 
 _CHAPTER_3 = {"davis_b": 32.0, "davis_c": 1.7}
 _TABLE_4_1 = {"mass": 166e3, "davis_b": 32.4, "davis_c": 1.6529}
@@ -62,8 +63,7 @@ class Locomotive(HybridSystem):
     method = "rosenbrock"  # the wheel's time constant is 4.6e-5 s per m/s of speed: far below the step near standstill
     internal_step = 5e-4  # at 1 ms the linearly implicit step overshoots the creep curve below the slip floor by mm/s
     states = (
-        state("train_position", "m", 0.0, "Position of the train at start"),
-        state("train_speed", "m/s", 0.0, "Speed of the train at start"),
+        *POINT_STATES,
         state(
             "wheel_rate", "rad/s", 0.0, "Angular speed of the wheel at start; speed / wheel_radius for a rolling wheel"
         ),
@@ -71,14 +71,12 @@ class Locomotive(HybridSystem):
     frictions = ("train_speed", "wheel_rate")
     inputs = (input_signal("effort", "N", 0.0, "Effort at the wheel rim: traction > 0, brake < 0"),)
     outputs = (
-        output_signal("position", "m", "Position of the train"),
-        output_signal("speed", "m/s", "Speed of the train", display_unit="km/h"),
-        output_signal("acceleration", "m/s2", "Acceleration of the train"),
+        *POINT_OUTPUTS,
         output_signal("wheel_speed", "m/s", "Circumferential speed of the wheel, r*w", display_unit="km/h"),
         output_signal("slip", "1", "Slip ratio (r*w - v) / max(|v|, slip_floor), (3.13)"),
         output_signal("adhesion_force", "N", "Force of the rail on the wheel along the track"),
         output_signal("resistance_force", "N", "Running resistance, against the motion"),
-        output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
+        DOWNHILL_PULL,
         output_signal("adhesion_degraded", "1", "0 nominal .. 1 degraded adhesion"),
     )
     presets = {
@@ -199,9 +197,9 @@ _VEHICLE = (
     parameter("wheel_inertia", "kg.m2", 225.0, "Moment of inertia of one axle J", min=1e-3),
     parameter("n_axles", "1", 1.0, "Number of axles; the total inertia is n_axles * wheel_inertia", min=1.0),
     parameter("wheel_radius", "m", 0.575, "Radius of the wheel r", min=1e-3),
-    parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0),
+    FREE_FALL,
     parameter("davis_a", "N", 900.0, "Running resistance, constant part; dry friction", min=0.0),
     parameter("davis_b", "N.s/m", 32.0, "Running resistance, viscous part", min=0.0),
     parameter("davis_c", "N.s2/m2", 1.7, "Running resistance, aerodynamic part", min=0.0),
-    parameter("slip_floor", "m/s", 0.5, "Smallest speed the slip refers to", min=1e-3, display_unit="km/h"),
+    SLIP_FLOOR,
 )

@@ -18,7 +18,6 @@ from plant_models.hybrid import (
     memory,
     output_signal,
     parameter,
-    state,
     vector,
     warning_output,
 )
@@ -27,11 +26,11 @@ from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhe
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
 from plant_models.railway.vehicle.resistance import (
     DAVIS_SETS,
-    GRAVITY,
     DavisSet,
     gradient_resistance,
     moving_resistance,
 )
+from plant_models.railway.vehicle.train_signals import DOWNHILL_PULL, FREE_FALL, POINT_OUTPUTS, POINT_STATES
 
 
 class _Forces(NamedTuple):
@@ -61,12 +60,10 @@ class _LongitudinalForces(HybridSystem):
         input_signal("disturbance_force", "N", 0.0, "Unknown force along increasing position", optional=True),
     )
     outputs = (
-        output_signal("position", "m", "Position of the train"),
-        output_signal("speed", "m/s", "Speed of the train", display_unit="km/h"),
-        output_signal("acceleration", "m/s2", "Acceleration of the train"),
+        *POINT_OUTPUTS,
         output_signal("wheel_speed", "m/s", "Circumferential speed of a wheel that rolls", display_unit="km/h"),
         output_signal("resistance_force", "N", "Davis resistance, against the motion"),
-        output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
+        DOWNHILL_PULL,
         output_signal("adhesion_limit", "N", "Largest force that the rails can take"),
         warning_output(
             "outside_fitted_range",
@@ -273,10 +270,7 @@ class LongitudinalTrain(_LongitudinalForces):
     description = "Train as one point per unit mass: effort in, position, speed and adhesion limit out"
     source = "Aguiar Cota 2019, (2.1)-(2.8), (2.26)-(2.28), Tables 2.1 and 5.1"
     internal_step = 2e-3  # a stop is placed within 2e-6 m per m/s2 of braking; the motion would allow 10 ms
-    states = (
-        state("train_position", "m", 0.0, "Position of the train at start"),
-        state("train_speed", "m/s", 0.0, "Speed of the train at start"),
-    )
+    states = POINT_STATES
     frictions = ("train_speed",)
     presets = _TRAIN_PRESETS
 
@@ -313,7 +307,7 @@ def _vehicle(railway: str) -> tuple[Signal, ...]:
         parameter(
             "fitted_to", "m/s", 50.0, "Highest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
         ),
-        parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0),
+        FREE_FALL,
         parameter("grade_amplitude", "m/s2", 0.0, "Amplitude of a grade term that swings in time, sine, uphill > 0"),
         parameter("grade_rate", "rad/s", 0.1, "Angular frequency of that term", min=0.0),
         parameter(

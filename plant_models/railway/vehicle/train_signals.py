@@ -9,6 +9,19 @@ from plant_models.railway.vehicle.resistance import GRAVITY
 
 AXLE_POSITIONS = {1: (9.75,), 4: (3.3, 5.9, 13.6, 16.2)}  # [m] behind the front of 19.5 m; bogies 2.6 m, 10.3 m apart
 ONE_WHEEL = 225.0  # [kg.m2], the inertia printed in Table 4.2
+POINT_STATES = (
+    state("train_position", "m", 0.0, "Position of the train at start"),
+    state("train_speed", "m/s", 0.0, "Speed of the train at start"),
+)
+"""Of a train that is one point, as are `POINT_OUTPUTS`."""
+POINT_OUTPUTS = (
+    output_signal("position", "m", "Position of the train"),
+    output_signal("speed", "m/s", "Speed of the train", display_unit="km/h"),
+    output_signal("acceleration", "m/s2", "Acceleration of the train"),
+)
+DOWNHILL_PULL = output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0")
+FREE_FALL = parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0)
+SLIP_FLOOR = parameter("slip_floor", "m/s", 0.5, "Smallest speed the slip refers to", min=1e-3, display_unit="km/h")
 
 
 def train_states(wagons: int, axles: int) -> tuple[Signal, ...]:
@@ -95,11 +108,11 @@ def _locomotive_parameters(axles: int) -> tuple[Signal, ...]:
         parameter("braked_mass", "kg", 80e3, "Braked mass of the locomotive's indirect brake", min=0.0),
         parameter("wheel_inertia", "kg.m2", ONE_WHEEL, "Moment of inertia of one axle of the locomotive J", min=1e-3),
         parameter("wheel_radius", "m", 0.575, "Radius of the locomotive's wheels r", min=1e-3),
-        parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0),
+        FREE_FALL,
         parameter("davis_a", "N", 900.0, "Running resistance of the locomotive, constant part; dry friction", min=0.0),
         parameter("davis_b", "N.s/m", 32.4, "Running resistance of the locomotive, viscous part", min=0.0),
         parameter("davis_c", "N.s2/m2", 1.6529, "Running resistance of the locomotive, aerodynamic part", min=0.0),
-        parameter("slip_floor", "m/s", 0.5, "Smallest speed the slip refers to", min=1e-3, display_unit="km/h"),
+        SLIP_FLOOR,
         parameter(
             "axle_position", "m", AXLE_POSITIONS[axles], "Distance of each axle from the front", min=0.0, size=axles
         ),
