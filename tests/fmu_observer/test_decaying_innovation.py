@@ -29,7 +29,7 @@ from fmu_observer.models.observer_model import shift_matrix
 from fmu_observer.observers.generic.sampled import DecayingInnovation, DynamicHighGain, ExponentialGain, HeldInnovation
 from fmu_observer.observers.train import AdaptiveGainCdo, DecayingInnovationCdo, DynamicGainCdo
 from plant_models.exhibits import TanhSystem
-from plant_models.hybrid import Runtime, scalar_names
+from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 EXPONENTS = (0.0, 0.25, 0.5, 1.0)
 SHIFT, C = shift_matrix(2), np.eye(1, 2)
@@ -411,55 +411,47 @@ def test_the_printed_law_of_theta_is_a_preset() -> None:
 # -- the train --------------------------------------------------------------------------------------------------------
 
 
+def after_balises(
+    system: HybridSystem, parameters: dict[str, float], states: dict[str, float] | None = None
+) -> dict[str, float]:
+    """Outputs 0.7 s after the last of five balises of a train that accelerates."""
+    motion, runtime = SteadyMotion(speed=12.0, acceleration=0.05), Runtime(system)
+    names, inputs = scalar_names(system.parameter_signals), scalar_names(system.input_signals)
+    for name, value in parameters.items():
+        runtime.p[names.index(name)] = value
+    for name, value in (states or {}).items():
+        runtime.x[scalar_names(system.states).index(name)] = value
+    at = {name: inputs.index(name) for name in ("effort", "odometer", "balise_position")}
+    runtime.u[at["effort"]], runtime.u[at["odometer"]] = 2e4, 12.0
+    runtime.start(0.0)
+    for t in (0.4, 1.1, 1.4, 2.2, 3.0):
+        runtime.advance(t)
+        runtime.u[at["balise_position"]] = motion.position(t)
+        runtime.trigger("balise")
+    runtime.advance(3.7)
+    return dict(zip(scalar_names(system.outputs), runtime.update_outputs(), strict=True))
+
+
 def test_with_the_decay_of_the_gain_it_is_the_high_gain_train_observer() -> None:
     """Against the adapting one, its gain fixed: same resistance, same friction, another integration of the decay."""
-    motion = SteadyMotion(speed=12.0, acceleration=0.05)
     found = []
     for system, parameters in (
         (AdaptiveGainCdo(), {"theta_min": 2.0, "theta_max": 2.0}),
         (DecayingInnovationCdo(), {"theta": 2.0, "decay_rate": 4.0, "decay_exponent": 1.0}),
     ):
-        runtime = Runtime(system)
-        names, inputs = scalar_names(system.parameter_signals), scalar_names(system.input_signals)
-        for name, value in parameters.items():
-            runtime.p[names.index(name)] = value
-        at = {name: inputs.index(name) for name in ("effort", "odometer", "balise_position")}
-        runtime.u[at["effort"]], runtime.u[at["odometer"]] = 2e4, 12.0
-        runtime.start(0.0)
-        for t in (0.4, 1.1, 1.4, 2.2, 3.0):
-            runtime.advance(t)
-            runtime.u[at["balise_position"]] = motion.position(t)
-            runtime.trigger("balise")
-        runtime.advance(3.7)
-        y = dict(zip(scalar_names(system.outputs), runtime.update_outputs(), strict=True))
+        y = after_balises(system, parameters)
         found.append([y[name] for name in ("position", "speed", "innovation")])
     np.testing.assert_allclose(found[0], found[1], atol=1e-8)
 
 
 def test_a_gain_that_settles_follows_its_law_and_is_the_adapting_one_once_settled() -> None:
     """The law is logistic; RK4 at 0.01 s leaves 1e-6 of it."""
-    motion, limit = SteadyMotion(speed=12.0, acceleration=0.05), 2.0
-    found = []
-    for system, parameters, first in (
-        (AdaptiveGainCdo(), {"theta_min": limit, "theta_max": limit}, {}),
-        (DynamicGainCdo(), {"theta_limit": limit}, {"theta": limit}),
-        (DynamicGainCdo(), {"theta_limit": limit, "theta_rate": 0.25}, {"theta": 6.0}),
-    ):
-        runtime = Runtime(system)
-        names, inputs = scalar_names(system.parameter_signals), scalar_names(system.input_signals)
-        for name, value in parameters.items():
-            runtime.p[names.index(name)] = value
-        for name, value in first.items():
-            runtime.x[scalar_names(system.states).index(name)] = value
-        at = {name: inputs.index(name) for name in ("effort", "odometer", "balise_position")}
-        runtime.u[at["effort"]], runtime.u[at["odometer"]] = 2e4, 12.0
-        runtime.start(0.0)
-        for t in (0.4, 1.1, 1.4, 2.2, 3.0):
-            runtime.advance(t)
-            runtime.u[at["balise_position"]] = motion.position(t)
-            runtime.trigger("balise")
-        runtime.advance(3.7)
-        found.append(dict(zip(scalar_names(system.outputs), runtime.update_outputs(), strict=True)))
+    limit = 2.0
+    found = [
+        after_balises(AdaptiveGainCdo(), {"theta_min": limit, "theta_max": limit}),
+        after_balises(DynamicGainCdo(), {"theta_limit": limit}, {"theta": limit}),
+        after_balises(DynamicGainCdo(), {"theta_limit": limit, "theta_rate": 0.25}, {"theta": 6.0}),
+    ]
     for name in ("position", "speed", "innovation"):
         assert found[0][name] == pytest.approx(found[1][name], abs=1e-8)
         assert found[0][name] != pytest.approx(found[2][name], abs=1e-6)

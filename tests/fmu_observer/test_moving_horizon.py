@@ -196,6 +196,25 @@ def dense(rows: list[np.ndarray], bounds: tuple[int, float, float] | None) -> np
     return np.asarray(found.x).reshape(count, N)
 
 
+def moved_dense(S: np.ndarray, s: np.ndarray, row: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """A state ``S z + s`` of start and noises z one row further, and the size of the noise of its third state."""
+    F, Q = transition(row[1])
+    S, s = F @ S, F @ s + F[:, 1] * row[3]
+    for place, i in enumerate((1, 2)):
+        S[i, N + 2 * k + place] += np.sqrt(Q[i, i])
+    return S, s, float(np.sqrt(Q[2, 2]))
+
+
+def measured_dense(S: np.ndarray, s: np.ndarray, row: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What a row measures of a state ``S z + s``, weighted: matrix and right side, or none where it measures
+    nothing."""
+    used = row[6:] > 0.5
+    if not used.any():
+        return [], []
+    root = np.linalg.inv(np.linalg.cholesky(R[np.ix_(used, used)]))
+    return [root @ H[used] @ S], [root @ (row[4:6][used] - H[used] @ s)]
+
+
 def disturbed_dense(rows: list[np.ndarray]) -> np.ndarray:
     """All states of a record whose unknown input has bounded disturbances, shape (N, n): SciPy's active set over the
     start and the noises, which alone are unknown."""
@@ -205,17 +224,12 @@ def disturbed_dense(rows: list[np.ndarray]) -> np.ndarray:
     bound = np.full(S.shape[1], np.inf)
     for k, row in enumerate(rows):
         if row[0]:
-            F, Q = transition(row[1])
-            S, s = F @ S, F @ s + F[:, 1] * row[3]
-            for place, i in enumerate((1, 2)):
-                S[i, N + 2 * k + place] += np.sqrt(Q[i, i])
-            bound[N + 2 * k + 1] = JERK * row[1] / np.sqrt(Q[2, 2])
+            S, s, noise = moved_dense(S, s, row, k)
+            bound[N + 2 * k + 1] = JERK * row[1] / noise
         states.append((S.copy(), s))
-        used = row[6:] > 0.5
-        if used.any():
-            root = np.linalg.inv(np.linalg.cholesky(R[np.ix_(used, used)]))
-            blocks.append(root @ H[used] @ S)
-            sides.append(root @ (row[4:6][used] - H[used] @ s))
+        matrix, right = measured_dense(S, s, row)
+        blocks += matrix
+        sides += right
     A, b = np.vstack(blocks), np.concatenate(sides)
     z = scipy.optimize.lsq_linear(A, b, (-bound, bound), method="bvls", tol=1e-14).x
     assert (np.abs(z) >= bound * (1.0 - 1e-9)).any()  # a bound is active
@@ -534,21 +548,16 @@ def inequalities(rows: np.ndarray, bounded: tuple[int, ...], disturbed: bool) ->
     h: list[float] = []
     for k, row in enumerate(rows):
         if row[0]:
-            F, Q = transition(row[1])
-            S, s = F @ S, F @ s + F[:, 1] * row[3]
-            for place, i in enumerate((1, 2)):
-                S[i, N + 2 * k + place] += np.sqrt(Q[i, i])
+            S, s, noise = moved_dense(S, s, row, k)
             if disturbed:
-                pushed = np.sqrt(Q[2, 2]) * np.eye(S.shape[1])[N + 2 * k + 1]
+                pushed = noise * np.eye(S.shape[1])[N + 2 * k + 1]
                 G, h = [*G, pushed, -pushed], [*h, JERK * row[1], JERK * row[1]]
         states.append((S.copy(), s))
         for i in bounded:
             G, h = [*G, S[i], -S[i]], [*h, 0.5 - s[i], 0.5 + s[i]]
-        used = row[6:] > 0.5
-        if used.any():
-            root = np.linalg.inv(np.linalg.cholesky(R[np.ix_(used, used)]))
-            A.append(root @ H[used] @ S)
-            b.append(root @ (row[4:6][used] - H[used] @ s))
+        matrix, side = measured_dense(S, s, row)
+        A += matrix
+        b += side
     left, right = np.vstack(A), np.concatenate(b)
     exact = clarabel.DefaultSettings()
     exact.verbose, exact.tol_gap_abs, exact.tol_gap_rel, exact.tol_feas = False, 1e-11, 1e-11, 1e-11

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
+from steady_train import steady_train
 
 from fmu_observer.models.exhibits.pendulum_model import pendulum
 from fmu_observer.observability import (
@@ -20,9 +21,6 @@ from fmu_observer.observability import (
     unobservable_modes,
 )
 from plant_models import Locomotive
-from plant_models.interop import operating_point
-
-RADIUS = 0.575
 
 
 def hautus_defect(A: np.ndarray, C: np.ndarray, eigenvalue: complex) -> int:
@@ -111,26 +109,16 @@ def test_slow_modes_beside_a_fast_one_are_not_lost() -> None:
 # -- the train ------------------------------------------------------------------------------------------------------
 
 
-def steady(speed: float) -> tuple[dict[str, float], dict[str, float]]:
-    point = operating_point(
-        Locomotive(),
-        {"train_speed": speed, "wheel_rate": speed / RADIUS},
-        {"effort": 1e3},
-        hold=("train_position", "train_speed"),
-        drift=("train_position",),
-        find=("effort",),
-    )
-    return dict(point.states), dict(point.inputs)
-
-
 def test_an_odometer_alone_never_shows_where_the_train_is() -> None:
-    blind = measured_plant(Locomotive(), *steady(13.9), continuous=["wheel_speed"])
+    blind = measured_plant(Locomotive(), *steady_train(13.9), continuous=["wheel_speed"])
     with pytest.raises(
         UnobservableError, match=r"locomotive: .*eigenvalue 0 1/s \(an offset that stays\).*train_position \(1\)"
     ) as error:
         require_detectable(blind)
     assert [list(m.taking_part) for m in error.value.modes] == [["train_position"]]
-    require_observable(measured_plant(Locomotive(), *steady(13.9), continuous=["wheel_speed"], sampled=["position"]))
+    require_observable(
+        measured_plant(Locomotive(), *steady_train(13.9), continuous=["wheel_speed"], sampled=["position"])
+    )
 
 
 def test_an_observer_model_is_linearised_where_it_is_asked() -> None:

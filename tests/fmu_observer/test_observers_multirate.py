@@ -11,25 +11,22 @@ from plant_models.hybrid import scalar_names
 MOTION = SteadyMotion(speed=20.0)
 
 
-def test_the_odometer_is_read_at_its_period_only() -> None:
+@pytest.mark.parametrize(
+    ("parameters", "changed", "before", "sampled"),
+    [({}, 0.11, 0.19, 0.2), ({"odometer_period": 0.25}, 0.0, 0.249, 0.25)],
+    ids=["as it stands", "set"],
+)
+def test_the_odometer_is_read_at_its_period_only(
+    parameters: dict[str, float], changed: float, before: float, sampled: float
+) -> None:
     runner = in_step(MultirateCdo(), MOTION)
+    runner.set("p", parameters)
     runner.runtime.start(0.0)
-    runner.runtime.advance(0.11)
+    runner.runtime.advance(changed)
     runner.set("u", {"odometer": 25.0})
-    runner.runtime.advance(0.19)
+    runner.runtime.advance(before)
     assert abs(runner.state("odometer_innovation")) < 1e-9
-    runner.runtime.advance(0.2)
-    assert runner.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
-
-
-def test_the_odometer_period_is_a_parameter() -> None:
-    runner = in_step(MultirateCdo(), MOTION)
-    runner.set("p", {"odometer_period": 0.25})
-    runner.runtime.start(0.0)
-    runner.set("u", {"odometer": 25.0})
-    runner.runtime.advance(0.249)
-    assert abs(runner.state("odometer_innovation")) < 1e-9
-    runner.runtime.advance(0.25)
+    runner.runtime.advance(sampled)
     assert runner.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railway_runs import NO_ZONES, started
+from steady_train import RADIUS, steady_train
 from toy_systems import Clockwork, Hyperbola, Slider
 
 from fmu_observer.observers.parameter_values import parameter_values
@@ -28,7 +29,7 @@ from plant_models.interop import OperatingPointError, left_out, operating_point,
 from plant_models.railway.adhesion import BURCKHARDT_NOMINAL
 
 TRAIN = Locomotive()
-MASS, INERTIA, RADIUS, WEIGHT = 90e3, 225.0, 0.575, 90e3 * 9.81
+MASS, INERTIA, WEIGHT = 90e3, 225.0, 90e3 * 9.81
 DAVIS_B, DAVIS_C = 32.0, 1.7
 
 
@@ -66,19 +67,6 @@ class Counter(HybridSystem):
         return {"count": x.count + 1.0}
 
 
-def rolling(speed: float) -> tuple[dict[str, float], dict[str, float]]:
-    """States and inputs at which the train runs steadily."""
-    point = operating_point(
-        TRAIN,
-        {"train_speed": speed, "wheel_rate": speed / RADIUS},
-        {"effort": 1e3},
-        hold=("train_position", "train_speed"),
-        drift=("train_position",),
-        find=("effort",),
-    )
-    return dict(point.states), dict(point.inputs)
-
-
 # -- linearisation --------------------------------------------------------------------------------------------------
 
 
@@ -97,7 +85,7 @@ def test_the_spring_chain_has_its_textbook_matrices() -> None:
 @settings(max_examples=20)
 @given(speed=st.floats(1.0, 50.0))
 def test_the_locomotives_linearisation_is_the_closed_form(speed: float) -> None:
-    states, inputs = rolling(speed)
+    states, inputs = steady_train(speed)
     drag = 900.0 + DAVIS_B * speed + DAVIS_C * speed**2
     assert inputs["effort"] == pytest.approx(drag, rel=1e-9)  # a steady train needs what resists it
     A = to_state_space(TRAIN, states, inputs).A
@@ -114,7 +102,7 @@ def test_the_locomotives_linearisation_is_the_closed_form(speed: float) -> None:
 
 
 def test_the_slow_mode_of_the_train_is_its_drag_slope() -> None:
-    A = to_state_space(TRAIN, *rolling(13.9)).A
+    A = to_state_space(TRAIN, *steady_train(13.9)).A
     slow = sorted(np.linalg.eigvals(A).real)[1]
     expected = -(DAVIS_B + 2.0 * DAVIS_C * 13.9) / (MASS + INERTIA / RADIUS**2)
     assert slow == pytest.approx(expected, rel=1e-5)  # the creep between train and wheel is left out of the closed form
