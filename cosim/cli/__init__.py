@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from cosim.errors import CosimError
 from cosim.process.interruption import ends_like_ctrl_c
 from cosim.process.watch import can_watch, watched
-from fmus.cli.commands import Program
+from fmus.cli.commands import CommandProgram
 
 __all__ = ["main"]
 
-PROGRAM = Program(
+PROGRAM = CommandProgram(
     "cosim",
     "Co-simulate train observers with train plant FMUs, balise events exact.",
     __name__,

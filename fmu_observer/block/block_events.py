@@ -13,7 +13,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from fmu_observer.block.block_journal import Journal, Mark, Record, Stamped
+from fmu_observer.block.block_journal import BlockJournal, Mark, Record, Stamped
 from fmu_observer.block.policy import Counters, advance, jump, replay
 from fmu_observer.description import STAMP_NOW, exposed_inputs
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol, LatePolicy
@@ -92,7 +92,7 @@ class Events:
             records: what happened, in order of time.
         """
         remembers = bool(self._names) and self.late_policy == "replay"
-        self.journal = Journal(self.protocol[1], records) if remembers else None
+        self.journal = BlockJournal(self.protocol[1], records) if remembers else None
 
     def mark(self) -> EventsMark:
         """Where the events stand, for `undo`."""

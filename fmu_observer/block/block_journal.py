@@ -62,10 +62,10 @@ new_record = partial(tuple.__new__, Record)
 """A record of its fields in their order, without a call of Python: a replay makes one for each step."""
 
 Mark = tuple[list[Record], int, int, int]
-"""Where a journal stood: its records, how many, the first that counts, when to prune; see `Journal.mark`."""
+"""Where a journal stood: its records, how many, the first that counts, when to prune; see `BlockJournal.mark`."""
 
 
-class Journal:
+class BlockJournal:
     """Records of a runtime, oldest first: at least as far back as the horizon, but no more than `JOURNAL_CAPACITY`.
 
     Args:

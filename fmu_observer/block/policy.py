@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.block.block_journal import Journal, Record, Stamped, new_record
+from fmu_observer.block.block_journal import BlockJournal, Record, Stamped, new_record
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import Runtime, Snapshot
 from plant_models.hybrid.event import DOUBTED, IGNORED
@@ -50,7 +50,7 @@ class Counters:
         return verdict != IGNORED
 
 
-def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
+def advance(runtime: Runtime, journal: BlockJournal | None, until: float) -> None:
     """Advance a runtime to `until` [s], and remember it; nothing where it is there already.
 
     Args:
@@ -62,7 +62,7 @@ def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
         runtime.advance(until)
 
 
-def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> int:
+def jump(runtime: Runtime, journal: BlockJournal | None, event: Stamped) -> int:
     """Let a runtime jump now, and remember it; returns the verdict on the event.
 
     The payload is there for the time of the jump; what was set in `u` stays.
@@ -80,7 +80,7 @@ def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> int:
     return verdict
 
 
-def communicate(runtime: Runtime, journal: Journal | None) -> None:
+def communicate(runtime: Runtime, journal: BlockJournal | None) -> None:
     """A communication step ends now; remember it where that means something.
 
     Args:
@@ -92,7 +92,9 @@ def communicate(runtime: Runtime, journal: Journal | None) -> None:
         runtime.communicate()
 
 
-def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> tuple[str, int]:
+def replay(
+    runtime: Runtime, journal: BlockJournal, event: Stamped, given: np.ndarray, tolerance: float
+) -> tuple[str, int]:
     """Live the past again with `event` at its stamp: what comes out is what would be, had it come in time.
 
     Args:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite, isinf, isnan, nan
 from typing import Any, Literal
 
@@ -42,6 +42,14 @@ class Finding:
     lyapunov_matrix: tuple[tuple[float, ...], ...] = ()
     search: LimitSearch | None = field(default=None, compare=False, repr=False)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether all is equal; two values that are not known are."""
+        return isinstance(other, Finding) and self._compared == other._compared
+
+    @property
+    def _compared(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, entry.name) for entry in fields(self) if entry.compare)
+
     @property
     def limit(self) -> float:
         """Value from which on it is lost; inf where a search found none."""
@@ -78,20 +86,20 @@ class Finding:
         """One to three plain sentences for the user, numbers included."""
         if self.explanation:
             return self.explanation
-        numbers = ", ".join(f"{c.what} = {c.value:.4g}" for c in self.conditions)
+        numbers = ", ".join(f"{c.what} = {c.value:.4g}" for c in self.conditions if not isnan(c.value))
         return f"{'Holds' if self.holds else 'DOES NOT HOLD'}: {self.statement} ({numbers}; {self.source})."
 
     @classmethod
-    def of(cls, fields: Mapping[str, Any]) -> Finding:
+    def of(cls, data: Mapping[str, Any]) -> Finding:
         """A finding from its fields as `dataclasses.asdict` gives them, also by way of JSON.
 
         Args:
-            fields: by name.
+            data: fields by name.
         """
-        conditions = tuple(map(cls.of, fields["conditions"]))
-        matrix = tuple(map(tuple, fields["lyapunov_matrix"]))
-        value = nan if isnan(fields["value"]) else fields["value"]  # the one that equals itself in comparisons
-        return cls(**{**fields, "value": value, "conditions": conditions, "lyapunov_matrix": matrix})
+        conditions = tuple(map(cls.of, data["conditions"]))
+        matrix = tuple(map(tuple, data["lyapunov_matrix"]))
+        value = nan if isnan(data["value"]) else data["value"]  # the one that equals itself in comparisons
+        return cls(**{**data, "value": value, "conditions": conditions, "lyapunov_matrix": matrix})
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data: infinite and missing numbers as None, what is empty left out."""

@@ -36,7 +36,7 @@ class _PositionGains:
     gains: tuple[float, ...]
     decay: float
     certificate: Finding
-    _noise_to_speed: float
+    noise_to_speed: float
 
 
 def augmented_matrix(drag_slope: float) -> np.ndarray:

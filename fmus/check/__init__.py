@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
-    from fmus.check.findings import Class, Finding, Verdict
+    from fmus.check.findings import CheckFinding, Class, Verdict
     from fmus.check.run import CheckReport, check_fmu
 
-__all__ = ["CheckReport", "Class", "Finding", "Verdict", "check_fmu"]
+__all__ = ["CheckFinding", "CheckReport", "Class", "Verdict", "check_fmu"]
 
 __getattr__ = lazy_imports(
     __name__,
     {
         "CheckReport": "fmus.check.run",
         "Class": "fmus.check.findings",
-        "Finding": "fmus.check.findings",
+        "CheckFinding": "fmus.check.findings",
         "Verdict": "fmus.check.findings",
         "check_fmu": "fmus.check.run",
     },

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, Finding, Verdict, skipped
+from fmus.check.findings import CheckFinding, CheckOutcome, Verdict, skipped
 from fmus.fmi.standard import CO_SIMULATION
 
 NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
@@ -89,14 +89,14 @@ class Check(ABC):
         return cls.run(context)
 
     @classmethod
-    def finding(cls, outcome: CheckOutcome) -> Finding:
+    def finding(cls, outcome: CheckOutcome) -> CheckFinding:
         """The finding of an outcome."""
         verdict = outcome.verdict or cls.failing
         advice = outcome.advice or cls.advice
-        return Finding(cls.name, verdict, outcome.detail, advice if verdict.rank >= Verdict.ERROR.rank else "")
+        return CheckFinding(cls.name, verdict, outcome.detail, advice if verdict.rank >= Verdict.ERROR.rank else "")
 
     @classmethod
-    def lost(cls, detail: str, *, crashed: bool) -> Finding:
+    def lost(cls, detail: str, *, crashed: bool) -> CheckFinding:
         """The finding where the process ended or fell silent in this check.
 
         Args:
@@ -105,4 +105,4 @@ class Check(ABC):
         """
         verdict = LIMIT if crashed and cls.failing is NOTE else cls.failing
         advice = f"{cls.advice}; {_NO_PROBE}" if crashed and cls.advice else cls.advice if crashed else SLOW
-        return Finding(cls.name, verdict, detail, advice)
+        return CheckFinding(cls.name, verdict, detail, advice)

@@ -50,7 +50,7 @@ class CheckOutcome:
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckFinding:
     """One line of the report.
 
     Args:
@@ -70,7 +70,7 @@ class Finding:
         return {name: str(value) for name, value in asdict(self).items()}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Finding:
+    def from_dict(cls, data: Mapping[str, Any]) -> CheckFinding:
         """The finding that `to_dict` described.
 
         Args:
@@ -79,7 +79,7 @@ class Finding:
         return cls(str(data["check"]), Verdict(data["verdict"]), str(data["detail"]), str(data["advice"]))
 
 
-def class_of(findings: Iterable[Finding]) -> Class:
+def class_of(findings: Iterable[CheckFinding]) -> Class:
     """The class of an FMU: that of its worst finding. What an error of the check left unseen is a limit.
 
     Args:

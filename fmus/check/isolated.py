@@ -21,8 +21,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any
 
-from fmus.check.findings import Finding, Verdict
-from fmus.check.job import Job
+from fmus.check.findings import CheckFinding, Verdict
+from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS
 from fmus.check.worker import unrun
 
@@ -55,14 +55,14 @@ class _Child:
         left: processes that it left running.
     """
 
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[CheckFinding] = field(default_factory=list)
     current: str = ""
     end: str = ""
     crashed: bool = True
     left: int = 0
 
 
-def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> list[Finding]:
+def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None) -> list[CheckFinding]:
     """Run a job in child processes.
 
     Args:
@@ -72,7 +72,7 @@ def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> 
     Returns:
         A finding for each check of the job, and those about what the FMU left running and what it printed.
     """
-    found: list[Finding] = []
+    found: list[CheckFinding] = []
     left, running = job.checks, 0
     with TemporaryFile() as console:
         while left:
@@ -94,7 +94,7 @@ def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> 
     return sorted(found, key=lambda f: order.get(f.check, len(order)))
 
 
-def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) -> _Child:
+def _run_child(job: CheckJob, console: IO[bytes], progress: Callable[[str], None]) -> _Child:
     seen = _Child()
     with _process(console) as process:
         lines = _reader(process)
@@ -117,7 +117,7 @@ def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) ->
                 seen.current, limit = str(message["start"]), job.budget
                 progress(seen.current)
             elif "finding" in message:
-                seen.findings.append(Finding.from_dict(message["finding"]))
+                seen.findings.append(CheckFinding.from_dict(message["finding"]))
                 seen.current, limit = "", _START_LIMIT
     return seen
 
@@ -196,16 +196,16 @@ def _ending(message: dict[str, Any]) -> str:
     return f"ended the process with exit code {code}"
 
 
-def _left(running: int) -> Finding:
+def _left(running: int) -> CheckFinding:
     """What the FMU started and did not end."""
     if not running:
-        return Finding(LEFT, Verdict.PASS, "none is left running")
-    return Finding(
+        return CheckFinding(LEFT, Verdict.PASS, "none is left running")
+    return CheckFinding(
         LEFT, Verdict.LIMIT, f"{running} were left running, and ended here", "end what it leaves running after each run"
     )
 
 
-def _console(console: IO[bytes]) -> Finding:
+def _console(console: IO[bytes]) -> CheckFinding:
     """What the FMU printed past its logger; everything a child prints comes from the FMU or from Python dying under
     it.
     """
@@ -213,5 +213,5 @@ def _console(console: IO[bytes]) -> Finding:
     console.seek(0)
     first = console.readline().decode("utf-8", "replace").strip()[:SHOWN]
     if not size:
-        return Finding(_CONSOLE, Verdict.PASS, "nothing is printed past the logger")
-    return Finding(_CONSOLE, Verdict.NOTE, f"{size} bytes were printed past the logger, beginning with: {first!r}")
+        return CheckFinding(_CONSOLE, Verdict.PASS, "nothing is printed past the logger")
+    return CheckFinding(_CONSOLE, Verdict.NOTE, f"{size} bytes were printed past the logger, beginning with: {first!r}")

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 
 
 @dataclass(frozen=True)
-class Job:
+class CheckJob:
     """What a child process is asked to do.
 
     Args:
@@ -35,7 +35,7 @@ class Job:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> Job:
+    def from_json(cls, text: str) -> CheckJob:
         """The job that `to_json` wrote.
 
         Args:

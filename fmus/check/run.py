@@ -15,9 +15,9 @@ from fmus.check.check import Check
 from fmus.check.checked_instance import LOADING
 from fmus.check.checks.archive_checks import platforms, validation
 from fmus.check.conclusions import what_to_trust
-from fmus.check.findings import Class, Finding, Verdict, class_of
+from fmus.check.findings import CheckFinding, Class, Verdict, class_of
 from fmus.check.isolated import run_isolated
-from fmus.check.job import Job
+from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS
 from fmus.check.runner import end_of_experiment
 from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
@@ -55,7 +55,7 @@ class CheckReport:
     archive: Archive
     step: float
     starts: Mapping[str, float]
-    findings: tuple[Finding, ...]
+    findings: tuple[CheckFinding, ...]
     trust: tuple[str, ...]
     seconds: float
     steps: int = 0
@@ -71,11 +71,11 @@ class CheckReport:
         return self.verdict is Class.USE
 
     @property
-    def limits(self) -> tuple[Finding, ...]:
+    def limits(self) -> tuple[CheckFinding, ...]:
         """What it must be used with, and what was not seen for an error of the check."""
         return tuple(f for f in self.findings if f.verdict in (Verdict.LIMIT, Verdict.ERROR))
 
-    def finding(self, check: str) -> Finding:
+    def finding(self, check: str) -> CheckFinding:
         """The finding of a check by its name.
 
         Raises:
@@ -130,7 +130,7 @@ def _job(
     timeout: float,
     steps: int | None,
     until: float | None,
-) -> Job:
+) -> CheckJob:
     """What is the same for all interfaces, of arguments that `check_fmu` was given."""
     if not 0.0 < step < math.inf or not 0.0 < timeout < math.inf:
         raise ValueError(
@@ -138,38 +138,38 @@ def _job(
         )
     _demand_settable(description, starts)
     count = _steps(description, step, steps, until)
-    return Job("", "", (), step, _start_time(description), timeout, count, starts)
+    return CheckJob("", "", (), step, _start_time(description), timeout, count, starts)
 
 
-def _static_findings(archive: Archive, progress: Callable[[str], None]) -> Iterator[Finding]:
+def _static_findings(archive: Archive, progress: Callable[[str], None]) -> Iterator[CheckFinding]:
     """Of checks that run nothing of the FMU."""
     for name, static in _STATIC.items():
         progress(name)
         outcome = static(archive)
-        yield Finding(name, outcome.verdict or Verdict.NOTE, outcome.detail)
+        yield CheckFinding(name, outcome.verdict or Verdict.NOTE, outcome.detail)
 
 
-def _run_findings(archive: Archive, job: Job, progress: Callable[[str], None]) -> list[Finding]:
+def _run_findings(archive: Archive, job: CheckJob, progress: Callable[[str], None]) -> list[CheckFinding]:
     """Of checks that run the FMU, interface by interface.
 
     Args:
         archive: the file. job: what is the same for all interfaces. progress: see `check_fmu`.
     """
-    findings: list[Finding] = []
+    findings: list[CheckFinding] = []
     left_out: dict[str, str] = {}
     with archive.unpacked() as folder:
         for interface in archive.interfaces:
             if interface == SCHEDULED_EXECUTION:
-                findings.append(Finding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
+                findings.append(CheckFinding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
                 continue
             names = tuple(_checks_of(interface, left_out.__setitem__))
             places = _registered_places(names)
             one = replace(job, folder=str(folder), interface=interface, checks=names, places=places)
             findings += _meant(archive, interface, run_isolated(one, progress))
     _demand_runnable(archive, findings)
-    findings += [Finding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
+    findings += [CheckFinding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
     if CO_SIMULATION not in archive.interfaces:
-        findings.append(Finding("interface", Verdict.LIMIT, _NO_SLAVE, "integrate it with a solver of your own"))
+        findings.append(CheckFinding("interface", Verdict.LIMIT, _NO_SLAVE, "integrate it with a solver of your own"))
     return findings
 
 
@@ -214,7 +214,7 @@ def _steps(description: ModelDescription, step: float, steps: int | None, until:
     return count
 
 
-def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Finding]:
+def _meant(archive: Archive, interface: str, findings: list[CheckFinding]) -> list[CheckFinding]:
     """Findings by what they mean for co-simulation: beside it those of model exchange are notes."""
     if interface == CO_SIMULATION or CO_SIMULATION not in archive.interfaces:
         return findings
@@ -225,7 +225,7 @@ def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Fi
     ]
 
 
-def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
+def _demand_runnable(archive: Archive, findings: list[CheckFinding]) -> None:
     """Refuse an FMU that cannot be loaded or makes no instance on this machine: nothing can be said of it, good or bad.
 
     Raises:
@@ -255,9 +255,9 @@ def _demand_settable(description: ModelDescription, starts: Mapping[str, float])
             )
 
 
-def _merged(findings: list[Finding]) -> tuple[Finding, ...]:
+def _merged(findings: list[CheckFinding]) -> tuple[CheckFinding, ...]:
     """One finding for each name: where two interfaces report the same, the worse one stands, at the end."""
-    worst: dict[str, Finding] = {}
+    worst: dict[str, CheckFinding] = {}
     for finding in findings:
         held = worst.pop(finding.check, None)
         worst[finding.check] = held if held is not None and held.verdict.rank > finding.verdict.rank else finding

@@ -18,8 +18,8 @@ from typing import Any, NoReturn
 from fmus.check.check import REPEATED, Check
 from fmus.check.checked_instance import SlaveError
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, Finding, Verdict, failed
-from fmus.check.job import Job
+from fmus.check.findings import CheckFinding, CheckOutcome, Verdict, failed
+from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS, EXPECTED
 from fmus.fmi.description import read_description
 from plant_models.user_file import UserFileError, load_class
@@ -35,7 +35,7 @@ def main() -> NoReturn:
     lines = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
     os.dup2(2, 1)  # from here on standard output is the file for console output, like standard error
     _limit()
-    job = Job.from_json(sys.stdin.readline())
+    job = CheckJob.from_json(sys.stdin.readline())
 
     me = os.getpid()
 
@@ -50,7 +50,7 @@ def main() -> NoReturn:
     os._exit(0)  # an FMU may have left threads, or handlers that crash at exit
 
 
-def run(job: Job, report: Callable[[dict[str, Any]], None]) -> None:
+def run(job: CheckJob, report: Callable[[dict[str, Any]], None]) -> None:
     """Run a job.
 
     Args:
@@ -63,7 +63,7 @@ def run(job: Job, report: Callable[[dict[str, Any]], None]) -> None:
         try:
             CHECKS[name] = load_class(place, EXPECTED)
         except UserFileError as error:
-            report({"finding": Finding(name, Verdict.ERROR, str(error), BY_HAND).to_dict()})
+            report({"finding": CheckFinding(name, Verdict.ERROR, str(error), BY_HAND).to_dict()})
     wanted = [CHECKS[name] for name in job.checks if name in CHECKS]
     for finding in findings(wanted, context, lambda name: report({"start": name})):
         report({"finding": finding.to_dict()})
@@ -72,7 +72,7 @@ def run(job: Job, report: Callable[[dict[str, Any]], None]) -> None:
 
 def findings(
     checks: list[type[Check]], context: Context, starting: Callable[[str], None] = lambda _: None
-) -> Iterator[Finding]:
+) -> Iterator[CheckFinding]:
     """Run checks one after the other; where one that is the basis of the others fails, these are skipped.
 
     Args:
@@ -81,7 +81,7 @@ def findings(
     broken, differs = "", False
     for check in checks:
         if broken or (differs and check.compares):
-            yield unrun(check.name, broken) if broken else Finding(check.name, Verdict.SKIPPED, DIFFERS)
+            yield unrun(check.name, broken) if broken else CheckFinding(check.name, Verdict.SKIPPED, DIFFERS)
             continue
         starting(check.name)
         finding = check.finding(_outcome(check, context))
@@ -91,14 +91,14 @@ def findings(
             broken = check.name
 
 
-def unrun(name: str, basis: str) -> Finding:
+def unrun(name: str, basis: str) -> CheckFinding:
     """The finding of a check that could not run because another one failed.
 
     Args:
         name: of the class.
         basis: name of the check that failed.
     """
-    return Finding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
+    return CheckFinding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
 
 
 def _outcome(check: type[Check], context: Context) -> CheckOutcome:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from fmus.cli.commands import Program
+from fmus.cli.commands import CommandProgram
 from fmus.cli.failures import EXPECTED, in_words
 from fmus.cli.signals import interruptible
 
-PROGRAM = Program(
+PROGRAM = CommandProgram(
     "fmus",
     "Export train models and observers as FMUs, and check FMUs.",
     __name__,

@@ -155,7 +155,7 @@ def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], 
 
 
 @dataclass(frozen=True)
-class Program:
+class CommandProgram:
     """A program with commands.
 
     Args:

@@ -65,7 +65,7 @@ def test_printed_gains_of_the_first_example_are_certified_for_mixed_gaps() -> No
     observer = GeneralTakagiSugenoCdo(FIRST)
     certificate = next(observer.findings(0.2))
     assert certificate.holds
-    assert (certificate.observer, certificate.preset) == ("general_takagi_sugeno_cdo", "as_published")
+    assert certificate.explain().startswith("general_takagi_sugeno_cdo (as_published): ")
     assert not next(observer.findings(0.3)).holds
     P = np.array(certificate.lyapunov_matrix)  # in the plant's own coordinates, whatever the scaling
     assert np.linalg.eigvalsh(P)[0] > 0.0

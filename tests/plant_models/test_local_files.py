@@ -33,7 +33,7 @@ import {helper}
 
 SYSTEM = """
 from own_constants import CLIMB
-from plant_models.exhibits.pendulum import Pendulum
+from plant_models.exhibits.oscillators import Pendulum
 
 
 class Own(Pendulum):

@@ -421,6 +421,6 @@ def test_an_interruption_while_a_command_is_loaded_is_no_traceback(
     def interrupted(*_arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fmus.cli.commands.Program.parser", interrupted)
+    monkeypatch.setattr("fmus.cli.commands.CommandProgram.parser", interrupted)
     assert main(["tune"]) == 2
     assert capsys.readouterr().err == "cosim: interrupted.\n"
