@@ -13,7 +13,7 @@ Kind = Literal["as printed", "sufficient", "exact", "simulated", "not found up t
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding:  # noqa: PLW1641 - the data class makes its hash
     """Answer to one question about an observer with its gains: how long may a gap be, does a condition hold.
 
     Attributes:
