@@ -284,6 +284,7 @@ def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument
 
 
 GROUP = "Compare"
+PLACE = 3
 HELP = "make, check and update baselines"
 PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
 ARGUMENTS = (

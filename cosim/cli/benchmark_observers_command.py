@@ -24,6 +24,7 @@ def _names(text: str) -> list[str]:
 
 
 GROUP = "Observers"
+PLACE = 1
 HELP = "compare observers on one recorded run"
 PARSER = {
     "description": (

@@ -33,6 +33,7 @@ RUNNING_RESISTANCE = "running_resistance"
 _RUN_SECONDS, _RUN_STEP = 60.0, 0.05
 
 GROUP = "Study"
+PLACE = 3
 HELP = "fit parameters of an FMU, a train model or a scenario to a recording"
 FORMER = {
     "identify": "cosim calibrate running_resistance RECORDING, with --signals speed=NAME for --speed NAME, --inputs "

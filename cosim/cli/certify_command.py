@@ -27,6 +27,7 @@ _FEWEST = 4
 _KINDS = ("sufficient", "exact")
 
 GROUP = "Observers"
+PLACE = 2
 HELP = "gaps, delays and errors for which observers are certified"
 FORMER = {"bound": "cosim certify OBSERVER --error M_S --missing N", "limits": "cosim certify OBSERVER"}
 PARSER = {

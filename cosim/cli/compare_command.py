@@ -37,6 +37,7 @@ EPILOG = (
 
 KINDS = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
 GROUP = "Compare"
+PLACE = 1
 HELP = "compare a result with a reference"
 PARSER = {
     "description": "Compare a result with a reference: signals in tolerance tubes, telegrams as events.",

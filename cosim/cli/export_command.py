@@ -18,6 +18,7 @@ from fmus.cli.commands import ArgumentGroup, argument
 from fmus.cli.output import Output
 
 GROUP = "Models and files"
+PLACE = 4
 HELP = "write a scenario as SSP, a result in another format, the trajectory behind a recording"
 FORMER = {"convert": "cosim export SOURCE TARGET", "reference": "cosim export SOURCE TARGET --trajectory"}
 PARSER = {

@@ -18,6 +18,7 @@ from fmus.fmu_report import describe_file, description_parts
 from plant_models.user_file import names_a_file, names_code
 
 GROUP = "Models and files"
+PLACE = 2
 HELP = "describe an FMU, an SSP file, a plant or an observer"
 PARSER = {
     "description": (

@@ -24,6 +24,7 @@ from plant_models.hybrid import HybridSystem
 from plant_models.user_file import names_code
 
 GROUP = "Models and files"
+PLACE = 5
 HELP = "linearise an FMU or a model at a point"
 PARSER = {
     "description": (

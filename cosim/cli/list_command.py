@@ -26,6 +26,7 @@ def _what(text: str) -> str:
 
 
 GROUP = "Models and files"
+PLACE = 1
 HELP = "list scenarios, plants and observers"
 PARSER = {"description": "Scenarios, plants and observers with their sources."}
 ARGUMENTS = (argument("what", nargs="?", type=_what, default="all", help=f"{', '.join(KINDS)}, or an .ssp file"),)

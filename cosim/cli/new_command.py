@@ -11,6 +11,7 @@ from fmus.cli.commands import argument
 from fmus.cli.output import Output
 
 GROUP = "Models and files"
+PLACE = 3
 HELP = "write a starter scenario for an FMU"
 PARSER = {
     "description": (

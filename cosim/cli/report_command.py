@@ -24,6 +24,7 @@ OVERLAY = "overlay.html"
 MOST_SIGNALS = 16  # figures on a page
 
 GROUP = "Compare"
+PLACE = 2
 HELP = "report of results, or of several laid over each other"
 PARSER = {
     "description": (

@@ -31,6 +31,7 @@ def _share(text: str) -> float:
 
 
 GROUP = "Run"
+PLACE = 3
 HELP = "run results again and compare"
 PARSER = {"description": DESCRIPTION}
 ARGUMENTS = (

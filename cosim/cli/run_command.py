@@ -40,6 +40,7 @@ SEEDS = "seeds"
 """Folder of the sweep over seeds, among the results."""
 
 GROUP = "Run"
+PLACE = 1
 HELP = "run a scenario"
 PARSER = {
     "description": "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP).",

@@ -11,6 +11,7 @@ from fmus.cli.commands import argument
 from fmus.cli.output import Output
 
 GROUP = "Run"
+PLACE = 2
 HELP = "show components, connections, order and loops"
 PARSER = {"description": "Components, connections, order and loops, without a run."}
 ARGUMENTS = (

@@ -30,6 +30,7 @@ _VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the
 a range, with --samples"""  # noqa: E501
 
 GROUP = "Study"
+PLACE = 1
 HELP = "run a scenario with varied values"
 PARSER = {
     "description": (

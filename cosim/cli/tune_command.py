@@ -36,6 +36,7 @@ def _seeds(text: str) -> list[int]:
 
 
 GROUP = "Study"
+PLACE = 2
 HELP = "search parameters for the smallest cost over several seeds"
 PARSER = {
     "description": (

@@ -47,6 +47,7 @@ class _BuildJob:
 
 
 GROUP = "Models"
+PLACE = 2
 HELP = "export models as native FMUs"
 PARSER = {"epilog": EPILOG, "formatter_class": argparse.RawDescriptionHelpFormatter}
 ARGUMENTS = (

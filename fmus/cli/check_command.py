@@ -31,6 +31,7 @@ _BULLET = "  - "
 _COLUMNS = (name_column("check"), name_column("verdict"), text_column("detail"))
 
 GROUP = "FMUs"
+PLACE = 2
 HELP = "how far an FMU can be trusted: validity and behaviour"
 PARSER: dict[str, Any] = {}
 ARGUMENTS = (

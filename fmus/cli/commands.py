@@ -1,8 +1,8 @@
 """The commands of a program: one file a command, ``<name>_command.py`` in the room of the program, which says all of
 it. Only the file of the command in use is loaded.
 
-Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `HELP`, one
-line, and where there are any `FORMER`, old spellings with what is typed now; then ``PARSER``, the keywords of its
+Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `PLACE`, its
+number there in order of use, `HELP`, one line, and where there are any `FORMER`, old spellings with what is typed now; then ``PARSER``, the keywords of its
 parser, ``ARGUMENTS``, what the parser takes, and a function ``execute`` unless it consists of `Actions`.
 """
 
@@ -39,12 +39,13 @@ class Command:
     """One command, as its file declares it.
 
     Args:
-        name: as it is typed. group: under which the help lists it. help: one line. former: what is typed now, by old
-            spellings.
+        name: as it is typed. group: under which the help lists it. place: within the group, from 1. help: one line.
+        former: what is typed now, by old spellings.
     """
 
     name: str
     group: str
+    place: int
     help: str
     former: Mapping[str, str]
 
@@ -240,8 +241,8 @@ def _declared(name: str, file: Path) -> Command:
     """What the file of a command declares of it."""
     assigned = [s for s in ast.parse(file.read_text(encoding="utf-8")).body if isinstance(s, ast.Assign)]
     literals = {ast.unparse(s.targets[0]): s.value for s in assigned}
-    found = {key: ast.literal_eval(literals[key]) for key in ("GROUP", "HELP", "FORMER") if key in literals}
-    return Command(name, found["GROUP"], found["HELP"], found.get("FORMER", {}))
+    found = {key: ast.literal_eval(literals[key]) for key in ("GROUP", "PLACE", "HELP", "FORMER") if key in literals}
+    return Command(name, found["GROUP"], found["PLACE"], found["HELP"], found.get("FORMER", {}))
 
 
 def _unknown(name: str, commands: Sequence[Command]) -> str:
@@ -255,9 +256,9 @@ def _unknown(name: str, commands: Sequence[Command]) -> str:
 
 
 def _listed(commands: Sequence[Command], groups: Sequence[str]) -> str:
-    """The commands with a line each, by groups."""
+    """The commands with a line each, by groups, in the order of their places."""
     order = {group: i for i, group in enumerate(groups)}
-    ordered = sorted(commands, key=lambda command: (order.get(command.group, len(order)), command.group))
+    ordered = sorted(commands, key=lambda c: (order.get(c.group, len(order)), c.group, c.place, c.name))
     columns, width = [name_column("name"), text_column("help")], max(len(command.name) for command in commands)
     tables = [
         Table(group, columns, [(f"  {c.name:{width}}", c.help) for c in members], title=group)

@@ -13,6 +13,7 @@ from fmus.fmu_report import describe_file, description_parts, problems_of
 OK, PROBLEMS = 0, 1
 
 GROUP = "FMUs"
+PLACE = 1
 HELP = "what an FMU says about itself, and whether it is valid"
 PARSER: dict[str, Any] = {}
 ARGUMENTS = (argument("file", type=Path, metavar="FILE"),)

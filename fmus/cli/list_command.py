@@ -11,6 +11,7 @@ from fmus.cli.output import Output
 from fmus.tables.table import Table, name_column, text_column
 
 GROUP = "Models"
+PLACE = 1
 HELP = "models that can be exported, with their presets and options"
 PARSER: dict[str, Any] = {}
 ARGUMENTS = ()

@@ -170,6 +170,18 @@ def test_the_help_lists_every_command_in_its_group(program: str) -> None:
 
 
 @pytest.mark.parametrize("program", LINES)
+def test_the_help_lists_commands_of_a_group_in_order_of_use(program: str) -> None:
+    text = PROGRAMS[program].parser(["--help"]).format_help()
+    for group in PROGRAMS[program].groups:
+        members = [command for command in find_commands(f"{program}.cli") if command.group == group]
+        ordered = sorted(members, key=lambda command: command.place)
+        assert [command.place for command in ordered] == list(range(1, len(members) + 1))
+        below = text[text.index(f"\n{group}\n") :]
+        positions = [below.index(f"\n  {command.name} ") for command in ordered]
+        assert positions == sorted(positions)
+
+
+@pytest.mark.parametrize("program", LINES)
 def test_an_old_spelling_is_answered_by_the_new_one(program: str, capsys: pytest.CaptureFixture[str]) -> None:
     for command in find_commands(f"{program}.cli"):
         for old, now in command.former.items():
