@@ -76,7 +76,7 @@ _StepThrough = Callable[[float, float, Sequence[Any]], list[Delivery]]
 
 @dataclass
 class Receiver:
-    """A planned component that declares the balise event, or another one by which it is told of something.
+    """A planned component that declares the balise event, or another one by which it is notified of something.
 
     An FMI 2 receiver acts on a telegram in the step that follows, and knows one telegram for each step. A telegram of
     this very instant is therefore announced before the step that ends there (`announced`); of telegrams that must not
@@ -103,7 +103,7 @@ class Receiver:
 
     @property
     def busy(self) -> bool:
-        """Whether something told or held back earlier still has to be seen to."""
+        """Whether something delivered or held back earlier still has to be seen to."""
         return bool(self.backlog or self.announced)
 
     def save(self) -> Any:
@@ -249,8 +249,8 @@ class Receiver:
     # -- a receiver that takes whole steps only ---------------------------------------------------------------------
 
     def _notify_then_step(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
-        """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told
-        late.
+        """Stamps inside the coming step notify the receiver of what it may not be stopped for; without them it is
+        notified late.
         """
         if any(self._port(telegram).stamp is None for telegram in telegrams):
             return self._step_then_notify(t, until, telegrams)
@@ -265,7 +265,7 @@ class Receiver:
         return deliveries
 
     def _step_then_notify(self, t: float, until: float, telegrams: Sequence[_Deliverable]) -> list[Delivery]:
-        """Whatever was passed in the step is told at its end, as if it had happened there."""
+        """Whatever was passed in the step is delivered at its end, as if it had happened there."""
         self._advance(t, until)
         self.arrived = self._outputs()
         # the last payload replaces the others
@@ -305,7 +305,7 @@ class Receiver:
             self._note_outcome()
 
     def _note_outcome(self) -> None:
-        """What the receiver's own counters say of the telegrams it was told and has not answered for yet."""
+        """What the receiver's own counters say of the telegrams that it got and has not reported on yet."""
         counts = self.planned.component.outcomes()
         if counts is None or counts == self.seen:
             return

@@ -1,6 +1,6 @@
 """Layouts: where the balises lie on the track, or at which instants a test places one under the train.
 
-Knows besides only what a telegram may tell.
+Knows besides only what a telegram may state.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def from_csv(path: str | Path, location_accuracy: float = 0.0) -> TrackLayout:
     Other columns are left alone, and so are lines that begin with ``#``: source and licence of the positions.
 
     Args:
-        path: of the file. location_accuracy: Q_LOCACC [m] of balises for which the file tells none.
+        path: of the file. location_accuracy: Q_LOCACC [m] of balises for which the file states none.
 
     Raises:
         ScenarioError: the file is missing, has no such column, or a row cannot be read; the row is named.

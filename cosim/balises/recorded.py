@@ -1,4 +1,4 @@
-"""Recorded telegrams: what an earlier run was told, told again, whatever the plant does now. Touches only the file it
+"""Recorded telegrams: what an earlier run received, sent again, whatever the plant does now. Touches only the file it
 reads.
 """
 
@@ -111,7 +111,7 @@ class RecordedLayout:
     records: tuple[BaliseRecord, ...]
     source: str = ""
     instants: np.ndarray = field(init=False, repr=False, compare=False)
-    """Stamps of the balises that were told [s], increasing."""
+    """Stamps of the balises that were delivered [s], increasing."""
 
     def __post_init__(self) -> None:
         for number, record in enumerate(self.records, start=1):
@@ -179,7 +179,7 @@ class RecordedLocaliser(Localiser):
 
     @staticmethod
     def _is_due(record: BaliseRecord, until: float) -> bool:
-        """As in the run that was recorded: a crossing belongs to the step that it lies in, a false telegram is told in
+        """As in the run that was recorded: a crossing belongs to the step that it lies in, a false telegram comes in
         time.
         """
         return record.stamp <= until + (TIME_TOLERANCE if record.kind == "false" else 0.0)
@@ -217,7 +217,7 @@ def recorded_crossing(record: BaliseRecord) -> Crossing:
 
 @dataclass(frozen=True)
 class RecordedChannel(Channel):
-    """Tells what was told: number for number the recorded telegrams, whatever was passed.
+    """Delivers what was delivered: number for number the recorded telegrams, whatever was passed.
 
     Args:
         records: in order of their stamps.

@@ -45,7 +45,7 @@ class BaliseService:
         odometer: column of the odometer reading that a telegram carries, or None.
         position: column of the plant's position.
 
-    A telegram that is told twice, with the same identity and stamp, counts once: receivers are not told again.
+    A telegram that is delivered twice, with the same identity and stamp, counts once: receivers are not notified again.
 
     After a run `mailbox` holds what was delivered, missed, and still on its way; `passed` counts the balises passed.
     """
@@ -162,7 +162,7 @@ class BaliseService:
     # -- steps done by somebody else ---------------------------------------------------------------------------------
 
     def expected_rows(self, start: float, stop: float) -> int:
-        """Rows of events in a run from `start` to `stop` [s], where the layout tells how many; else none."""
+        """Rows of events in a run from `start` to `stop` [s], where the layout states how many; else none."""
         layout = self.localiser.layout
         return 2 * len(layout.within(start, stop)) if isinstance(layout, InstantLayout) else 0
 
@@ -172,7 +172,7 @@ class BaliseService:
         return not self._ahead
 
     def delivered_elsewhere(self, crossing: Crossing, odometer_reading: float, outcomes: Mapping[str, str]) -> None:
-        """Somebody else did a step in which a balise was passed and all receivers were told at once.
+        """Somebody else did a step in which a balise was passed and all receivers were notified at once.
 
         Args:
             crossing: of the balise. odometer_reading: there. outcomes: what became of the telegram, by receiver.
@@ -239,7 +239,7 @@ class BaliseService:
         return [e for e in self.mailbox.due(until + TIME_TOLERANCE) if not self._is_repeated(e)]
 
     def _is_repeated(self, telegram: BaliseRecord) -> bool:
-        """Whether it was told before, which is only logged. One of no balise has no identity."""
+        """Whether it was delivered before, which is only logged. One of no balise has no identity."""
         key = telegram.identity, telegram.stamp
         if telegram.kind == "false" or key not in self._delivered:
             self._delivered[key] = None
@@ -316,10 +316,10 @@ class BaliseService:
         for name in self._by_name:
             if name == self.plant:
                 raise CouplingError(
-                    f"{name}: the watched plant cannot be told of its own balises; take it off the receivers."
+                    f"{name}: the watched plant cannot receive its own balises; take it off the receivers."
                 )
             if order.index(name) < order.index(self.plant):
-                raise CouplingError(f"{name} is told of balises, so it must be stepped after the plant '{self.plant}'.")
+                raise CouplingError(f"{name} receives balises, so it must be stepped after the plant '{self.plant}'.")
 
 
 def localiser_stage_text(method: str) -> str:

@@ -1,4 +1,4 @@
-"""Telegrams: what the on-board is told of a crossing, when, and what goes wrong on the way.
+"""Telegrams: what the on-board receives of a crossing, when, and what goes wrong on the way.
 
 A telegram carries its stamp and the odometer reading at the crossing, and arrives a latency later. Some balises are
 missed, some telegrams are false. All chance comes from (seed, number of the crossing) and from nothing else.
@@ -43,7 +43,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class FalseTelegram:
-    """A telegram without a balise: told at `time` [s], claiming a position `offset` metres from the true one."""
+    """A telegram without a balise: delivered at `time` [s], claiming a position `offset` metres from the true one."""
 
     time: float
     offset: float
@@ -58,7 +58,7 @@ class Channel:
         latency_jitter: further delay, uniform in [0, jitter] [s]; telegrams may overtake each other.
         missed_fraction: probability that a balise is not read.
         missed: identities of balises that are not read.
-        position_noise: standard deviation of the told position as a share of the location accuracy.
+        position_noise: standard deviation of the reported position as a share of the location accuracy.
         false_telegrams: telegrams without a balise.
         seed: seed of all chance here.
     """

@@ -269,7 +269,7 @@ def read_baseline(path: str | Path) -> Baseline:
         path: of its JSON file, or of one of the tables beside it.
 
     Returns:
-        The baseline; its `notes` tell what was odd and did not matter.
+        The baseline; its `notes` state what was odd and did not matter.
 
     Raises:
         BaselineError: it is missing, unreadable, cut off, in conflict after a merge, or of another version of the
@@ -293,7 +293,7 @@ def read_baseline(path: str | Path) -> Baseline:
 
 
 def summary_of(header: Header) -> dict[str, Any]:
-    """What a run would say of itself, as far as the header tells.
+    """What a run would say of itself, as far as the header states it.
 
     Args:
         header: what the baseline says of itself.

@@ -16,7 +16,7 @@ from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError
 
 WORST = 20
-"""Lines told of a difference."""
+"""Lines shown of a difference."""
 
 
 @dataclass(frozen=True)

@@ -272,7 +272,7 @@ def _span(result: Result) -> dict[str, float]:
 
 
 def versions_of(result: Result) -> dict[str, str]:
-    """Versions as the run tells them, without what differs between two machines of one kind.
+    """Versions as the run states them, without what differs between two machines of one kind.
 
     Args:
         result: the run.

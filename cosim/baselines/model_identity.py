@@ -1,4 +1,4 @@
-"""Which model a component of a run was: enough to tell a new delivery from another model. Reads FMU files to digest
+"""Which model a component of a run was: enough to separate a new delivery from another model. Reads FMU files to digest
 them.
 """
 

@@ -58,7 +58,7 @@ def check(
     names = [info.name for info in (*baseline.result.signals, *actual.signals)]
     comparison = compare_results(
         baseline.result,
-        _told(_selected(actual, baseline)),
+        _as_in_header(_selected(actual, baseline)),
         resolved(tolerances or baseline.tolerances, names),
         labels=(baseline.label, label),
     )
@@ -110,8 +110,8 @@ def _selected(result: Result, baseline: Baseline) -> Result:
     return replace(result, table=result.table[["time", *(info.name for info in shown)]], signals=shown)
 
 
-def _told(result: Result) -> Result:
-    """The result with a summary as a header would tell it, so that the comparison's notes name what really differs."""
+def _as_in_header(result: Result) -> Result:
+    """The result with a summary as a header would state it, so that the comparison's notes name what really differs."""
     if "components" not in result.summary:
         return result
     summary = {**result.summary, "components": jsonable(result.summary["components"]), "versions": versions_of(result)}

@@ -58,7 +58,7 @@ def plan_update(
     """What writing a baseline of a result over the one at `path` would do.
 
     Rows within tolerance of the former ones are kept as they are: a new machine or package version changes last digits,
-    which nobody wants to read as a difference. The header then tells of a new delivery.
+    which nobody wants to read as a difference. The header then states a new delivery.
 
     Args:
         result: of a run, or its outcome. path: of the JSON file.
@@ -101,7 +101,7 @@ def _former(path: Path) -> tuple[Baseline | None, list[str]]:
 
 
 def _may_stay(before: Comparison, former: Baseline, draft: BaselineDraft) -> bool:
-    """Whether the former rows still tell what the new ones would."""
+    """Whether the former rows still show what the new ones would."""
     same = all(getattr(former.header, key) == getattr(draft.header, key) for key in ("tolerances", "every", "span"))
     names = [info.name for info in former.header.signals] == [info.name for info in draft.header.signals]
     return same and names and before.equal and not former.notes

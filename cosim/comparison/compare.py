@@ -42,7 +42,7 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
         for label, side in zip(labels, (reference, result), strict=True)
         if side.failure is not None
     ]
-    bare = [_tells_no_units(side) for side in (reference, result)]
+    bare = [_states_no_units(side) for side in (reference, result)]
     if bare[0] != bare[1]:
         without, with_units = labels if bare[0] else labels[::-1]
         lines.append(f"{without} names no units; its numbers were taken to be in those of {with_units}.")
@@ -61,7 +61,7 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
     return lines
 
 
-def _tells_no_units(side: Result) -> bool:
+def _states_no_units(side: Result) -> bool:
     """Whether it is a mere table without any unit, as most CSV files are: not a run, whose pure numbers are meant
     so.
     """
@@ -270,7 +270,7 @@ class _Pair:
         self.times = [np.asarray(s.time[k], dtype=float) for s, k in zip(self.results, self.rows, strict=True)]
         self.infos = [{info.name: info for info in side.signals} for side in self.results]
         self.has = set(_names(result))
-        self.bare = [_tells_no_units(side) for side in self.results]
+        self.bare = [_states_no_units(side) for side in self.results]
 
     def compare(self, name: str) -> SignalComparison:
         """The comparison of a signal of the reference."""

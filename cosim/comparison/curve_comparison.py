@@ -19,7 +19,7 @@ _WINDOW_STEPS, _WINDOW_SHARE, _WINDOW_TOLERANCES = 20.0, 0.01, 10.0  # how far o
 
 
 _MOST_RUNS = (
-    20  # runs of points outside the tube that are told one by one; more of them are joined over the gaps between
+    20  # runs of points outside the tube that are reported one by one; more of them are joined over the gaps between
 )
 
 

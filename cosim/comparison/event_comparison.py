@@ -31,7 +31,7 @@ class Event:
         record: the telegram or packet. name: what it is called in messages.
         words: what must be the same, by field; events are first sought among those with the same words.
         times: instants [s] by what happens at them, the stamp first. payload: numbers by field.
-        outcomes: by receiver. units: of the payload by field; none is told where there is none.
+        outcomes: by receiver. units: of the payload by field; none is stated where there is none.
     """
 
     record: Record

@@ -41,7 +41,7 @@ from fmus.toolchain.compile import CompilationError, CompilerMissing
 
 LONGEST = 4096
 SECONDS = 0.03
-"""A chunk is to last so long at most [s]: between two of them Ctrl-C is seen and progress told."""
+"""A chunk is to last so long at most [s]: between two of them Ctrl-C is seen and progress reported."""
 
 GROWTH = 8
 """A chunk is at most so many times as long as the one before it."""
@@ -139,7 +139,7 @@ class CompiledStepper:
         return Chunk(done, partial(self._rest_of_step, k + done))
 
     def _time_in_chunk(self, place: int, component: Component) -> float:
-        """Where a component stands that logs something while C steps it: its calls so far tell the step it is in."""
+        """Where a component stands that logs something while C steps it: its calls so far show the step it is in."""
         if self._first is None:
             return component.time
         if self._program.head.journal.on:

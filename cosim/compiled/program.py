@@ -118,7 +118,7 @@ class Program:
         Args:
             place: address of the count; None where nobody reads it. before: rows that are filled already.
         """
-        self.head.rows_told = ctypes.addressof(self._nobody_reads) if place is None else place
+        self.head.rows_reported = ctypes.addressof(self._nobody_reads) if place is None else place
         self.head.rows_before = before
 
     def watch(

@@ -65,7 +65,7 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
         double *row = rows + used++ * width;
         row[0] = until;
         memcpy(row + 1, program->values, bytes);
-        *program->rows_told = program->rows_before + used;
+        *program->rows_reported = program->rows_before + used;
         if (!all_finite(program))
             stopped(program, STOP_NOT_FINITE, 0, 0);
     }

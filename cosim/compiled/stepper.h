@@ -220,7 +220,7 @@ typedef struct {
     double seconds_at_most;     /* a chunk is to last [s] */
     int64_t *last_call;         /* where the call that is being made is noted, and the time [s], for whoever watches */
     double *last_time;
-    int64_t *rows_told;         /* where the rows that are filled are counted, for the same */
+    int64_t *rows_reported;     /* where the rows that are filled are counted, for the same */
     int64_t rows_before;        /* those that are filled before the chunk */
     const uint8_t *can_be_missing; /* values that may be NaN; NULL: none */
     int64_t rows_done;          /* in the chunk: one for each step, and those of events */

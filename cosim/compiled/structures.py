@@ -93,7 +93,7 @@ class CProgram(ctypes.Structure):
         ("balises", CBalises),
         ("journal", CJournal),
         ("seconds_at_most", ctypes.c_double),
-        *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_told")),
+        *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_reported")),
         ("rows_before", ctypes.c_int64),
         ("can_be_missing", ctypes.c_void_p),
         ("rows_done", ctypes.c_int64),

@@ -251,7 +251,7 @@ class Component(_DifferentiableComponent):
         return release
 
     def outcomes(self) -> Mapping[str, int] | None:
-        """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
+        """Counts of what became of the events delivered, where the slave keeps them: blocks, and FMUs with
         `OUTCOME_VARIABLES`.
 
         Of an FMU that cannot say any more those that were read last.

@@ -1,6 +1,6 @@
 """A user's plain Python object as a component. Knows one object.
 
-It has the call surface of an FMI 3.0 slave, as a block has: whoever steps components cannot tell it from an FMU. Its
+It has the call surface of an FMI 3.0 slave, as a block has: to whoever steps components it is as an FMU. Its
 event ``balise`` is a triggered input clock with the fields of a telegram that the object's ``balise`` takes.
 """
 
@@ -144,7 +144,7 @@ class _PythonSlave:
         """The event happens in `updateDiscreteStates`."""
 
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
-        """A telegram comes; it is told in `updateDiscreteStates`."""
+        """A telegram comes; it takes effect in `updateDiscreteStates`."""
         self._notified = any(values)
         self._values[self._ends[3] :] = NO_TIME
 

@@ -1,6 +1,6 @@
 """A recording as a component: its columns are outputs, played back in time. Knows one recording.
 
-It has the call surface of an FMI 3.0 slave, so that whoever steps components cannot tell it from a plant. What jumped
+It has the call surface of an FMI 3.0 slave, so that to whoever steps components it is as a plant. What jumped
 in the recording (two rows of the same time) is a time event: the step that ends there ends with the row before it,
 Event Mode brings the row after it. So whoever listens gets the very inputs it had beside the plant.
 """

@@ -62,7 +62,7 @@ class Recording:
 
     @cached_property
     def digest(self) -> str:
-        """What tells this recording from others: a hash of times, names and values."""
+        """What distinguishes this recording from others: a hash of times, names and values."""
         names = "\0".join(s.name for s in self.signals).encode()
         return hashlib.sha256(names + self.time.tobytes() + self.values.tobytes()).hexdigest()[:32]
 
@@ -178,13 +178,13 @@ def column_courses(
         result: a run, which knows how it took its signals, or a table. columns: names. said: by name what was said.
         discrete: those of which the target is discrete; where nothing else is known they are held.
     """
-    told, of_run = _recorded(result), _is_run(result)
+    stated, of_run = _recorded(result), _is_run(result)
     found: list[ColumnCourse] = []
     for name in columns:
         if name in said:
             found.append("held" if said[name] == "hold" or result.info(name).variability == "discrete" else "line")
         elif of_run:
-            found.append(told.get(name, "fresh"))
+            found.append(stated.get(name, "fresh"))
         else:
             found.append("held" if name in discrete or result.info(name).variability == "discrete" else "line")
     return found
@@ -338,8 +338,8 @@ def _events(time: np.ndarray, values: np.ndarray, telegrams: np.ndarray) -> np.n
     same = (values[first] == values[last]) | (np.isnan(values[first]) & np.isnan(values[last]))
     differ = ~np.all(same, axis=1)
     known = np.append(np.sort(telegrams[np.isfinite(telegrams)]), np.inf)  # NaN are those that were missed
-    told = known[np.searchsorted(known, time[first] - TIME_TOLERANCE)] <= time[first] + TIME_TOLERANCE
-    return np.asarray(time[first][differ | ~told])
+    listed = known[np.searchsorted(known, time[first] - TIME_TOLERANCE)] <= time[first] + TIME_TOLERANCE
+    return np.asarray(time[first][differ | ~listed])
 
 
 def _without_gaps(values: np.ndarray, time: np.ndarray, interpolation: Interpolation) -> tuple[np.ndarray, str]:

@@ -26,7 +26,7 @@ KEPT = 16
 """Contents that are kept, those used last; what is met again after more others is unpacked again."""
 
 _FOR_READERS = ("sources/", "documentation/")
-"""Folders that an instance of FMI 2 or 3 is not told of."""
+"""Folders that an instance of FMI 2 or 3 is not informed of."""
 
 
 @dataclass

@@ -71,7 +71,7 @@ def connect_clocks(
 
 
 def _leave_to_connection(target: str, components: Mapping[str, Component]) -> None:
-    """An event whose count is connected is told by its source, stamp and payload with it: the master has no part in
+    """An event whose count is connected is notified by its source, stamp and payload with it: the master has no part in
     it.
     """
     component, signal = split_name(target, components, "Connection target")

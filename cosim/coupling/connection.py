@@ -137,7 +137,7 @@ def _of_elements(pair: Link, components: Mapping[str, Component]) -> list[Connec
 
 
 def event_connection(pair: Link, components: Mapping[str, Component]) -> Connection:
-    """A checked connection of a number to a field of an event, of which the master tells: it is sent with the event.
+    """A checked connection of a number to a field of an event, which the master notifies: it is sent with the event.
 
     Args:
         pair: link as the scenario has it. components: by name.
@@ -251,7 +251,7 @@ def unconnected_inputs(
 
     Args:
         connections: checked. components: all of them.
-        given: by component the names whose values were given on purpose; they are not told.
+        given: by component the names whose values were given on purpose; they are not reported.
     """
     set_by_hand = {(name, signal) for name, signals in (given or {}).items() for signal in signals}
     taken = {c.target for c in connections} | set_by_hand
@@ -306,7 +306,7 @@ def _connectable(component: Component, name: str, *causalities: str) -> ModelVar
         )
     if variable.causality == "input" and variable.valueReference in component.event_references():
         raise CouplingError(
-            f"{component.name}.{name} belongs to an event, of which the master tells; connect its count too, or leave "
+            f"{component.name}.{name} belongs to an event, which the master notifies; connect its count too, or leave "
             f"all of it."
         )
     return variable

@@ -95,7 +95,7 @@ def is_continuous(variable: ModelVariable) -> bool:
 
 
 def _waits_for_events(source: Component, target: Component, connection: Connection) -> bool:
-    """Whether the target is told at the end of the step, by an event, of what the source changes within the step."""
+    """Whether the target is notified at the end of the step, by an event, of what the source changes within it."""
     if not target.capabilities.hasEventMode or source.capabilities.hasEventMode:
         return False
     variable = target.variables[connection.target[1]]

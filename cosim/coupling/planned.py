@@ -18,7 +18,7 @@ class PlannedInterpolator(Protocol):
 
     @property
     def name(self) -> str:
-        """How the component is told."""
+        """How the component is notified."""
 
     def begin(self) -> None:
         """A step begins: what is held over it was true where its source stands now."""
@@ -31,7 +31,7 @@ class PlannedInterpolator(Protocol):
         """
 
     def send(self, t: float, until: float) -> None:
-        """Tell of the line for a step from `t` to `until` [s]."""
+        """Give the line for a step from `t` to `until` [s]."""
 
     def arrive(self, until: float) -> None:
         """The component stands at `until` [s], the end of a step."""

@@ -1,7 +1,7 @@
 """Colours, dashes and fonts of all figures, and the canvas they are drawn on. Touches no global state of matplotlib.
 
-Colours are those of Okabe and Ito, which colour-blind people can tell apart; each comes with a dash pattern, so that
-the lines can be told apart on grey paper as well.
+Colours are those of Okabe and Ito, which colour-blind people can distinguish; each comes with a dash pattern, so that
+the lines can be distinguished on grey paper as well.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def observer_line(observers: Sequence[str], observer: str) -> dict[str, Any]:
 
 
 def run_line(index: int) -> dict[str, Any]:
-    """Colour, dashes and width of a run among others: the first lies broad below, later ones are told apart by both.
+    """Colour, dashes and width of a run among others: the first lies broad below, later ones are distinguished by both.
 
     Args:
         index: place of the run, from 0.

@@ -35,8 +35,8 @@ class Gap:
     """The way from one balise to the next one that was read.
 
     Args:
-        origin, target: names of the two. start, end: when their telegrams were told [s].
-        length: way of the train from the first balise to where the second was told [m].
+        origin, target: names of the two. start, end: when their telegrams were delivered [s].
+        length: way of the train from the first balise to where the second was delivered [m].
         speed: of the train at the end [m/s]; NaN where it was not recorded.
     """
 
@@ -233,7 +233,7 @@ def root_mean_square(errors: np.ndarray) -> float:
 
 
 def _read(events: Sequence[BaliseRecord]) -> list[BaliseRecord]:
-    """Telegrams of balises that were read and told, in order of their stamps, one at an instant."""
+    """Telegrams of balises that were read and delivered, in order of their stamps, one at an instant."""
     delivered = [event for event in events if event.kind == "true" and np.isfinite(event.delivered_at)]
     by_time = {event.delivered_at: event for event in sorted(delivered, key=lambda event: event.stamp)}
     return [by_time[time] for time in sorted(by_time)]

@@ -1,4 +1,4 @@
-"""Whether the covariances that observers tell fit their errors: NIS and NEES of a run, with their bands. Imports NumPy;
+"""Whether the covariances of observers fit their errors: NIS and NEES of a run, with their bands. Imports NumPy;
 SciPy where a filter is judged.
 """
 
@@ -23,18 +23,18 @@ _NOT_MEASUREMENTS = ("_std", "_covariance", "_likelihood")
 
 ADVICE = {
     "overconfident": "it trusts itself more than its errors allow. Increase the covariance of the process noise, or "
-    "that of the measurements where the sensor is worse than told; a wrong model or a bias looks alike",
-    "underconfident": "its errors are smaller than it tells. Decrease the covariances of process or measurements; a "
+    "that of the measurements where the sensor is worse than stated; a wrong model or a bias looks alike",
+    "underconfident": "its errors are smaller than it reports. Decrease the covariances of process or measurements; a "
     "plant or a sensor that adds no noise in this run looks alike",
 }
 MEANING = {
-    "NIS": "how far measurements are from what it expects, squared, over the variance that it tells for that",
-    "NEES": "how far all its states are from the truth, squared, over the variances that it tells for that",
-    "error": "how far this one is from the truth, squared, over the variance that it tells for that",
+    "NIS": "how far measurements are from what it expects, squared, over the variance that it reports for that",
+    "NEES": "how far all its states are from the truth, squared, over the variances that it reports for that",
+    "error": "how far this one is from the truth, squared, over the variance that it reports for that",
 }
 """What is judged, by kind, for those who do not know the words."""
 _NOTHING_WRONG = 1e-6
-"""Mean square of errors, in units of what is told, below which a run holds no noise to judge a covariance by."""
+"""Mean square of errors, in units of what is reported, below which a run holds no noise to judge a covariance by."""
 _COLOURED = (
     "Innovations look small because the error lasts (a wheel that creeps, a bias): give it a state, or increase the "
     "covariance of the process noise"
@@ -106,8 +106,8 @@ def filter_consistency(result: Result, spec: ReportSpec) -> list[FilterConsisten
 def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
     """Texts for filters whose covariance does not fit, one an observer.
 
-    Each test more raises false alarms, so an observer that tells NIS is warned of by NIS, and by NEES where that says
-    that it trusts itself too much; one that tells no NIS by NEES, and one without a covariance by single quantities.
+    Each test more raises false alarms, so an observer that reports NIS is warned of by NIS, and by NEES where that says
+    that it trusts itself too much; one that reports no NIS by NEES, and one without a covariance by single quantities.
 
     Args:
         result: the run. spec: observers, roles and labels.
@@ -205,7 +205,7 @@ def _judged(
 
 
 def _degrees(result: Result, observer: str, names: list[str]) -> np.ndarray:
-    """Degrees of freedom of NIS in each row: told, or the number of innovations, or 1."""
+    """Degrees of freedom of NIS in each row: reported, or the number of innovations, or 1."""
     degrees = estimate(result, observer, "nis_degrees")
     if degrees is not None:
         return degrees
@@ -213,7 +213,7 @@ def _degrees(result: Result, observer: str, names: list[str]) -> np.ndarray:
 
 
 def measurement_count(outputs: Iterable[str]) -> int:
-    """How many measurements the innovations of an observer are of; 1 where it tells none of them.
+    """How many measurements the innovations of an observer are of; 1 where it reports none of them.
 
     Args:
         outputs: names of its outputs, vectors element by element.

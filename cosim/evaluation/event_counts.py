@@ -11,8 +11,8 @@ from cosim.results.result import BaliseRecord
 _KNOWN_OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "repeated", "undelivered")
 _UNDELIVERED = "undelivered"
 USED = ("accepted", "replayed", "late", "doubted", "told")
-"""Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that does not say."""
-_IN_WORDS = {"told": "told, does not say"}
+"""Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that reports no outcome."""
+_IN_WORDS = {"told": "delivered, outcome not reported"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ def result_warnings(result: Result, spec: ReportSpec) -> list[str]:
     """Why the numbers of a run say little or nothing, in words.
 
     Args:
-        result: the run; one that failed tells of its end by itself. spec: roles, phases, start of the evaluation.
+        result: the run; one that failed reports its end by itself. spec: roles, phases, start of the evaluation.
 
     Returns:
         A text for each of: filters whose covariance does not fit their errors; where the true speed is known, a train

@@ -23,7 +23,7 @@ class ReportSpec:
         title: heading of the report.
         true_position, true_speed, true_slip, true_adhesion_force, true_fault, odometer, speed_reference: names of
             recorded signals; `true_fault` is not zero while a fault acts: while the odometer lies, say.
-        detection: output of the observers that is not zero while they tell a fault. delay_limit: longest delay of its
+        detection: output of the observers that is not zero while they report a fault. delay_limit: longest delay of its
             detection that is allowed [s], or None.
         observers: component names of the observers; signals are ``<name>.position``, ``.speed``, ``.slip``,
             ``.adhesion_force``, ``.slip_indicator``, and that of `detection`, each used where it was recorded.

@@ -1,4 +1,4 @@
-"""The roles of a result that was read back: as its summary tells them, or guessed from the names. Imports NumPy
+"""The roles of a result that was read back: as its summary states them, or guessed from the names. Imports NumPy
 only.
 """
 

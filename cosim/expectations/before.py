@@ -1,4 +1,4 @@
-"""What expectations are checked against before the run: the scenario, its components, and who is told of balises."""
+"""What expectations are checked against before the run: the scenario, its components, and who receives balises."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class Before:
         return known
 
     def _follows_our_levels(self, component: str, signal: str) -> bool:
-        """Whether an indicator's name tells its levels: of shipped models, and the slip indicator of what plays an
+        """Whether an indicator's name states its levels: of shipped models, and the slip indicator of what plays an
         observer.
         """
         own = self.tables.get(component)

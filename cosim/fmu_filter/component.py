@@ -132,7 +132,7 @@ class FmuFilterModel:
         """Take a telegram in at its stamp; what followed a late one is done again.
 
         Args:
-            stamp: when the balise was passed [s]. position: told [m]. location_accuracy: told [m].
+            stamp: when the balise was passed [s]. position: reported [m]. location_accuracy: reported [m].
 
         Returns:
             The outputs; False for a telegram from before the horizon.

@@ -43,7 +43,7 @@ class FilterTable(TomlTable):
     )
     balise: str | None = Field(default=None, description="output that a telegram measures, a position [m]")
     balise_deviation: _Positive = Field(
-        default=1.0, description="standard deviation of it [m], where a telegram tells no location accuracy"
+        default=1.0, description="standard deviation of it [m], where a telegram states no location accuracy"
     )
     horizon: _NotNegative = Field(default=10.0, description="how far back a late telegram is still taken in [s]")
     alpha: _Positive = Field(default=1.0, description="spread of the sigma points of a `ukf` [1]")

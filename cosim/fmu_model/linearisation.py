@@ -1,4 +1,4 @@
-"""A linearisation: the matrices at a point with the names and units that belong to them, and what they tell. Touches no
+"""A linearisation: the matrices at a point with the names and units that belong to them, and what they show. Touches no
 FMU.
 """
 

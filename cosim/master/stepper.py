@@ -63,7 +63,7 @@ class StepperChoice:
         return (f"Python does all steps, not the compiled stepper: {self.reason}.",) if fallback else ()
 
     def summary(self) -> dict[str, Any]:
-        """What to tell of it after the run, plain data: the name, steps it did, and why not."""
+        """What to report of it after the run, plain data: the name, steps it did, and why not."""
         if self.compiled is None:
             return {"name": "python", "steps_compiled": 0, "reason": self.reason}
         return {"name": "compiled", "steps_compiled": self.compiled.steps, "reason": None}

@@ -1,4 +1,4 @@
-"""How long a receiver may wait for a packet, as far as the settings of a network tell before the run."""
+"""How long a receiver may wait for a packet, as far as the settings of a network show before the run."""
 
 from __future__ import annotations
 

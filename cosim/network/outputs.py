@@ -32,7 +32,7 @@ class PacketReader:
     Args:
         target: ``component.input``. signal: number of the signal that it reads.
         period, offset: of its samples, the offset after the start of the run [s]; None where nobody knows them, and
-            what it was told stays until a packet is lost.
+            what it received stays until a packet is lost.
     """
 
     target: str
@@ -43,7 +43,7 @@ class PacketReader:
     def next_sample(self, t: float, start: float) -> float:
         """Its first sample after `t` [s], of a run that starts at `start` [s]; infinite where nobody knows.
 
-        One at `t` itself has read what was told before.
+        One at `t` itself has read what was delivered before.
         """
         if self.period is None:
             return inf

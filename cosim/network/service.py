@@ -1,6 +1,6 @@
-"""The network of a run: nodes send at their instants, packets arrive, receivers are told or hold what came last.
+"""The network of a run: nodes send at their instants, packets arrive, receivers are notified or hold what came last.
 
-Transmissions and deliveries are instants to which all components are stepped, so what is measured and what is told does
+Transmissions and deliveries are instants to which all components are stepped, so what is measured and delivered does
 not depend on the communication step, nor on the order in which components are stepped.
 """
 
@@ -64,10 +64,10 @@ class Field:
 
 @dataclass
 class PacketListener:
-    """A component that is told of packets by an event of its own.
+    """A component that is notified of packets by an event of its own.
 
     Args:
-        component: its name. event: by which it is told. fields: that take signals. nodes: of whose packets it is told.
+        component: its name. event: by which it is notified. fields: that take signals. nodes: whose packets it gets.
     """
 
     component: str
@@ -96,7 +96,7 @@ class NetworkService:
         settings: what it is. start: of the run [s].
         sources: columns of the measured signals in the values of the plan, shape (p,).
         first: column of the network's own outputs.
-        listeners: components that are told by events. holders: by signal the components whose inputs hold it.
+        listeners: components that are notified by events. holders: by signal the components whose inputs hold it.
         readers: inputs for which what arrives is an output too, behind the others.
     """
 
@@ -143,10 +143,10 @@ class NetworkService:
         self._arriving = slice(behind, behind + len(self._readers))
 
     def attach(self, plan: Plan, known: Sequence[Receiver] = ()) -> None:
-        """Take a place in the plan: values are measured in it, and receivers that are behind are told in their steps.
+        """Take a place in the plan: values are measured in it, and receivers that are behind get theirs in their steps.
 
         Args:
-            plan: of the run. known: receivers of balises, which keep what they are told of packets as well.
+            plan: of the run. known: receivers of balises, which keep what they receive of packets as well.
         """
         self._plan = plan
         by_name = {receiver.planned.component.name: receiver for receiver in known}
@@ -220,12 +220,12 @@ class NetworkService:
         self._sent[own] = np.where(there[own], measured[own], self._sent[own])
         values[self._sender] = node + 1.0
         self.number, self._next = k + 1, self.chance.instant(k + 1)
-        told = tuple(measured[own].tolist())
+        sent = tuple(measured[own].tolist())
         lost, arrives = self.chance.lost(k), stamp + self.chance.delay(k)
-        self._post(_Packet(stamp, arrives, node, k, told, "lost" if lost else "sent", len(self.entries)))
+        self._post(_Packet(stamp, arrives, node, k, sent, "lost" if lost else "sent", len(self.entries)))
         if not lost and self.chance.is_doubled(k):
             arrives = stamp + self.chance.delay(k, second=True)
-            self._post(_Packet(stamp, arrives, node, k, told, "duplicate", len(self.entries)))
+            self._post(_Packet(stamp, arrives, node, k, sent, "duplicate", len(self.entries)))
 
     def _post(self, packet: _Packet) -> None:
         lost = packet.kind == "lost"
@@ -262,7 +262,7 @@ class NetworkService:
             else:
                 message = self._message(listener, packet)
                 delivery = entry.deliveries[listener.component] = listener.receiver.notify(t, message)
-                delivery.before = delivery.after = None  # rows tell it; a log of a long run has no room for it
+                delivery.before = delivery.after = None  # rows show it; a log of a long run has no room for it
 
     def _arrive(self, t: float, node: int, brought: np.ndarray) -> None:
         """Those that leave out what is missing take what a packet of a node brought, NaN where it was lost, until they
@@ -275,15 +275,15 @@ class NetworkService:
                 self._reads[place] = reader.next_sample(t, self._start)
 
     def _message(self, listener: PacketListener, packet: _Packet) -> EventMessage:
-        """What a listener is told: the values of the packet, and of other nodes what was last received."""
+        """What a listener receives: the values of the packet, and of other nodes what was last received."""
         values = self._plan.values[self._held].copy()
         values[self._own[packet.node]] = packet.values
-        told = {f.name: f.factor * float(values[f.signal]) + f.offset for f in listener.fields}
+        received = {f.name: f.factor * float(values[f.signal]) + f.offset for f in listener.fields}
         own = {"node": packet.node + 1.0, "number": float(packet.number), "delivered_at": packet.delivered_at}
-        return EventMessage(listener.event, packet.stamp, packet.delivered_at, own | told)
+        return EventMessage(listener.event, packet.stamp, packet.delivered_at, own | received)
 
     def _move(self, receiver: Receiver, drive: Mover, t: float, until: float) -> None:
-        """A receiver that is behind with what it was told is told in its step."""
+        """A receiver that is behind with what was delivered to it is notified in its step."""
         if receiver.busy:
             receiver.step(t, until, ())
         else:
@@ -292,7 +292,7 @@ class NetworkService:
     # -- what came out ----------------------------------------------------------------------------------------------
 
     def settled(self, first: int) -> list[PacketRecord]:
-        """Packets in the order of sending, up to the first that is still on its way or not yet used where it was told.
+        """Packets in the order of sending, up to the first that is still on its way or not yet used by its receiver.
 
         Args:
             first: number of packets at the begin that are left out.
@@ -324,11 +324,11 @@ class NetworkService:
 
     def _outcomes(self, entry: _SentPacket) -> dict[str, str]:
         node = entry.packet.node
-        told = [*self._holding[node], *(one.component for one in self.listeners if node in one.nodes)]
+        receivers = [*self._holding[node], *(one.component for one in self.listeners if node in one.nodes)]
         if entry.packet.kind == "lost":
             return {}
         if not entry.deliveries:
-            return dict.fromkeys(told, "undelivered")
+            return dict.fromkeys(receivers, "undelivered")
         return {name: what if isinstance(what, str) else what.outcome for name, what in entry.deliveries.items()}
 
     # -- state ------------------------------------------------------------------------------------------------------

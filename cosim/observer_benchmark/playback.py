@@ -139,7 +139,7 @@ class ScenarioParts:
 
 
 def find_parts(scenario: Scenario) -> ScenarioParts:
-    """Tell the plant side of a scenario from its observers.
+    """Separate the plant side of a scenario from its observers.
 
     Args:
         scenario: the scenario.

@@ -1,1 +1,1 @@
-"""The process: what is told and kept when an FMU ends it, hangs in it, or somebody stops it from outside."""
+"""The process: what is reported and kept when an FMU ends it, hangs in it, or somebody stops it from outside."""

@@ -1,6 +1,6 @@
 """The last call: which function of which component is being called, at what time. Standard library only.
 
-It stands in a page of memory that a watching process shares, so that it can be told when this process is gone. To note
+It is in a page of memory that a watching process shares, so that it can be stated when this one is gone. To note
 a call is one store of a number; the words behind the numbers are written to the page when they are asked for first.
 """
 

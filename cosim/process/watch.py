@@ -1,4 +1,4 @@
-"""The watch: a command runs in a process of its own, and this one tells what an FMU did to it. Standard library only.
+"""The watch: a command runs in a process of its own, and this one reports what an FMU did to it. Standard library only.
 
 The process is forked before anything large is loaded, so this one costs milliseconds and a few megabytes. It hands
 signals on, ends a call that takes too long, and keeps what was computed when the other one is gone.
@@ -87,7 +87,7 @@ class _Watch:
         self._why = ""
 
     def wait(self) -> int:
-        """The exit code, after everything that is to be told has been told."""
+        """The exit code, after everything that is to be reported has been reported."""
         status = self._status()
         for number in STOPPING:
             signal.signal(number, signal.SIG_IGN)  # what is kept now is kept quickly

@@ -184,7 +184,7 @@ def _stored_scenario(manifest: Manifest) -> Scenario:
 
 
 def _new_ones(warn: Callable[[str], None] | None, stored: Result) -> Callable[[str], None]:
-    """Tells only of what was not warned of before."""
+    """Reports only what was not warned of before."""
     known = set(stored.summary.get("warnings", ()))
 
     def warn_new(text: str) -> None:

@@ -43,7 +43,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: object) -> None:
-    """Tell a worker of pytest-xdist where it is to leave what it found; only the controller writes baselines.
+    """Pass a worker of pytest-xdist where it is to leave what it found; only the controller writes baselines.
 
     Args:
         node: a worker of pytest-xdist.
@@ -90,7 +90,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Tell what was checked, what differs, what was written.
+    """Report what was checked, what differs, what was written.
 
     Args:
         terminalreporter: where the summary goes. config: of the session.

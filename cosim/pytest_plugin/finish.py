@@ -15,7 +15,7 @@ from cosim.pytest_plugin.records import Records, RegressionRecord
 
 TITLE = "fmu baselines"
 LINES = 6
-"""Lines of a difference shown at the end; the failure itself tells all."""
+"""Lines of a difference shown at the end; the failure itself shows all."""
 _WRITTEN: pytest.StashKey[list[str]] = pytest.StashKey()
 REFUSED: pytest.StashKey[str] = pytest.StashKey()
 """Why nothing was written, or an empty text."""

@@ -183,7 +183,7 @@ class FmuRegression:
             root.mkdir(parents=True, exist_ok=True)
             (root / ".gitignore").write_text("*\n", encoding="utf-8")
             return {kind: self._shown(file) for kind, file in write_comparison(found, folder).items()}
-        except Exception as error:  # the difference must be told, whatever happens to its picture
+        except Exception as error:  # the difference must be reported, whatever happens to its picture
             return {"picture": f"could not be made: {error}"}
 
     def _artifacts(self, path: Path) -> Path:

@@ -63,7 +63,7 @@ class Records:
         return found
 
     def share_with(self, node: Any) -> None:
-        """Tell a worker where the folder is.
+        """Pass a worker the place of the folder.
 
         Args:
             node: a worker of pytest-xdist.

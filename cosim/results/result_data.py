@@ -41,16 +41,16 @@ class BaliseRecord:
         stamp: when the train passed the balise [s].
         delivered_at: when the receivers were notified [s]; NaN for a missed one.
         identity: name of the balise.
-        position: position told [m].
+        position: position reported [m].
         true_position: position of the plant at the stamp [m].
-        location_accuracy: Q_LOCACC told [m].
+        location_accuracy: Q_LOCACC reported [m].
         odometer_reading: odometer output at the crossing [m/s], NaN without an odometer.
-        kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
+        kind: ``true``, ``missed`` (read by nobody) or ``false`` (delivered, but no balise is there).
         method: localisation method that gave the stamp.
         time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
         outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``,
-            ``doubted`` or ``ignored`` by a gate, ``told`` (it does not say), ``repeated`` (told before, with the same
-            identity and stamp, so not told again), or ``undelivered`` (still on its way when the run ended).
+            ``doubted`` or ``ignored`` by a gate, ``told`` (it reports none), ``repeated`` (came before, with the same
+            identity and stamp, so not delivered again), or ``undelivered`` (on its way when the run ended).
     """
 
     stamp: float
@@ -78,7 +78,7 @@ class PacketRecord:
         values: measurements by ``component.signal``, in the units of their components.
         kind: ``sent``, ``lost`` (it never arrives) or ``duplicate`` (the same once more).
         outcomes: what became of it at each receiver: ``held`` (its inputs follow), ``dropped`` (a duplicate, or older
-            than what is held), as for telegrams where it is told by an event, or ``undelivered`` (still on its way when
+            than what is held), as for telegrams where it gets them by an event, or ``undelivered`` (on its way when
             the run ended).
     """
 

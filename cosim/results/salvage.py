@@ -1,4 +1,4 @@
-"""Salvage: what a run had computed becomes a result when its process is gone. Touches the folders it is told of."""
+"""Salvage: what a run had computed becomes a result when its process is gone. Touches the folders it is given."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def to_pandas(result: ResultData, signals: Iterable[str] | None = None) -> Any:
 
 
 def _event_columns(result: ResultData) -> dict[str, Any]:
-    """Columns of the telegrams; ``outcome.NAME`` is what became of each at a receiver, empty where it was not told."""
+    """Columns of the telegrams; ``outcome.NAME`` is what became of each at a receiver, empty where it did not come."""
     columns: dict[str, Any] = {}
     for name in TELEGRAM_ROWS.columns:
         if name != "outcomes":

@@ -1,4 +1,4 @@
-"""The balise service of a run: who is watched, how crossings are found, who is told."""
+"""The balise service of a run: who is watched, how crossings are found, who is notified."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 BALISE_EVENT = "balise"
 _ASKED_FOR = "asked for in the scenario"
-_AS_RECORDED = "they are told as they were in an earlier run"
+_AS_RECORDED = "they are delivered as they were in an earlier run"
 _PROBING = ("fmus", "cosim/components")
 """The code by which plants are probed."""
 _NO_ERROR = PlantError()
@@ -85,7 +85,7 @@ def balise_roles(table: BalisesTable | None, components: Mapping[str, Component]
 
 
 def _receivers(table: BalisesTable, components: Mapping[str, Component], plant: str, where: str) -> list[str]:
-    """Names of the components that are told of balises: those listed, or all but the plant that declare the event.
+    """Names of the components that are notified of balises: those listed, or all but the plant that declare the event.
 
     Args:
         table: of the balises. where: name of the scenario, for messages.
@@ -163,7 +163,7 @@ def choose_method(
     if table.layout == "recorded":
         return Choice("recorded", _AS_RECORDED)
     asked: Method | None = None if table.method == "auto" else table.method
-    # a tolerance tells of a solver: it is looked at
+    # a tolerance means a solver: it is examined
     if asked is not None and asked in _UNTOUCHED and component.tolerance is None:
         return Choice(asked, _ASKED_FOR, error=_plant_error(table, asked, component, start))
     if component.kind == RECORDING:

@@ -96,7 +96,7 @@ def complete_tables(task: RunTask, coupled: Coupled, balises: BaliseRoles, remar
     check_roles(table, coupled.sources, task.where)
     roles = inferred_roles(table, coupled.components, coupled.connections, balises.plant)
     if roles:
-        remarks.note(f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}.")
+        remarks.note(f"Roles that the report was not given: {', '.join(map(' = '.join, roles.items()))}.")
     table = _check_expectations(_with_roles(table, roles), coupled.sources, balises.receivers, task.where)
     return task.with_table(table)
 

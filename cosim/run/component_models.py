@@ -262,7 +262,7 @@ def native_fmu(
 
     Args:
         system: the system. version: of FMI. preset: of its parameters. where: place for messages.
-        protocol: how it is told of events; None for what is usual in the version of FMI.
+        protocol: how it is notified of events; None for what is usual in the version of FMI.
 
     Raises:
         FmuLoadError: it cannot be built.

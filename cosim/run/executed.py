@@ -133,8 +133,8 @@ def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning)
         return
     time, first = np.asarray(table["time"], dtype=float), raised[0]
     shown = [other for other in warning.shows if f"{name}.{other}" in fields]
-    told = ", ".join(f"{other} = {float(table[f'{name}.{other}'][first]):.6g}" for other in shown)
-    beside = f" ({told})" if told else ""
+    others = ", ".join(f"{other} = {float(table[f'{name}.{other}'][first]):.6g}" for other in shown)
+    beside = f" ({others})" if others else ""
     if warning.at_end:
         yield f"{name}: {warning.text}; seen at the end, {time[-1]:.6g} s{beside}."
         return

@@ -12,7 +12,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.scenario.scenario_tables import BalisesTable
 
 Layout = TrackLayout | InstantLayout | RecordedLayout
-_TOLD_AS_RECORDED = (
+_DELIVERED_AS_RECORDED = (
     "latency",
     "latency_jitter",
     "missed_fraction",
@@ -66,10 +66,10 @@ def _checked(layout: TrackLayout, table: BalisesTable) -> TrackLayout:
 
 def _recorded(table: BalisesTable, start: float, folder: Path) -> RecordedLayout:
     """The telegrams of an earlier run; what happens to telegrams has happened to them already."""
-    given = [key for key in _TOLD_AS_RECORDED if key in table.model_fields_set]
+    given = [key for key in _DELIVERED_AS_RECORDED if key in table.model_fields_set]
     given += ["method"] if table.method != "auto" else []
     if given:
-        raise ScenarioError(f"layout 'recorded' tells the telegrams as they were told; leave out {', '.join(given)}.")
+        raise ScenarioError(f"layout 'recorded' delivers the telegrams as recorded; leave out {', '.join(given)}.")
     return read_layout((folder / str(table.file)).resolve()).later(start)
 
 

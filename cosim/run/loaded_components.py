@@ -134,6 +134,6 @@ def _protocol_parameters(table: ComponentTable, component: Component, where: str
     }
     for name in given:
         if name not in component.variables:
-            why = "what it does with late events is its own choice" if component.events else "it is told of no events"
+            why = "what it does with late events is its own choice" if component.events else "it receives no events"
             raise ScenarioError(f"{where}: this {component.kind} has no parameter {name}; {why}.")
     return given if component.kind == "FMU" else {}

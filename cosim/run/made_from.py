@@ -100,7 +100,7 @@ def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
 
 def _objects(origin: Origin) -> dict[str, dict[str, Any]]:
     """What is kept of classes and instances that a script gave, by component."""
-    told = {}
+    described = {}
     for name, table in origin.table.components.items():
         model = table.model or table.observer
         given = None if model is None else model.given
@@ -112,8 +112,8 @@ def _objects(origin: Origin) -> dict[str, dict[str, Any]]:
             values = {**table.options, **table.parameters}
             kept = ", ".join(f"{key} = {value}" for key, value in values.items()) or "none"
             text = f"{name}: of the instance of {model} were kept its class and its settings ({kept}), nothing else."
-        told[name] = {"class": names_code(model), "text": text}
-    return told
+        described[name] = {"class": names_code(model), "text": text}
+    return described
 
 
 def _keep(

@@ -117,9 +117,9 @@ def _set_rates(table: ScenarioTable, plan: Plan, axis: TimeAxis, services: Servi
             f"every = {max(every.values())} needs communication steps that are fixed; set master.control = 'fixed'."
         )
     taken = {name: "its clocks are connected" for wire in plan.clocks for name in (wire.source[0], wire.target[0])}
-    taken |= {} if balises is None else {r.planned.component.name: "it is told of balises" for r in balises.receivers}
+    taken |= {} if balises is None else {r.planned.component.name: "it receives balises" for r in balises.receivers}
     if network is not None:
-        taken |= {listener.component: "it is told of packets" for listener in network.listeners}
+        taken |= {listener.component: "it receives packets" for listener in network.listeners}
     if balises is not None:
         taken[balises.plant] = "it is watched for balises"
     set_rates(plan, axis, every, substeps, taken)

@@ -30,7 +30,7 @@ class NetworkReading:
         leaves_out: whether the component leaves out a reading that is missing.
         samples: period and offset [s] at which it reads; None where it does not stop at samples, or nobody knows.
         repeats: whether samples may find nothing new of a signal that is not lost.
-        of_event: whether it is a field of an event that another component tells: read when that occurs.
+        of_event: whether it is a field of an event that another component notifies of: read when that occurs.
     """
 
     source: str
@@ -141,7 +141,7 @@ def make_network(table: ScenarioTable, components: Mapping[str, Component], fold
 
 
 def is_wired(pairs: Sequence[Link], component: str, event: str) -> bool:
-    """Whether somebody else tells of an event: its count or clock has a source.
+    """Whether somebody else notifies of an event: its count or clock has a source.
 
     Args:
         pairs: connections of the scenario. component: whose event. event: its name.

@@ -1,6 +1,6 @@
 """From the connections of a scenario with a network to those that the plan takes, and to who listens and reads.
 
-A connection travels where a node owns its source and its target is a receiver. To a field of an event it is told by the
+A connection travels where a node owns its source and its target is a receiver. To a field of an event it comes by the
 packet itself; any other input reads what arrived last.
 """
 
@@ -41,7 +41,7 @@ def connect_over(
         events; and the same as the plan takes them, with the network as source of what travels over it.
 
     Raises:
-        ScenarioError: an event is to be told of a signal that no node owns.
+        ScenarioError: an event is to carry a signal that no node owns.
         CouplingError: as for `connect`.
     """
     assert table.network is not None
@@ -91,7 +91,7 @@ def _field(
     """The part of a packet that a field of an event takes."""
     if not travels:
         raise ScenarioError(
-            f"{where}: {pair[1]} is told by the event '{event}', and no node of the network owns {pair[0]}; "
+            f"{where}: {pair[1]} is delivered by the event '{event}', and no node of the network owns {pair[0]}; "
             f"{nearest(pair[0], set(settings.signals))}"
         )
     made = event_connection(pair, components)

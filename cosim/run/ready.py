@@ -121,7 +121,7 @@ _CARRIED = {
 
 
 def _interpolation_note(interpolators: Mapping[str, str], inputs: str) -> str:
-    """How components are told of inputs that follow a line."""
+    """How components are informed of inputs that follow a line."""
     by_interpolator: dict[str, list[str]] = {}
     for name, interpolator in interpolators.items():
         by_interpolator.setdefault(interpolator, []).append(name)

@@ -1,4 +1,4 @@
-"""Roles: which signals a report uses. Those it is told exist and are what they should be; others follow from the
+"""Roles: which signals a report uses. Those it is given exist and are what they should be; others follow from the
 coupling.
 """
 
@@ -42,7 +42,7 @@ def roles_of_balises(balises: BalisesTable | None) -> dict[str, str]:
 def inferred_roles(
     table: ScenarioTable, components: Mapping[str, Component], connections: Sequence[Connection], plant: str
 ) -> dict[str, str]:
-    """The roles that the report table leaves open, as far as balises and connections tell them.
+    """The roles that the report table leaves open, as far as balises and connections show them.
 
     Args:
         table: the scenario. components: by name. connections: checked. plant: that passes the balises; empty for none.

@@ -57,7 +57,7 @@ def ending(
 
     Args:
         origin: of the run. folder: that it was streamed to, or None. warn: called with each warning.
-        finished: told of the outcome; None for nobody.
+        finished: notified of the outcome; None for nobody.
     """
 
     def finish(outcome: Outcome) -> Outcome:
@@ -71,7 +71,7 @@ def ending(
 
 
 def _finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str], None]) -> Outcome:
-    """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning
+    """Write what only the end of a run shows. Where the disk refuses, the folder keeps what was streamed, and a warning
     says so.
     """
     assert outcome.origin is not None

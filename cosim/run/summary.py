@@ -108,12 +108,12 @@ def _shown(value: StartValue) -> Any:
 
 
 def judged_summary(result: Result, spec: ReportSpec) -> dict[str, Any]:
-    """What the report is told, and what is judged by it: faults, position errors at balises, consistency of filters.
+    """What the report is given, and what it evaluates: faults, position errors at balises, consistency of filters.
 
     Args:
         result: the run. spec: roles of its signals.
     """
-    found: dict[str, Any] = {"report": asdict(spec)}  # so that the folder tells which signal plays which role
+    found: dict[str, Any] = {"report": asdict(spec)}  # so that the folder states which signal plays which role
     if faults := fault_detection(result, spec):
         found["fault_detection"] = [fault.to_data() for fault in faults]
     if (gaps := gap_errors(result, spec)).errors:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
 
 Stamp = tuple[int, int]
-"""Size and time of the last change: what tells without reading a file that it is another one."""
+"""Size and time of the last change: what shows without reading a file that it is another one."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ class ForeignFile:
 
     @property
     def parts(self) -> list[Path]:
-        """The files that belong to it: of results all that tells of the run, whether the folder is named or a table in
+        """The files that belong to it: of results all that describes the run, whether the folder is named or a table in
         it; of Python what it imports beside it.
         """
         if self.path.suffix == ".py":
             return [self.path, *local_files(self.path).values()]
         folder = self.path if self.path.is_dir() else self.path.parent
         if self.path.is_dir():
-            return sorted(p for p in folder.iterdir() if p.is_file() and _tells_of_results(p))
+            return sorted(p for p in folder.iterdir() if p.is_file() and _belongs_to_results(p))
         if (folder / "summary.json").is_file() and self.path.name.startswith("table."):
             return [
                 self.path,
@@ -135,5 +135,5 @@ def _existing_parts(foreign: ForeignFile) -> list[Path]:
         return []
 
 
-def _tells_of_results(path: Path) -> bool:
+def _belongs_to_results(path: Path) -> bool:
     return path.name.startswith("table.") or path.name in ("summary.json", "events.csv", "messages.csv")

@@ -67,7 +67,7 @@ def _tolerance(value: Any) -> float | str:
         return str(value)
     if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
         return float(value)
-    raise ValueError("expected a relative tolerance above 0, or 'none' to tell none")
+    raise ValueError("expected a relative tolerance above 0, or 'none' to give none")
 
 
 Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]

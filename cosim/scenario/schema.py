@@ -97,7 +97,7 @@ class ScenarioTable(TomlTable):
 
 
 _MAX_STEPS = 1e12
-"""Communication steps of a run at most: days with the fastest stepper, and times are still told apart."""
+"""Communication steps of a run at most: days with the fastest stepper, and times are still distinct."""
 
 
 def step_count(start: float, stop: float, step: float) -> int:
@@ -127,7 +127,7 @@ def step_count(start: float, stop: float, step: float) -> int:
 
 
 _APART = 10.0
-"""A step is at least so many times the distance at which two times are still told apart: a grid of fewer is uneven."""
+"""A step is at least so many times the distance at which two times are still distinct: a grid of fewer is uneven."""
 
 
 def _check_resolution(what: str, step: float, start: float, stop: float) -> None:
@@ -142,7 +142,7 @@ def _check_resolution(what: str, step: float, start: float, stop: float) -> None
     largest = max(abs(start), abs(stop))
     distance = max(ulp(largest), TIME_TOLERANCE)
     if step < _APART * distance:
-        why = f"times near {largest:g} s are told apart from {distance:.2g} s on"
+        why = f"times near {largest:g} s are distinct from {distance:.2g} s on"
         least = f"a step must be {_APART:g} times that; use {_APART * distance:.2g} s or more"
         raise ValueError(f"{what} {step!r} s is too short: {why}, and {least}")
 

@@ -131,7 +131,7 @@ class UnitTable:
         return NamedUnit(bare, unit)
 
     def _compare(self, name: str, node: Node) -> None:
-        """Tell of a unit that is defined otherwise than everybody understands its name: numbers follow the
+        """Warn of a unit that is defined otherwise than everybody understands its name: numbers follow the
         definition.
         """
         usual, defined = _usual(name), self._units[name]

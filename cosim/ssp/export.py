@@ -134,7 +134,7 @@ class _Exporter:
         self.files[DEFAULT_VARIANT] = text_of(root)
 
     def reader(self) -> Reader | None:
-        """The component that tells the others of balises in a tool that knows of none, where one is needed and can be
+        """The component that notifies the others of balises in a tool that has none, where one is needed and can be
         made.
         """
         balises = with_seeds(self.table).balises
@@ -149,7 +149,7 @@ class _Exporter:
             if isinstance(layout, TrackLayout):
                 why = f"a reader holds at most {_MOST_BALISES} balises and there are {len(layout.positions)}"
             LOG.warning(
-                "%s: other tools will tell the observers of no balises, for no reader could be added: %s.",
+                "%s: other tools will notify the observers of no balises, for no reader could be added: %s.",
                 self.where,
                 why,
             )
@@ -185,7 +185,7 @@ class _Exporter:
             fmu = (self.folder / str(component.fmu)).resolve()
         else:
             version = 2 if self.version == "1.0" else int((component.backend or NATIVE)[-1])
-            # A master that knows no event mode can tell an FMU of events by counts only.
+            # A master that knows no event mode can notify an FMU of events by counts only.
             counts = None if self.table.balises is None else EventProtocol("counts")
             fmu = native_fmu(system, version, component.preset, place, counts if system.triggered_events else None)
         interface = Interface(self.checked(fmu, name, component), f"component {name!r}")

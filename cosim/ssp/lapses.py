@@ -1,4 +1,4 @@
-"""Lapses: form that public packages get wrong and that has one meaning all the same. Told, and gone on with; refused
+"""Lapses: form that public packages get wrong and that has one meaning all the same. Stated, and gone on with; refused
 where asked.
 
 What could mean two things, or other numbers, is no lapse: it is refused where it stands.

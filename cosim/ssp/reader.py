@@ -1,4 +1,4 @@
-"""The balise reader of an exported system: it tells the observers of balises where no master does.
+"""The balise reader of an exported system: it notifies the observers of balises where no master does.
 
 Other tools know nothing of balises. The FMU `balise_reader`, wired to the watched plant and to every observer that is
 notified by counts, finds them from position and speed. Read back, the package's own master takes its place.

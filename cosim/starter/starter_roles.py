@@ -15,7 +15,7 @@ class PlantRoles:
     """Guesses for a plant; None for what was not found.
 
     Args:
-        position, speed, wheel_speed: outputs. effort: input that drives the train. applied: output that tells the
+        position, speed, wheel_speed: outputs. effort: input that drives the train. applied: output that reports the
             effort, where no input does. slip, adhesion: outputs for the report. mass: parameter.
     """
 

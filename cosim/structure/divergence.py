@@ -62,7 +62,7 @@ class _Range:
 
 
 def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
-    """The text of a failure, with the signal that went wrong first and what fed its component, where the rows tell.
+    """The text of a failure, with the signal that went wrong first and what fed its component, where the rows show it.
 
     Args:
         error: that ended the run. plan: that was run. table: rows by ``component.signal``, in the components' own

@@ -1,5 +1,5 @@
 """The runs of a sweep in groups, one for each value of a setting: means with intervals, shares of counted things.
-Touches the file it is told to write.
+Touches the file it is asked to write.
 """
 
 from __future__ import annotations

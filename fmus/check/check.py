@@ -21,7 +21,7 @@ ONE_INSTANCE = "have one instance of it in a process, a fresh process for each r
 _NO_PROBE = (
     "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
 )
-SLOW = "it hangs or is slow there: a longer --timeout tells which"
+SLOW = "it hangs or is slow there: a longer --timeout shows which"
 MISSING = "do not use the capabilities whose functions are missing"
 NO_REDOING = "do not redo steps: the master finds crossings by shorter steps or interpolation, and iterates nothing"
 FIXED_STEP = "keep to one communication step; an event inside it can only be interpolated"

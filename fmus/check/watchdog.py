@@ -112,7 +112,7 @@ def _end_all(child: int) -> int:
 
 
 def _descendants(number: int) -> Iterator[int]:
-    """All descendants of a process, where the system tells."""
+    """All descendants of a process, where the system reports them."""
     children: list[int] = []
     with suppress(OSError):
         for tasks in (_PROC / str(number) / "task").iterdir():

@@ -16,7 +16,7 @@ from fmpy.model_description import ModelDescription, ValidationError
 
 from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
 from fmus.fmi.description import FILE, read_description
-from fmus.fmi.sense import nonsense, tell_apart
+from fmus.fmi.sense import distinguish, nonsense
 from fmus.fmi.standard import INTERFACES
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
@@ -164,7 +164,7 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
         raise NotAnFmuError(f"{path} is FMI {version}; FMI {supported} are supported.")
     if all(getattr(description, name) is None for name in INTERFACES):
         raise NotAnFmuError(f"{path} offers no interface: neither {', '.join(INTERFACES.values())}.")
-    tell_apart(description)
+    distinguish(description)
     fault = nonsense(description)
     if fault is not None:
         raise NotAnFmuError(f"{path} cannot be used: modelDescription.xml: {fault}")

@@ -17,7 +17,7 @@ CLOCKS = ("calculated", "constant", "fixed", "tunable", "changing", "countdown",
 """What ``intervalVariability`` can be (FMI 3.0.2, 2.2.8.3)."""
 
 
-def tell_apart(description: ModelDescription) -> None:
+def distinguish(description: ModelDescription) -> None:
     """Give internal variables that share one name a name each: nobody can mean one of them by it, and nobody needs to.
 
     Public FMUs have such pairs. Inputs, outputs and parameters are left as they are: they are set and connected by

@@ -317,7 +317,7 @@ def test_escape_sequences_never_reach_the_terminal(
     ],
 )
 def test_steps_below_the_resolution_of_time_are_refused(keys: dict[str, float]) -> None:
-    with pytest.raises(CosimError, match=r"step .* s is too short: times near .* s are told apart"):
+    with pytest.raises(CosimError, match=r"step .* s is too short: times near .* s are distinct"):
         Scenario(**keys).add("driver", model="driver").table()
 
 

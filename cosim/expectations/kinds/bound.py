@@ -1,4 +1,4 @@
-"""The error of an estimate stays within the bound that is told beside it."""
+"""The error of an estimate stays within the bound that is reported beside it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AS_PRINTED = "_as_printed"
 
 
 class BoundExpectation(PairExpectation):
-    """The error of a signal never exceeds a bound that another signal tells."""
+    """The error of a signal never exceeds a bound that another signal reports."""
 
     check: Literal["bound"]
     bound: str

@@ -33,14 +33,14 @@ class CertificateExpectation(Expectation):
             raise ScenarioError(_NEVER_CERTIFIED)
         for name in before.named(self.of, before.receivers, "observer"):
             if name not in before.receivers:
-                raise ScenarioError(f"{name!r} is told of no telegrams; {nearest(name, before.receivers)}")
+                raise ScenarioError(f"{name!r} receives no telegrams; {nearest(name, before.receivers)}")
         return self
 
     def judge(self, run: JudgedRun) -> list[Judged]:
         """Certified for the longest gap that was expected, where that was known, and for the longest that occurred."""
         certificates = mapping_entry(run.result, "certificates")
-        told = [name for name, entry in certificates.items() if isinstance(entry, Mapping) and SEEN in entry]
-        names = told if self.of is None else [self.of] if isinstance(self.of, str) else list(self.of)
+        certified = [name for name, entry in certificates.items() if isinstance(entry, Mapping) and SEEN in entry]
+        names = certified if self.of is None else [self.of] if isinstance(self.of, str) else list(self.of)
         if not names:
             raise NotRecordedError("nothing to judge: no observer of this run has a certificate")
         return [_certificate(name, certificates.get(name), run) for name in names]

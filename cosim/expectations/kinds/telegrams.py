@@ -54,12 +54,12 @@ class TelegramsExpectation(WindowExpectation):
         return self
 
     def prepare(self, before: Before) -> Self:
-        """There are balises, and the receiver is told of them."""
+        """There are balises, and the receiver is notified of them."""
         super().prepare(before)
         if before.receivers is None:
             raise ScenarioError("this scenario has no balises; give it a table [balises]")
         if self.of is not None and self.of not in before.receivers:
-            raise ScenarioError(f"{self.of!r} is told of no telegrams; {nearest(self.of, before.receivers)}")
+            raise ScenarioError(f"{self.of!r} receives no telegrams; {nearest(self.of, before.receivers)}")
         return self
 
     def judge(self, run: JudgedRun) -> list[Judged]:

@@ -35,7 +35,7 @@ class Algorithm(ABC):
     """Brings all components of a plan, and its values, over one step.
 
     An algorithm calls `prepare` (gather the inputs) and `move` of the planned components, and nothing else of the
-    components but `save` and `restore`; who watches a plant or tells a receiver of balises takes their `move` over
+    components but `save` and `restore`; who watches a plant or notifies a receiver of balises takes their `move` over
     without its knowledge.
 
     Args:
@@ -89,7 +89,7 @@ class Algorithm(ABC):
         return
 
     def summary(self) -> Mapping[str, Any]:
-        """What to tell of it after the run, plain data: the name, why, groups, held and fresh connections,
+        """What to report of it after the run, plain data: the name, why, groups, held and fresh connections,
         iterations.
         """
         found = {"name": self.name, **self.choice.summary(), "held": self.held(), "fresh": self.fresh()}

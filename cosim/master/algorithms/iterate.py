@@ -177,7 +177,7 @@ class _IteratedLoop:
         """Bring the members from `t` to `until` [s].
 
         Raises:
-            RunError: a component failed, or the iteration does not converge; the residuals are told.
+            RunError: a component failed, or the iteration does not converge; the residuals are stated.
         """
         states = [step.component.save() for step in self.steps]
         start = Start(states, self._plan.values[self._span].copy(), self._plan.non_numeric.copy())
@@ -248,11 +248,11 @@ class _IteratedLoop:
             if not residuals:
                 raise
             self._plan.values[self._span] = start.values
-            told = (
+            residuals = (
                 f"sweep {len(residuals) + 1} of the iteration of {', '.join(self.names)}; residuals so far: "
                 f"{shown(residuals)}"
             )
-            raise RunError(f"{error} (In {told}.)", error.component, error.time) from error
+            raise RunError(f"{error} (In {residuals}.)", error.component, error.time) from error
         back: np.ndarray = self._plan.values[self._columns]
         return back
 

@@ -30,7 +30,7 @@ class StepControl(ABC):
         """
 
     def summary(self) -> Mapping[str, Any]:
-        """What to tell of it after the run, plain data."""
+        """What to report of it after the run, plain data."""
         return {"name": self.name}
 
     def warnings(self) -> list[str]:

@@ -51,7 +51,7 @@ class DoublingStep(StepControl):
         system: what is stepped; all its components must save their state and vary their step.
         tolerance: bound of the error of a step in every continuous signal, relative to its size, absolute below 1.
         order: of the error of one step in its length: 2 with held inputs, 3 with lines.
-        smallest_step: no step is shorter [s]; there a too large error is accepted, counted and told.
+        smallest_step: no step is shorter [s]; there a too large error is accepted, counted and reported.
 
     Raises:
         CouplingError: a component cannot save its state, or cannot vary its step.

@@ -66,7 +66,7 @@ def set_rates(
         plan: prepared, services attached. axis: communication points.
         every: component -> communication steps that make one of its own.
         substeps: component -> own steps in one communication step.
-        taken: component -> why it must take every communication step (it is watched, or told of balises).
+        taken: component -> why it must take every communication step (it is watched, or receives balises).
 
     Raises:
         CouplingError: a component that must take every step, cannot vary its step where a rest is left, or has both

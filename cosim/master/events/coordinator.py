@@ -179,7 +179,7 @@ class EventCoordinator:
             now = reached
 
     def summary(self) -> dict[str, Any]:
-        """What to tell of it after the run, plain data."""
+        """What to report of it after the run, plain data."""
         names = [p.name for p in self._participants]
         iteration = self.iteration
         return {"participants": names, "instants": iteration.count, "longest": iteration.longest, "redone": self.redone}

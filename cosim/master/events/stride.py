@@ -49,7 +49,7 @@ class Stride:
             self._hold(t, until)
 
     def _drive(self, inner: Mover, t: float, until: float) -> None:
-        """The same without telling anybody of the parts that are not taken."""
+        """The same without notifying anybody of the parts that are not taken."""
         start = self._start(t, until)
         if start is not None:
             inner(start, until)

@@ -22,7 +22,7 @@ def attach_interpolators(plan: Plan, method: Method | Literal["hold"]) -> Mappin
         plan: prepared, components instantiated. method: as for `FirstOrderHold`; ``hold`` for no other lines.
 
     Returns:
-        By component, the interpolator that tells it of its lines (see `interpolators`).
+        By component, the interpolator that gives it its lines (see `interpolators`).
     """
     givers = _givers(plan)
     return {s.component.name: _attach(s, plan, givers, method) for s in plan.steps if len(s.inputs)}

@@ -1,6 +1,6 @@
 """First-order hold: the straight line of each input of one component through the last two values that its source gave.
 
-Where the value is that of the end of the step the line interpolates, elsewhere it extrapolates. How a slave is told of
+Where the value is that of the end of the step the line interpolates, elsewhere it extrapolates. How a slave receives
 it is in `interpolators`.
 """
 

@@ -1,4 +1,4 @@
-"""Interpolators: how a slave is told that its inputs follow a line during a step.
+"""Interpolators: how a slave is informed that its inputs follow a line during a step.
 
 | interpolator | needs | what the slave sees |
 |---|---|---|
@@ -25,7 +25,7 @@ from cosim.master.interpolation.first_order_hold import FirstOrderHold
 
 
 class InputInterpolator(ABC):
-    """Tells one component of the line of its inputs.
+    """Gives one component the line of its inputs.
 
     Args:
         hold: the course of the inputs. inputs: the connected inputs it belongs to.
@@ -38,7 +38,7 @@ class InputInterpolator(ABC):
 
     @abstractmethod
     def send(self, t: float, until: float) -> None:
-        """Tell of the line for a step from `t` to `until` [s]."""
+        """Give the line for a step from `t` to `until` [s]."""
 
     def begin(self) -> None:
         """A step begins: what is held over it was true where its source stands now."""
@@ -54,7 +54,7 @@ class InputInterpolator(ABC):
         self.hold.update(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
 
     def arrive(self, until: float) -> None:
-        """The component stands at `until` [s]: where only a mean was told, outputs follow from the value there."""
+        """The component stands at `until` [s]: where only a mean was given, outputs follow from the value there."""
         return
 
     def forget(self, jumped: np.ndarray) -> None:

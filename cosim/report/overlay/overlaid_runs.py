@@ -9,7 +9,7 @@ from cosim.errors import ComparisonError
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
-MOST_RUNS = 12  # that anybody can tell apart in a figure
+MOST_RUNS = 12  # that anybody can distinguish in a figure
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
         raise ComparisonError(f"Each run needs its roles and its label: got {counts}.")
     if len(results) > MOST_RUNS:
         raise ComparisonError(
-            f"At most {MOST_RUNS} runs can be told apart in a figure (got {len(results)}): choose some."
+            f"At most {MOST_RUNS} runs can be distinguished in a figure (got {len(results)}): choose some."
         )
     twice = sorted({label for label in labels if list(labels).count(label) > 1})
     if twice:

@@ -42,7 +42,7 @@ _COMPONENT_ENTRIES = {
 _SETTINGS = ("scenario", "start", "stop", "step")
 _VERSION = "version of "  # these stand last
 _PLACE = 1e-6  # balises this close together are one [m]
-INSTANT = 1e-9  # likewise, where the layout tells when they are passed [s]
+INSTANT = 1e-9  # likewise, where the layout states when they are passed [s]
 
 
 def differences(runs: Sequence[OverlayRun]) -> list[list[str]]:

@@ -59,7 +59,7 @@ def about_text(result: ResultData) -> str:
 
 
 def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> ResultData:
-    """The result of a table and what `about_text` told; NaN in the summary has become None.
+    """The result of a table and what `about_text` stated; NaN in the summary has become None.
 
     Args:
         table: rows, a structured array, shape (rows,).

@@ -70,4 +70,4 @@ def format_of(path: Path) -> type[Format]:
     for ending in sorted(endings, key=len, reverse=True):
         if path.name.lower().endswith(ending):
             return endings[ending]
-    raise OutputError(f"{path}: the format is told by the ending of the name, one of {', '.join(endings)}.")
+    raise OutputError(f"{path}: the format follows from the ending of the name, one of {', '.join(endings)}.")

@@ -10,7 +10,7 @@ from fmus.check.restoring import near, restoring
 from fmus.check.runner import WARM_UP_STEPS
 from fmus.fmi.slave import Slave
 
-WITHIN = "steps may be redone, and what is redone differs by as much; the master tells it in its bounds"
+WITHIN = "steps may be redone, and what is redone differs by as much; the master states it in its bounds"
 
 
 def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:

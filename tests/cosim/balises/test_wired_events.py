@@ -75,5 +75,5 @@ def test_the_master_does_not_tell_a_second_time_what_is_wired() -> None:
 
 @pytest.mark.parametrize("fields", [("position",), ("time", "position")])
 def test_a_part_of_an_event_is_refused_without_its_count(fields: tuple[str, ...]) -> None:
-    with pytest.raises(CosimError, match="belongs to an event, of which the master tells; connect its count too"):
+    with pytest.raises(CosimError, match="belongs to an event, which the master notifies; connect its count too"):
         wired(fields).run()

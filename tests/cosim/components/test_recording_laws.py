@@ -134,7 +134,7 @@ def telegram(**changes: Any) -> BaliseRecord:
         (
             [telegram()],
             {"latency": 0.1, "missed": ["B1"]},
-            r"tells the telegrams as they were told; leave out latency, missed",
+            r"delivers the telegrams as recorded; leave out latency, missed",
         ),
         ([telegram()], {"method": "rollback"}, r"leave out method"),
         (None, {}, r"holds no telegrams.*no such file"),

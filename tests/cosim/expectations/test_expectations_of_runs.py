@@ -68,8 +68,8 @@ WRONG = [
         {"check": "bound", "signal": "observer.speed", "reference": "locomotive.speed", "bound": "observer.speeed"},
         "did you mean 'speed'",
     ),
-    ({"check": "telegrams", "missed": 0, "of": "driver"}, "is told of no telegrams"),
-    ({"check": "certificate", "of": "locomotive"}, "is told of no telegrams"),
+    ({"check": "telegrams", "missed": 0, "of": "driver"}, "receives no telegrams"),
+    ({"check": "certificate", "of": "locomotive"}, "receives no telegrams"),
     ({"check": "certificate", "of": "lok"}, "no observer 'lok'"),
 ]
 

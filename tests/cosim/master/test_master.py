@@ -352,13 +352,11 @@ def test_the_plant_is_no_receiver_and_receivers_come_after_it() -> None:
             return super().output(t, x, u, p)
 
     plant, listener = block(Motion(), "plant"), block(Listener(), "listener")
-    with pytest.raises(CouplingError, match="the watched plant cannot be told of its own balises"):
+    with pytest.raises(CouplingError, match="the watched plant cannot receive its own balises"):
         prepare([plant, listener], [], 0.1, 2, Balises(positions(1.0), receivers=["plant"]))
     master = prepare([plant, listener], [], 0.1, 2, Balises(positions(1.0), receivers=["listener"]))
     master.plan.steps.reverse()
-    with pytest.raises(
-        CouplingError, match="listener is told of balises, so it must be stepped after the plant 'plant'"
-    ):
+    with pytest.raises(CouplingError, match="listener receives balises, so it must be stepped after the plant 'plant'"):
         Master(master.plan, TimeAxis(0.0, 0.1, 2), master.balises)
 
 

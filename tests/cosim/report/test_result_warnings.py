@@ -148,7 +148,7 @@ def test_what_was_delivered_and_what_became_of_it_stand_together() -> None:
     columns = outcome_columns(counts.outcomes.values())
     assert columns == {
         "accepted": "accepted",
-        "told": "told, does not say",
+        "told": "delivered, outcome not reported",
         "undelivered": "undelivered",
         "doubted": "doubted",
     }

@@ -204,7 +204,7 @@ def test_a_late_policy_for_a_model_without_events_is_refused(backend: str) -> No
     """Whether it is native or not, which may depend on the machine."""
     made = Scenario(stop=0.2, step=0.1).add("plant", observer="rolling", late_policy="reject", **{"as": backend})
     with pytest.raises(
-        ScenarioError, match=r"components\.plant: this (FMU|block) has no parameter late_policy; it is told"
+        ScenarioError, match=r"components\.plant: this (FMU|block) has no parameter late_policy; it receives no events"
     ):
         run(made)
 
