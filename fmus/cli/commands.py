@@ -2,8 +2,9 @@
 it. Only the file of the command in use is loaded.
 
 Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `PLACE`, its
-number there in order of use, `HELP`, one line, and where there are any `FORMER`, old spellings with what is typed now; then ``PARSER``, the keywords of its
-parser, ``ARGUMENTS``, what the parser takes, and a function ``execute`` unless it consists of `Actions`.
+number there in order of use, `HELP`, one line, and where there are any `FORMER`, old spellings with what is typed now;
+then ``PARSER``, the keywords of its parser, ``ARGUMENTS``, what the parser takes, and a function ``execute`` unless it
+consists of `Actions`.
 """
 
 from __future__ import annotations
