@@ -248,11 +248,11 @@ class _IteratedLoop:
             if not residuals:
                 raise
             self._plan.values[self._span] = start.values
-            residuals = (
+            place = (
                 f"sweep {len(residuals) + 1} of the iteration of {', '.join(self.names)}; residuals so far: "
                 f"{shown(residuals)}"
             )
-            raise RunError(f"{error} (In {residuals}.)", error.component, error.time) from error
+            raise RunError(f"{error} (In {place}.)", error.component, error.time) from error
         back: np.ndarray = self._plan.values[self._columns]
         return back
 
