@@ -20,16 +20,15 @@ from worker_tasks import Task, square
 from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import RunError
-from cosim.runs import keys
+from cosim.runs import cluster, keys
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import make_executor
 from cosim.runs.journal import JOURNAL, Journal, read_lines
 from cosim.studies.seed_runs import seed_study
 from cosim.tuning.tune import tune
 
-distributed = pytest.importorskip("distributed")
-cluster = pytest.importorskip("cosim.runs.cluster")
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are killed by signals")
+# Dask is brought by the extra of the second tier alone.
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="processes are killed by signals")]
 
 
 def started(stack: ExitStack, *words: str, folder: Path) -> subprocess.Popen[bytes]:
@@ -53,6 +52,8 @@ def workers(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
             time.sleep(0.1)
         more = ["--scheduler-file", "s.json", "--no-dashboard", "--no-nanny", "--nthreads", "1"]
         both = [started(stack, "dask_worker", *more, "--local-directory", f"w{n}", folder=at) for n in range(2)]
+        import distributed
+
         with distributed.Client(scheduler_file=str(at / "s.json")) as client:
             client.wait_for_workers(2, timeout=60)
             address = client.scheduler.address

@@ -19,8 +19,9 @@ from worker_tasks import Task, square
 from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import OutputError
+from cosim.runs import cluster
 from cosim.runs.engine import run_jobs
-from cosim.runs.executors import Executor, InThisProcess
+from cosim.runs.executors import Executor, InThisProcess, make_executor
 from cosim.runs.journal import EARLIER, JOURNAL, Journal, read_lines
 from cosim.runs.keys import file_content
 from cosim.runs.run import Run
@@ -159,3 +160,9 @@ def test_results_of_another_number_are_no_results_of_this_run(tmp_path: Path) ->
     plant.vary({"stop": [0.1, 0.3]}).run(directory=tmp_path)
     resumed = plant.vary({"stop": [0.1, 0.2, 0.3]}).run(directory=tmp_path, resume=True, keep=False)
     assert [float(run.result.time[-1]) for run in resumed.runs if run.result] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_a_scheduler_without_its_packages_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "distributed", None)
+    with pytest.raises(OutputError, match=r"needs dask.distributed: pip install 'fmu-observer\[cluster\]'"):
+        make_executor(scheduler="tcp://nowhere:1")
