@@ -16,6 +16,7 @@ _COLUMNS: tuple[Column, ...] = (
     name_column("observer", "observer"),
     name_column("what", "finding"),
     text_column("value", "value", "First value at which it is lost, or the size of an error"),
+    text_column("demand", "demanded", "What it was held against"),
     text_column("holds", "holds", "Whether the demand, or the condition, holds"),
     text_column("kind", "kind", "As printed, sufficient, exact, simulated, or the end of a search that found no limit"),
     text_column("source", "source"),
@@ -28,17 +29,17 @@ def findings_table(observers: Sequence[Certified]) -> Table:
     Args:
         observers: with their findings.
     """
-    rows: list[list[str]] = []
+    rows: list[list[str | None]] = []
     notes: list[str] = []
     for one in observers:
         for found in one.findings:
-            rows.append(
-                [one.observer, found.what, _value(found), _HOLDS[found.holds], found.kind, _source(found, notes)]
-            )
+            demand = None if found.demand is None else _with_unit(found.demand, found)
+            verdict = _HOLDS[found.holds], found.kind, _source(found, notes)
+            rows.append([one.observer, found.what, _value(found), demand, *verdict])
         notes += one.notes
     kept = slice(0 if len(observers) > 1 else 1, None)
     title = "" if len(observers) > 1 else f"Findings about {', '.join(one.observer for one in observers)}"
-    return Table("findings", _COLUMNS[kept], [row[kept] for row in rows], title=title, notes=notes)
+    return Table("findings", _COLUMNS[kept], [row[kept] for row in rows], title=title, notes=notes).filled()
 
 
 def _value(found: Finding) -> str:
@@ -47,7 +48,11 @@ def _value(found: Finding) -> str:
     if isinf(found.value):
         return "no limit"
     over = "> " if found.kind == "not found up to" else ""
-    return f"{over}{number(found.value)} {found.unit if found.unit != '1' else ''}".rstrip()
+    return over + _with_unit(found.value, found)
+
+
+def _with_unit(value: float, found: Finding) -> str:
+    return f"{number(value)} {found.unit if found.unit != '1' else ''}".rstrip()
 
 
 def _source(found: Finding, notes: list[str]) -> str:
