@@ -62,8 +62,9 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
     for place, (label, runs) in enumerate(groups.items()):
         x, y = _points(runs, against, measure, ticks)
         style = OBSERVER_LINES[place % len(OBSERVER_LINES)]
-        # neighbours differ in more than this value
-        style = style | {"linestyle": ""} if others and len(groups) == 1 else style
+        # neighbours differ in more than this value, or are seeds, between which there is nothing
+        lone = (others and len(groups) == 1) or against.rpartition(".")[2] == "seed"
+        style = style | {"linestyle": ""} if lone else style
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
     if ticks is not None:
         ax.set_xticks(range(len(ticks)), ticks)
