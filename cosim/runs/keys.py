@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import cache
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from cosim.run.results_manifest import sha256
 from cosim.scenario.origin import ForeignFile
@@ -17,6 +20,10 @@ from fmus.versions import versions
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
+
+_OWN = ("plant_models", "fmu_observer", "fmus", "cosim")
+_THIS_PROCESS = uuid4().hex
+"""In place of the content of code that stands in no file, and so cannot be recognised in a later process."""
 
 
 def digest(*texts: str) -> str:
@@ -51,6 +58,31 @@ def file_content(path: Path) -> str:
         return digest(*(text for part in parts for text in (part.name, sha256(part))))
     except OSError:
         return str(path)
+
+
+def code_content(*functions: Callable[..., Any]) -> str:
+    """Digest of functions of the user's: the files that they stand in, and the values that they are bound to.
+
+    Args:
+        functions: or objects that are called. Of those of this package the name counts; versions stand for the rest.
+    """
+    return digest(*(text for function in functions for text in _code(function)))
+
+
+def _code(function: Any) -> Iterator[str]:
+    if isinstance(function, partial):
+        yield from _code(function.func)
+        yield repr((function.args, function.keywords))
+        return
+    named = function if hasattr(function, "__qualname__") else type(function)
+    cells = getattr(function, "__closure__", None) or ()
+    bound = [getattr(function, name, None) for name in ("__self__", "__defaults__", "__kwdefaults__")]
+    yield f"{named.__module__}.{named.__qualname__} {[cell.cell_contents for cell in cells]} {bound}"
+    if named is not function:
+        yield repr(function)
+    if named.__module__.partition(".")[0] not in _OWN:
+        path = getattr(sys.modules.get(named.__module__), "__file__", None)
+        yield _THIS_PROCESS if path is None else file_content(Path(path).resolve())
 
 
 @cache

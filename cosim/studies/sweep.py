@@ -17,6 +17,7 @@ from cosim.runs.engine import Done, Progress, run_jobs
 from cosim.runs.executors import make_executor
 from cosim.runs.job import Ended, Job
 from cosim.runs.journal import Journal
+from cosim.runs.keys import code_content
 from cosim.runs.run import Run, whole
 from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.override import CASE
@@ -109,8 +110,9 @@ class Sweep:
             directory: where the journal ``runs.jsonl`` gets a line for each run as soon as it is done, and each run is
                 written, ``run_000``, ``run_001``, ..., with an index at the end, also where the sweep is interrupted.
             folders: write a results folder for each run; without them `directory` holds journal and table only.
-            resume: take the runs over that an earlier sweep left in `directory`, where scenario, settings and the
-                content of files are the same, unless they failed for a reason outside, such as an interruption.
+            resume: take the runs over that an earlier sweep left in `directory`, where scenario, settings, the content
+                of files and own measures with the files that they stand in are the same, unless they failed for a
+                reason outside, such as an interruption.
             retry: with `resume`, run all again that failed.
             scheduler: address of a scheduler of `dask.distributed` whose workers do the runs: ``tcp://host:8786``.
             measures: numbers by name that are taken of each outcome where it is run: a function of a module.
@@ -126,7 +128,7 @@ class Sweep:
             raise ScenarioError("A sweep is resumed from its folder: give directory=...")
         folder = None if directory is None else Path(directory)
         rows = _Rows(measures, measure or {}, keep, folder, folders)
-        jobs = self._jobs(rows.take, f"{measures.__module__}.{measures.__qualname__}")
+        jobs = self._jobs(rows.take, code_content(measures, *rows.measure.values()))
         result = SweepResult(self.varied(0), self.names, [], dict(units or {}))  # which is whole in any case
         done: dict[int, SweepRun] = {}
         with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
@@ -183,9 +185,8 @@ class _Rows:
         return {"measures": {**self.measures(outcome), **own}, "faults": faults, "folder": folder}
 
     def fits(self, number: int, row: Mapping[str, Any]) -> bool:
-        """Whether the row of an earlier sweep has all that this one takes, and its results the same folder."""
-        written = not self._written or row["folder"] == run_folder(number)
-        return written and set(self.measure) <= set(row["measures"])
+        """Whether the results of an earlier sweep's run stand in the folder that they would have in this one."""
+        return not self._written or bool(row["folder"] == run_folder(number))
 
     def run(self, done: Done) -> SweepRun:
         """A run that is done, with the outcome where it is kept."""

@@ -34,6 +34,11 @@ class Cost(ABC):
         return ()
 
     @property
+    def code(self) -> Callable[..., float]:
+        """What computes it: a cost that was known before is taken over where this is unchanged."""
+        return type(self).of
+
+    @property
     def estimates(self) -> tuple[str, ...]:
         """Outputs of the observer on which it depends; none where that is not known."""
         return ()
@@ -225,6 +230,11 @@ class OwnCost(Cost):
     def text(self) -> str:
         """Name of the function."""
         return getattr(self.function, "__qualname__", type(self.function).__name__)
+
+    @property
+    def code(self) -> Callable[..., float]:
+        """The function."""
+        return self.function
 
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""

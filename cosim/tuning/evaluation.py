@@ -20,7 +20,7 @@ from cosim.runs.engine import Done, run_jobs
 from cosim.runs.executors import Executor, make_executor
 from cosim.runs.job import Ended, Failure, Job
 from cosim.runs.journal import Journal
-from cosim.runs.keys import digest, table_content
+from cosim.runs.keys import code_content, digest, table_content
 from cosim.runs.run import Run
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
@@ -188,8 +188,8 @@ class Evaluator(AbstractContextManager["Evaluator"]):
         if seed not in self._contents:
             played = "recorded" if self.by_seed[seed].parts is not None else "whole"
             whole = self.by_seed[seed].whole
-            content = table_content(whole.table(), whole.folder)
-            self._contents[seed] = f"{digest(content)} {played} {self.cost.text} {self.cost.signals}"
+            content = digest(table_content(whole.table(), whole.folder), code_content(self.cost.code))
+            self._contents[seed] = f"{content} {played} {self.cost.text} {self.cost.signals}"
         return self._contents[seed]
 
     def _evaluated(

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sys
 from collections.abc import Iterator, Sequence
+from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,7 +26,7 @@ from cosim.runs import cluster
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import Executor, InThisProcess, make_executor
 from cosim.runs.journal import EARLIER, JOURNAL, Journal, read_lines
-from cosim.runs.keys import file_content
+from cosim.runs.keys import code_content, file_content
 from cosim.runs.run import Run
 from cosim.runs.workers import Team
 from cosim.studies.sweep_result import SweepResult
@@ -166,3 +169,34 @@ def test_a_scheduler_without_its_packages_is_refused_in_words(monkeypatch: pytes
     monkeypatch.setattr(cluster, "distributed", None)
     with pytest.raises(OutputError, match=r"needs dask.distributed: pip install 'fmu-observer\[cluster\]'"):
         make_executor(scheduler="tcp://nowhere:1")
+
+
+FUNCTION = "def half(_outcome):\n    return {value}\n\n\ndef make(value):\n    return lambda outcome: value\n"
+
+
+def test_an_own_measure_that_was_changed_is_taken_anew(tmp_path: Path) -> None:
+    sweep = Scenario(stop=0.02, step=0.01).add("train", model="locomotive", **{"as": "block3"}).vary({"seed": [0]})
+    file = tmp_path / "measure_of_a_user.py"
+    for value in (0.5, 1.5, 1.5, 0.5):
+        file.write_text(FUNCTION.format(value=value))
+        module = loaded(file)
+        for measure in (module.half, module.make(value), partial(lambda wanted, _outcome: wanted, value)):
+            found = sweep.run(directory=tmp_path / "out", folders=False, resume=True, measure={"own": measure})
+            assert found[0].measures["own"] == value
+
+
+def loaded(file: Path) -> Any:
+    spec = spec_from_file_location(file.stem, file)
+    assert spec is not None
+    module = sys.modules[file.stem] = module_from_spec(spec)
+    exec(compile(file.read_text(), str(file), "exec"), module.__dict__)  # no byte code of an earlier second
+    return module
+
+
+def test_a_function_of_which_nothing_changed_is_known_again(tmp_path: Path) -> None:
+    file = tmp_path / "measure_of_a_user.py"
+    file.write_text(FUNCTION.format(value=1.0))
+    first, again = loaded(file), loaded(file)
+    assert code_content(first.half) == code_content(again.half) != code_content(first.make(1.0))
+    assert code_content(first.make(1.0)) == code_content(again.make(1.0)) != code_content(first.make(2.0))
+    assert code_content(partial(first.make, 1)) != code_content(partial(first.make, 2))

@@ -33,8 +33,12 @@ def family(**more: Any) -> Scenario:
     return scenario.add("train", model="locomotive", **{"as": "block3"}, parameters={"train_speed": 10.0})
 
 
+MEASURED: list[float] = []
+
+
 def travelled(outcome: Any) -> float:
-    return float(outcome["train.position"][-1])
+    MEASURED.append(float(outcome["train.position"][-1]))
+    return MEASURED[-1]
 
 
 def test_a_case_is_all_that_it_sets() -> None:
@@ -133,23 +137,18 @@ def test_a_sweep_goes_on_where_one_ended(swept: SweepResult, tmp_path: Path) -> 
     assert len(lines) == 4
     failed = json.dumps(json.loads(lines[2]) | {"failure": "stopped", "outside": True})
     (folder / JOURNAL).write_text("\n".join([lines[0], lines[1], failed, lines[3][:50]]))
-    again: list[float] = []
-
-    def measure(outcome: Any) -> float:
-        again.append(travelled(outcome))
-        return again[-1]
-
+    MEASURED.clear()
     sweep = family().vary({"case": list(CASES), "train.effort": EFFORTS})
     ticks: list[tuple[int, int]] = []
     resumed = sweep.run(
-        measure={"way": measure}, directory=folder, folders=False, resume=True, progress=lambda *t: ticks.append(t)
+        measure={"way": travelled}, directory=folder, folders=False, resume=True, progress=lambda *t: ticks.append(t)
     )
     assert [run.measures for run in resumed.runs] == [run.measures for run in swept.runs]
-    assert len(again) == 2
+    assert len(MEASURED) == 2
     assert ticks == [(3, 4), (4, 4)]
     changed = family().set("train.davis_b", 40.0).vary({"case": list(CASES), "train.effort": EFFORTS})
-    changed.run(measure={"way": measure}, directory=folder, folders=False, resume=True)
-    assert len(again) == 6
+    changed.run(measure={"way": travelled}, directory=folder, folders=False, resume=True)
+    assert len(MEASURED) == 6
     with pytest.raises(ScenarioError, match="resumed from its folder"):
         sweep.run(resume=True)
 

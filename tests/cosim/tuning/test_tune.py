@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -350,6 +351,18 @@ def test_a_search_that_is_not_resumed_keeps_the_one_before(tmp_path: Path) -> No
 def grew(outcome: Outcome) -> float:
     """A cost that is no finite number where a train is light."""
     return float(np.nan if outcome["train.speed"][-1] > 10.1 else outcome["train.speed"][-1])
+
+
+def times(factor: float) -> Callable[[Outcome], float]:
+    return lambda outcome: factor * float(outcome["train.speed"][-1])
+
+
+def test_a_cost_of_the_user_s_that_was_changed_is_computed_anew(tmp_path: Path) -> None:
+    bounds = {"train.mass": (60e3, 120e3)}
+    asked: dict[str, Any] = {"method": "hand", "iterations": 1, "directory": tmp_path, "resume": True}
+    first, other, again = (tune(light_train(), bounds, cost=times(k), **asked) for k in (1.0, -2.0, 1.0))
+    np.testing.assert_allclose(other.before, -2.0 * np.array(first.before), rtol=1e-12)
+    assert again.before == first.before
 
 
 def light_train() -> Scenario:
