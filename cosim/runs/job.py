@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from math import nan
 from time import perf_counter
 from typing import Any
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, RunError
 from cosim.scenario.origin import ForeignFile
 
 
@@ -87,6 +88,24 @@ class Job(ABC):
             ended: what it left there.
         """
         return ended
+
+
+def pickled(job: Job) -> bytes:
+    """A job as bytes for another process.
+
+    Args:
+        job: to be sent.
+
+    Raises:
+        RunError: it holds what cannot be sent.
+    """
+    try:
+        return pickle.dumps(job)
+    except (TypeError, AttributeError, ValueError, pickle.PicklingError) as error:
+        raise RunError(
+            f"A run cannot be passed to a process of its own: {error}. Run with one worker, or take functions and "
+            "classes of a module."
+        ) from error
 
 
 def perform(job: Job) -> Ended:

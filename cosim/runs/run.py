@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, RunError
 from cosim.run.outcome import INTERRUPTED, Outcome
-from cosim.runs.job import Ended, Failure, Job
+from cosim.runs.job import Ended, Failure, Job, pickled
 from cosim.runs.keys import digest, table_content
 from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.origin import ForeignFile, Origin, foreign_files
@@ -62,10 +61,15 @@ class Run(Job):
     @property
     def apart(self) -> bool:
         """Whether it calls native code of others, which may take its process along, and can be done in another one:
-        a class that a script defines is not found there without the script.
+        a class that a script defines is not found there without the script, and not all that it holds can be sent.
         """
         named = [*(str(file.path) for file in self.files()), *map(str, self.settings.values())]
-        return any(name.endswith(".fmu") for name in named) and b"__main__" not in pickle.dumps(self)
+        if not any(name.endswith(".fmu") for name in named):
+            return False
+        try:
+            return b"__main__" not in pickled(self)
+        except RunError:
+            return False
 
     def do(self) -> Ended:
         """Run it and take what is wanted. What is doubtful is in the outcome, and not said for every run."""

@@ -24,7 +24,7 @@ from typing import Any
 
 from cosim.errors import RunError
 from cosim.process.last_call import make_page
-from cosim.runs.job import Ended, Failure, Job
+from cosim.runs.job import Ended, Failure, Job, pickled
 
 _STOP_SECONDS = 5.0
 _SERVE = (
@@ -58,6 +58,9 @@ class Team:
 
         Yields:
             Jobs with what they left, as they end.
+
+        Raises:
+            RunError: a job cannot be sent to another process.
         """
         waiting = iter(jobs)
         busy: list[_Worker] = []
@@ -85,7 +88,7 @@ class Team:
 
     def _worker_for(self, job: Job) -> _Worker:
         """A process that does this job now; one that does not know the script is exchanged where the job needs it."""
-        data = pickle.dumps(job)
+        data = pickled(job)
         script = _script() if b"__main__" in data else {}
         worker = self._idle.pop() if self._idle else _Worker(script)
         if script and not worker.script:

@@ -11,7 +11,7 @@ from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 from hypothesis import given
@@ -21,7 +21,7 @@ from worker_tasks import Task, square
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.errors import OutputError
+from cosim.errors import OutputError, RunError
 from cosim.runs import cluster
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import Executor, InThisProcess, make_executor
@@ -200,3 +200,24 @@ def test_a_function_of_which_nothing_changed_is_known_again(tmp_path: Path) -> N
     assert code_content(first.half) == code_content(again.half) != code_content(first.make(1.0))
     assert code_content(first.make(1.0)) == code_content(again.make(1.0)) != code_content(first.make(2.0))
     assert code_content(partial(first.make, 1)) != code_content(partial(first.make, 2))
+
+
+class Doubling:
+    """A model of a script that no other process can be sent."""
+
+    inputs: ClassVar[dict[str, str]] = {}
+    outputs: ClassVar[dict[str, str]] = {"y": "s"}
+
+    def __init__(self) -> None:
+        self.rule = lambda t: 2.0 * t
+
+    def step(self, t: float, _h: float, _u: Any) -> dict[str, float]:
+        return {"y": self.rule(t)}
+
+
+@pytest.mark.compiler
+def test_what_cannot_be_sent_is_run_here_and_refused_in_words_elsewhere(fmu: Path) -> None:
+    sweep = three(fmu).add("own", model=Doubling()).vary({"stop": [0.1, 0.2]})
+    assert [run.failure for run in sweep.run().runs] == [None, None]
+    with pytest.raises(RunError, match=r"cannot be passed to a process of its own: .*Run with one worker"):
+        sweep.run(workers=2)
