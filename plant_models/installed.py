@@ -19,7 +19,9 @@ def installed_version(package: str) -> str | None:
         package: its name.
     """
     try:
-        found = VERSION.search(distribution(package).read_text("METADATA") or "")
+        known = distribution(package)
     except PackageNotFoundError:
         return None
+    # a clone that is on the path has the latter, in its folder .egg-info
+    found = VERSION.search(known.read_text("METADATA") or known.read_text("PKG-INFO") or "")
     return None if found is None else found[1]
