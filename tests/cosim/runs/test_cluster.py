@@ -47,8 +47,10 @@ def workers(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
     at = tmp_path / "cluster"
     at.mkdir()
     with ExitStack() as stack:
-        started(stack, "dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json", folder=at)
+        words = ("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", "s.json")
+        scheduler = started(stack, *words, folder=at)
         while not (at / "s.json").is_file():
+            assert scheduler.poll() is None, (at / "dask_scheduler.log").read_text()
             time.sleep(0.1)
         more = ["--scheduler-file", "s.json", "--no-dashboard", "--no-nanny", "--nthreads", "1"]
         both = [started(stack, "dask_worker", *more, "--local-directory", f"w{n}", folder=at) for n in range(2)]
