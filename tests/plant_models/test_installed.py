@@ -16,10 +16,11 @@ def test_versions_are_those_of_the_standard_library() -> None:
     assert installed_version("no-such-package") is None
 
 
-@pytest.mark.parametrize("place", ["own_clone.egg-info/PKG-INFO", "own_clone-2.5.dist-info/METADATA"])
+@pytest.mark.parametrize("place", ["clone_on_path.egg-info/PKG-INFO", "wheel_on_path-2.5.dist-info/METADATA"])
 def test_a_clone_on_the_path_has_its_version_too(place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / place
     file.parent.mkdir()
-    file.write_text("Metadata-Version: 2.4\nName: own-clone\nVersion: 2.5\n\nText\n")
+    name = f"{place.partition('_')[0]}-on-path"
+    file.write_text(f"Metadata-Version: 2.4\nName: {name}\nVersion: 2.5\n\nText\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert installed_version("own-clone") == "2.5"
+    assert installed_version(name) == "2.5"
