@@ -52,7 +52,7 @@ def read_description(source: Path) -> ModelDescription:
     Raises:
         Exception: whatever a broken file makes the parsers throw.
     """
-    description = read_model_description(str(source), validate=False)
+    description = _read(source)
     version = str(description.fmiVersion)
     if version.startswith("1"):
         _complete_fmi_1(description, ElementTree.fromstring(_text(source)))
@@ -71,6 +71,16 @@ def read_description(source: Path) -> ModelDescription:
     if description.generationTool == OWN_TOOL:
         _complete_annotations(description, ElementTree.fromstring(_text(source)))
     return description
+
+
+def _read(source: Path) -> ModelDescription:
+    """The description as fmpy reads it. An archive is opened and closed here: fmpy leaves the member that it reads
+    open, and with it the file where a description is broken.
+    """
+    if source.is_dir() or source.suffix.lower() == ".xml":
+        return read_model_description(str(source), validate=False)
+    with source.open("rb") as file:
+        return read_model_description(file, validate=False)
 
 
 def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
