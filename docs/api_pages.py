@@ -1,7 +1,7 @@
 """The pages of the API reference: what the packages offer (`__all__`) and what these pages import, from its docstrings.
 
-`conf.py` writes them into `docs/api` before Sphinx reads the pages. Nothing is listed by hand: a name joins by being
-offered by its room, or by being used in a page.
+`conf.py` writes them into `docs/reference/api` before Sphinx reads the pages. Nothing is listed by hand: a name joins
+by being offered by its room, or by being used in a page.
 """
 
 from __future__ import annotations

@@ -19,4 +19,4 @@ exclude_patterns = ["_build", "gallery"]
 html_theme = "alabaster"
 html_theme_options = {"page_width": "1100px"}
 
-api_pages.write(Path(__file__).parent / "api")
+api_pages.write(Path(__file__).parent / "reference" / "api")

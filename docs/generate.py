@@ -195,7 +195,7 @@ def expectation_tables() -> dict[str, Any]:
 
 def on_page(table: str) -> bool:
     """Whether the page of expectations has a place for this table; those of later kinds stand at its end."""
-    return f"<!-- generated: {table} -->" in (ROOT / "docs/expectations.md").read_text(encoding="utf-8")
+    return f"<!-- generated: {table} -->" in (ROOT / "docs/reference/expectations.md").read_text(encoding="utf-8")
 
 
 def all_expectations() -> str:
@@ -260,10 +260,10 @@ def _kind(annotation: Any) -> str:
 PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ("README.md", "printed table"): printed_table,
     ("README.md", "observers"): certificate_table,
-    ("docs/certificates.md", "observers"): certificate_table,
-    **{("docs/scenario_files.md", name): schema_page(name) for name in schema_tables()},
-    **{("docs/expectations.md", name): schema_page(name) for name in expectation_tables() if on_page(name)},
-    ("docs/expectations.md", "expectations"): all_expectations,
+    ("docs/reference/certificates.md", "observers"): certificate_table,
+    **{("docs/reference/scenario_files.md", name): schema_page(name) for name in schema_tables()},
+    **{("docs/reference/expectations.md", name): schema_page(name) for name in expectation_tables() if on_page(name)},
+    ("docs/reference/expectations.md", "expectations"): all_expectations,
 }
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ def samples_per_independent(residuals: Array, parameters: float) -> float:
         residuals: of one signal, shape (n,). parameters: p, how many were fitted by them.
 
     Source: Bartlett, J. Roy. Stat. Soc. 98 (1935) 536, for the factor; means, thresholds and the correction are ours,
-    their two error rates stand in docs/identification.md.
+    their two error rates stand in docs/reference/identification.md.
     """
     count, found, size = len(residuals), 1.0, 1
     while size == 1 or count >= _FEWEST_MEANS * size:

@@ -124,14 +124,15 @@ def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
                 f"{label(spec, observer)} leaves out an error that lasts (is not white): its {entry.name} is "
                 f"{number(found.mean)} on average where {number(found.degrees)} is expected, yet its {larger.name} is "
                 f"{number(larger.found.mean)} where {number(larger.found.degrees)} is ({entry.name}: "
-                f"{MEANING[entry.kind]}; {larger.name}: {MEANING[larger.kind]}). {_COLOURED}; see docs/consistency.md."
+                f"{MEANING[entry.kind]}; {larger.name}: {MEANING[larger.kind]}). {_COLOURED}; "
+                "see docs/reference/consistency.md."
             )
             continue
         yield (
             f"{label(spec, entry.observer)} is {found.verdict}: its {entry.name} is {number(found.mean)} on average "
             f"where {number(found.degrees)} is expected ({number(found.band.low)} to {number(found.band.high)} for 99 "
             f"% of consistent filters; {entry.name}: {MEANING[entry.kind]}): {ADVICE[found.verdict]}; see "
-            f"docs/consistency.md."
+            f"docs/reference/consistency.md."
         )
 
 

@@ -18,7 +18,10 @@ _COLUMNS = (
     Column("inside", "Samples inside 95 % band", "%", "Of a consistent filter 95 %", factor=100.0, short="inside"),
     text_column("verdict", "Verdict", "; ".join(f"{word}: {text}" for word, text in ADVICE.items()), short="verdict"),
 )
-VERDICTS = "overconfident: errors are larger than stated; underconfident: smaller; docs/consistency.md says what to do."
+VERDICTS = (
+    "overconfident: errors are larger than stated; underconfident: smaller; "
+    "docs/reference/consistency.md says what to do."
+)
 
 
 def consistency_table(entries: Sequence[FilterConsistency], spec: ReportSpec) -> Table:

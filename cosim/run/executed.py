@@ -167,7 +167,7 @@ def _doubted(name: str, telegrams: Sequence[BaliseRecord]) -> Iterator[str]:
             count += len(found)
     if parts:
         plural = "telegram" if count == 1 else "telegrams"
-        yield f"{name} doubted {count} {plural}: {', '.join(parts)}; see docs/telegram_gate.md."
+        yield f"{name} doubted {count} {plural}: {', '.join(parts)}; see docs/theses/telegram_gate.md."
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 ``python docs/gallery/build.py`` runs all, with names of folders or scripts as arguments only those, with ``--pages``
 none: the pages are written again from the numbers kept. A folder with a ``head.md`` is taken up by itself; its page is
-``docs/gallery_FOLDER.md``. The numbers stay in the folder's ``numbers``; the tests run the scripts again and compare.
+``docs/theses/gallery_FOLDER.md``. The numbers stay in the folder's ``numbers``; the tests run the scripts again and
+compare.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def scripts(folder: Path) -> list[Path]:
 
 def page_path(folder: Path) -> Path:
     """The page of a folder."""
-    return HERE.parent / f"gallery_{folder.name}.md"
+    return HERE.parent / "theses" / f"gallery_{folder.name}.md"
 
 
 def main(names: list[str]) -> None:
@@ -81,7 +82,7 @@ def section(script: Path) -> str:
     lines = ["| " + " | ".join(cells) + " |" for cells in (heading, *rows)]
     lines.insert(1, "|" + "---|" * len(heading))
     reasons = dict.fromkeys(line["why"] for line in content["lines"] if line["why"])
-    picture = f"images/gallery/{folder.name}/{script.stem}.png"
+    picture = f"../images/gallery/{folder.name}/{script.stem}.png"
     figure = [f"![{content['title']}]({picture})", ""] if content["figure"] else []
     source = f"{content['source']}. Script: `docs/gallery/{folder.name}/{script.name}`."
     head = [f"## {script.stem[:2]} {content['title']}", "", source, ""]

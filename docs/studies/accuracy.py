@@ -1,7 +1,7 @@
 """How accurate the shipped plants are at an internal step: each against its own equations by SciPy at 1e-10, through
 events.
 
-`python docs/studies/accuracy.py` prints the table of `docs/accuracy.md`.
+`python docs/studies/accuracy.py` prints the table of `docs/reference/accuracy.md`.
 """
 
 from __future__ import annotations

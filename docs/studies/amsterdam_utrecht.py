@@ -1,8 +1,8 @@
 """Every train observer on the line Amsterdam - Utrecht: how far it is off at the end of the longest gaps.
 
-``python docs/studies/amsterdam_utrecht.py`` prints the tables of docs/amsterdam_utrecht.md, with ``--write`` it puts
-them there. Everything runs in one run of the shipped scenario: its own observers, and beside them those that it leaves
-out, with gains for gaps of 32 s.
+``python docs/studies/amsterdam_utrecht.py`` prints the tables of docs/theses/amsterdam_utrecht.md, with ``--write`` it
+puts them there. Everything runs in one run of the shipped scenario: its own observers, and beside them those that it
+leaves out, with gains for gaps of 32 s.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fmu_observer.design.augmented_gains import design_for_gap
 from fmus.tables.numbers import error_number, number
 
 SCENARIO = "amsterdam_utrecht"
-PAGE = Path(__file__).parents[1] / "amsterdam_utrecht.md"
+PAGE = Path(__file__).parents[1] / "theses" / "amsterdam_utrecht.md"
 LONGEST_TIME = 32.0  # [s] between two balises, in the slow parts of the run
 FAULTS = 16  # jams and skids of the scenario
 STEPS = (0.01, 0.05, 0.1)  # [s]

@@ -1,8 +1,8 @@
 """How often the 95 % intervals of `cosim calibrate` hold the true value: of results folders of this package, and of
 noise that is not white.
 
-``python docs/studies/calibrated_intervals.py`` prints the tables of docs/identification.md, with ``--write`` it puts
-them there; that takes five minutes of one core.
+``python docs/studies/calibrated_intervals.py`` prints the tables of docs/reference/identification.md, with ``--write``
+it puts them there; that takes five minutes of one core.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cosim.calibration.runs import FmuRuns, Runs
 from cosim.results.load_result import load_result
 from plant_models import PLANTS
 
-PAGE = Path(__file__).parents[1] / "identification.md"
+PAGE = Path(__file__).parents[1] / "reference" / "identification.md"
 RUNS = 200
 DAVIS = ("davis_a", "davis_b", "davis_c")
 KNOWN = {"traction_coefficient": 1.0, "brake_coefficient": 1.0, "internal_step": 0.1}

@@ -1,7 +1,7 @@
 """How often the confidence regions of a calibrated sealed FMU hold the true mass and Davis coefficients.
 
-`python docs/studies/fmu_calibration.py` prints the table of `docs/fmu_as_model.md`: one FMU, one instance, 500
-recordings that differ by their noise. Three minutes on one core.
+`python docs/studies/fmu_calibration.py` prints the table of `docs/reference/fmu_as_model.md`: one FMU, one instance,
+500 recordings that differ by their noise. Three minutes on one core.
 """
 
 from __future__ import annotations

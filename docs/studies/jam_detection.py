@@ -1,7 +1,7 @@
 """Jam detection in numbers: missed and false alarms, delays, latch-ups; printed and repaired rules; a wheel that never
 rolls again.
 
-``python docs/studies/jam_detection.py`` (half a minute) writes the tables of docs/jam_detection.md and draws
+``python docs/studies/jam_detection.py`` (half a minute) writes the tables of docs/theses/jam_detection.md and draws
 docs/images/jam_detection.png. The trains and their jams are synthetic; they are those of ``docs/gallery/jam_runs.py``.
 """
 
@@ -47,7 +47,7 @@ LENGTHS = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 2.0, 3.0, 5.0)  # [s]
 DEPTHS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 NOISES = (0.0, 0.02, 0.05, 0.1)  # [m/s]
 SEED, NOISE = 1, 0.02
-PAGE = Path(__file__).resolve().parents[1] / "jam_detection.md"
+PAGE = Path(__file__).resolve().parents[1] / "theses" / "jam_detection.md"
 PICTURE = PAGE.parent / "images" / "jam_detection.png"
 RULES = ("repaired", "printed")
 SIGNS = ("jam", "skid")

@@ -1,9 +1,9 @@
 """Moving-horizon observers beside filters, continuous-discrete observers and a factor graph of others, on one recorded
 run.
 
-``python docs/studies/moving_horizon_comparison.py`` prints the table of docs/moving_horizon.md, with ``--write`` it
-puts it there; that takes some three minutes. The train runs Amsterdam - Utrecht with its jams, skids and wet stretches;
-to that come balises that do not lie where the map says, and false telegrams.
+``python docs/studies/moving_horizon_comparison.py`` prints the table of docs/theses/moving_horizon.md, with ``--write``
+it puts it there; that takes some three minutes. The train runs Amsterdam - Utrecht with its jams, skids and wet
+stretches; to that come balises that do not lie where the map says, and false telegrams.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ try:
 except ImportError:  # extra `benchmark`
     gtsam = None
 
-PAGE = Path(__file__).parents[1] / "moving_horizon.md"
+PAGE = Path(__file__).parents[1] / "theses" / "moving_horizon.md"
 WINDOW = 80  # rows: 40 s, more than the longest gap lasts
 PERIOD = 0.5  # [s] between two readings, for all filters
 MAP_DEVIATION, ACCURACY = 2.5, 5.0  # [m] by which balises lie beside the map; told location accuracy

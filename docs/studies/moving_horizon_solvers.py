@@ -1,7 +1,7 @@
 """Which solver for windows that are solved to convergence: one window of the train, 200 readings and 20 balises.
 
-``python docs/studies/moving_horizon_solvers.py`` prints the table of docs/moving_horizon.md, with ``--write`` it puts
-it there. All solve the same quadratic programmes within the same Gauss-Newton steps, one from the solution of the
+``python docs/studies/moving_horizon_solvers.py`` prints the table of docs/theses/moving_horizon.md, with ``--write`` it
+puts it there. All solve the same quadratic programmes within the same Gauss-Newton steps, one from the solution of the
 window before; IPOPT and SciPy have the whole problem to themselves.
 """
 
@@ -27,7 +27,7 @@ from fmu_observer.formulas.moving_horizon.row_window import WindowRow
 from fmu_observer.formulas.moving_horizon.window_program import Programme, WindowProgram
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, Shared
 
-PAGE = Path(__file__).parents[1] / "moving_horizon.md"
+PAGE = Path(__file__).parents[1] / "theses" / "moving_horizon.md"
 READINGS, BALISES, WINDOWS = 200, 20, 12
 ORDER = 4
 DISTURBANCE_LIMIT = 0.003  # [m/s2]: tight, so that it is active in part of the window

@@ -2,8 +2,9 @@
 
     python docs/studies/mutations.py
 
-does all of it (a minute; it builds nineteen FMUs) and rewrites the tables in ``docs/mutation_study.md``. This folder
-holds studies of the package itself, whose tables stand in the pages; the tests recompute a part of each and compare.
+does all of it (a minute; it builds nineteen FMUs) and rewrites the tables in ``docs/reference/mutation_study.md``. This
+folder holds studies of the package itself, whose tables stand in the pages; the tests recompute a part of each and
+compare.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from repetitions import other_steps, repetitions
 from tqdm import tqdm
 from verdicts import DEFAULT, RELATIVE, Row, counted, judge
 
-PAGE = Path(__file__).parents[1] / "mutation_study.md"
+PAGE = Path(__file__).parents[1] / "reference" / "mutation_study.md"
 PART = r"(<!-- generated: {name} -->\n)(.*?)(<!-- end -->)"
 WORDS = {False: "no", True: "yes"}
 

@@ -1,7 +1,7 @@
 """Train observers beside the odometer that they hear: how far each is off, and how much worse than the odometer.
 
-``python docs/studies/own_odometer.py`` prints the table of docs/own_odometer.md, with ``--write`` it puts it there;
-that takes half a minute of CPU. Each situation is one run with all observers in it.
+``python docs/studies/own_odometer.py`` prints the table of docs/theses/own_odometer.md, with ``--write`` it puts it
+there; that takes half a minute of CPU. Each situation is one run with all observers in it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from cosim import Scenario
 from fmu_observer import OBSERVERS
 from plant_models.hybrid import HybridSystem
 
-PAGE = Path(__file__).parents[1] / "own_odometer.md"
+PAGE = Path(__file__).parents[1] / "theses" / "own_odometer.md"
 RESET = "odometer_reset"
 PERIOD = 0.1  # between two readings [s]
 TOP = 20.0  # speed of the journeys [m/s]

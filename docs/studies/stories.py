@@ -1,7 +1,7 @@
 """Which parts of the stories of Sc1 to Sc4 come out, over the seeds of the receiver and over rails that nobody printed.
 
-``python docs/studies/stories.py`` prints the tables of docs/multi_vehicle_train.md (15 minutes on two cores). Three
-studies:
+``python docs/studies/stories.py`` prints the tables of docs/theses/multi_vehicle_train.md (15 minutes on two cores).
+Three studies:
 
 - ``theta``: the observers' gain is chosen on Sc1 with seeds that no other table here uses;
 - ``receiver``: the shipped scenarios with 20 seeds of the receiver, the only noise in them (`10_hz` has an odometer

@@ -1,7 +1,7 @@
 """The gate against true and false telegrams: train observers with true and wrong models, dry and wet rails, balises
 near and far.
 
-``python docs/studies/telegram_gate.py`` prints the tables of docs/telegram_gate.md and draws
+``python docs/studies/telegram_gate.py`` prints the tables of docs/theses/telegram_gate.md and draws
 docs/images/telegram_gate.png.
 
 The plant of the line Amsterdam - Utrecht is run once on each rail, 29.7 km, without jams; the observers run beside the

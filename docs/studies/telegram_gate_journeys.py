@@ -1,8 +1,8 @@
 """The gate on journeys that no threshold saw: random trains, slopes, speeds, rails and layouts of balises.
 
-``python docs/studies/telegram_gate_journeys.py`` prints the second table of docs/telegram_gate.md, with ``--write`` it
-puts it there; that takes a quarter of an hour of CPU. What a telegram is asked, and what is counted, is that of
-`telegram_gate`; only trains, lines and settings are others.
+``python docs/studies/telegram_gate_journeys.py`` prints the second table of docs/theses/telegram_gate.md, with
+``--write`` it puts it there; that takes a quarter of an hour of CPU. What a telegram is asked, and what is counted, is
+that of `telegram_gate`; only trains, lines and settings are others.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cosim import Scenario
 from fmu_observer import OBSERVERS
 from fmu_observer.design.certified_gains import certified_gains
 
-PAGE = Path(__file__).parents[1] / "telegram_gate.md"
+PAGE = Path(__file__).parents[1] / "theses" / "telegram_gate.md"
 JOURNEYS = range(20)
 SPACINGS = {20.0: 4e3, 100.0: 8e3, 300.0: 15e3, 1000.0: 40e3, 2000.0: 40e3}
 """Mean distance of the balises [m], and the way on which they lie [m]; each distance is 0.7 to 1.3 times that."""

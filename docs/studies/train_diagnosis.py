@@ -1,8 +1,8 @@
 """Thresholds, false alarms and detections of the train's diagnosis, and what can be told apart with which sensors.
 
-``python docs/studies/train_diagnosis.py`` prints the tables of docs/train_diagnosis.md, with ``--write`` it writes them
-(four minutes). Thresholds come from fault-free journeys, a stated rate of false alarms each; false alarms and faults
-are then counted on other journeys, rails, loads and seeds.
+``python docs/studies/train_diagnosis.py`` prints the tables of docs/theses/train_diagnosis.md, with ``--write`` it
+writes them (four minutes). Thresholds come from fault-free journeys, a stated rate of false alarms each; false alarms
+and faults are then counted on other journeys, rails, loads and seeds.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from fmu_observer.formulas.diagnosis.thresholds import (
     rate_threshold,
 )
 
-PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
+PAGE = Path(__file__).resolve().parents[1] / "theses" / "train_diagnosis.md"
 PER_HOUR = 0.05  # alarms that each residual may raise [1/h]
 SEEDS, FAULTY = 120, 20
 WET_SEEDS = 60

@@ -1,8 +1,8 @@
 """What the train's diagnosis tells of two faults at once, of sizes between the usual ones, and of a radar with coloured
 noise: on journeys that no threshold saw, dry and wet.
 
-``python docs/studies/train_diagnosis_pairs.py`` prints the tables of docs/train_diagnosis.md, with ``--write`` it puts
-them there (five minutes of CPU time).
+``python docs/studies/train_diagnosis_pairs.py`` prints the tables of docs/theses/train_diagnosis.md, with ``--write``
+it puts them there (five minutes of CPU time).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fmu_observer.detection.train_diagnosis import TrainDiagnosis
 from fmu_observer.detection.train_isolation import FAULTS
 from fmu_observer.formulas.diagnosis.thresholds import alarm_rate, count_alarms, rate_threshold
 
-PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
+PAGE = Path(__file__).resolve().parents[1] / "theses" / "train_diagnosis.md"
 DRY = (Journey(33.0, 800.0, 0.4, 0.35, mass=1.01), Journey(48.0, 1150.0, 0.4, grade=0.0005))
 WET = (
     Journey(33.0, 850.0, 0.35, rail=0.19, mass=1.01),

@@ -1,7 +1,8 @@
 """What can be told apart at all: structural analysis of a train's sensors by faultdiagnosistoolbox, beside our table.
 
-``python docs/studies/train_isolability.py`` prints the table of docs/train_diagnosis.md, with ``--write`` it writes it.
-The structural model says which variable and which fault stands in which equation, and nothing of sizes, noise and time.
+``python docs/studies/train_isolability.py`` prints the table of docs/theses/train_diagnosis.md, with ``--write`` it
+writes it. The structural model says which variable and which fault stands in which equation, and nothing of sizes,
+noise and time.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from page_tables import write_table
 
 from fmu_observer.detection.train_isolation import SENSORS, isolability
 
-PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
+PAGE = Path(__file__).resolve().parents[1] / "theses" / "train_diagnosis.md"
 SETS: dict[str, tuple[str, ...]] = {
     "all": SENSORS,
     "no second odometer": ("odometer_1", "radar", "gps", "balise", "pressure_sensor"),

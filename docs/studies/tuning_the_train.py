@@ -1,8 +1,8 @@
 """Observers of the train on the line Amsterdam - Utrecht before and after tuning, judged with seeds that no search saw.
 
-``python docs/studies/tuning_the_train.py`` prints the table of docs/tuning_the_train.md, with ``--write`` it puts it
-there; that takes 35 s of CPU. ``--quick`` takes one seed and the first minute. The scenario is the file ``drawn.toml``
-of that page; the values are those that the commands there found.
+``python docs/studies/tuning_the_train.py`` prints the table of docs/theses/tuning_the_train.md, with ``--write`` it
+puts it there; that takes 35 s of CPU. ``--quick`` takes one seed and the first minute. The scenario is the file
+``drawn.toml`` of that page; the values are those that the commands there found.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from cosim import Scenario
 from cosim.studies.groups import mean_of
 from cosim.studies.measures import error_measures
 
-PAGE = Path(__file__).parents[1] / "tuning_the_train.md"
+PAGE = Path(__file__).parents[1] / "theses" / "tuning_the_train.md"
 JUDGES = range(10, 16)  # searches saw 0 and 1
 QUICK = 60.0  # end of a quick run [s]
 

@@ -1,4 +1,4 @@
-"""The tables of docs/validation_campaign.md: the shipped campaign over twenty seeds, and the range of its thresholds.
+"""The tables of docs/theses/validation_campaign.md: the shipped campaign over twenty seeds, and its thresholds.
 
 ``python docs/studies/validation_campaign.py`` writes them into the page (5 minutes on one core). Published numbers are
 Tables 5.2 to 5.7 of Aguiar Cota 2019.
@@ -17,7 +17,7 @@ from cosim import Scenario
 from cosim.studies.groups import Spread, grouped
 from fmus.tables.numbers import number
 
-PAGE = Path(__file__).parents[1] / "validation_campaign.md"
+PAGE = Path(__file__).parents[1] / "theses" / "validation_campaign.md"
 PART = r"(<!-- study: {name} -->\n)(.*?)(<!-- end -->)"
 SEEDS, FEW_SEEDS = range(20), range(4)
 OBSERVER, SENSOR, COACH = "quasi_lpv_uio", "odometer_reset", 30.0

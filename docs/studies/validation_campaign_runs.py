@@ -1,4 +1,4 @@
-"""What lies behind the rates of docs/validation_campaign.md: every jam that was missed, every false detection, the
+"""What lies behind the rates of docs/theses/validation_campaign.md: each jam that was missed, each false detection, the
 residual without jams, and the bounds of Table 5.9 over the samples that were not used.
 
 ``python docs/studies/validation_campaign_runs.py`` writes the tables into the page (3 minutes on one core). Published

@@ -1,4 +1,4 @@
-"""The ten faults of the wind turbine, over ten seeds, and its false alarms: the tables of docs/wind_turbine.md.
+"""The ten faults of the wind turbine, over ten seeds, and its false alarms: the tables of docs/theses/wind_turbine.md.
 
 ``python docs/studies/wind_turbine_faults.py`` (four minutes) prints them, with ``--write`` it puts them into the page.
 The limits of the diagnosis come from other runs than those that it is judged by.
@@ -15,7 +15,7 @@ from wind_turbine_loop import ALARM_NAMES, DIAGNOSIS, INTERVALS, PEAKS, SPEED_SE
 
 from fmu_observer.formulas.diagnosis.thresholds import alarm_rate, proportion_interval
 
-PAGE = Path(__file__).resolve().parents[1] / "wind_turbine.md"
+PAGE = Path(__file__).resolve().parents[1] / "theses" / "wind_turbine.md"
 STOP = 4400.0  # [s]
 MADE_OF = range(100, 110)
 JUDGES = range(10)

@@ -1,5 +1,5 @@
 """By when the repaired jam rules believe an odometer again, as numbers: the bounds of the theorem in
-docs/jam_detection.md. NumPy only; knows the rules' parameters and the error equations of their observer.
+docs/theses/jam_detection.md. NumPy only; knows the rules' parameters and the error equations of their observer.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """When an odometer is judged to lie, and when it is believed again: the rules of the jam detector. Pure functions.
 
-`RepairedRules` [ours] recover from every state; docs/jam_detection.md states the theorem and proves it. What all rules
-have in common stands here; the printed ones are in `printed_jam_rules`.
+`RepairedRules` [ours] recover from every state; docs/theses/jam_detection.md states the theorem and proves it. What all
+rules have in common stands here; the printed ones are in `printed_jam_rules`.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ class TrainDiagnosis(HybridSystem):
 
     Presets: `swept` (default; thresholds from fault-free runs, nearly all on dry rails), `wet_rails` (from fault-free
     runs on wet rails, where wheels creep by up to 3 %: wider where wheels are compared with what does not slip); see
-    docs/train_diagnosis.md for the false alarms and the delays of both.
+    docs/theses/train_diagnosis.md for the false alarms and the delays of both.
 
     Source: Omar 2012, chapter 7 (redundancy, windowed residuals, grid inversion), for a train; table and thresholds
     ours.

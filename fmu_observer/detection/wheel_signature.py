@@ -75,7 +75,7 @@ class WheelSignature(HybridSystem):
     mean over the period in which the fault began. A fault that does not end is given up after `hold_limit`.
 
     The detector knows neither effort nor model, so it serves where no observer runs, and it is worse than
-    `jam_detector` where one does: docs/signatures.md has both error rates. The classes were trained at 5 Hz, and
+    `jam_detector` where one does: docs/theses/signatures.md has both error rates. The classes were trained at 5 Hz, and
     another period is refused: the change by the effort grows with it, noise and the step of a fault do not, so that no
     factor makes one record the other.
     """

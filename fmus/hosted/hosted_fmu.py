@@ -285,7 +285,7 @@ _OVERHEAD = (
     "a step costs about 10 us more than the block's own Python, which takes 10 us to more than 100 us where "
     "native C takes 1 us"
 )
-"""Measured, see docs/hosted_export.md."""
+"""Measured, see docs/reference/hosted_export.md."""
 
 
 def _needs(package: str, oldest: tuple[int, int]) -> str:

@@ -1,5 +1,5 @@
 """Section ``foreign`` of `native_fmu`: how exact events are in masters of other people; the table of
-docs/foreign_masters.md.
+docs/guide/foreign_masters.md.
 """
 
 from __future__ import annotations

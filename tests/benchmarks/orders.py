@@ -2,7 +2,7 @@
 closed form.
 
 Run it with ``python tests/benchmarks/orders.py``. The components are exact for the inputs they are told, so that the
-coupling is the only error. Lines as in docs/algorithms.md come out.
+coupling is the only error. Lines as in docs/reference/algorithms.md come out.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def test_what_a_window_does_not_show_is_told() -> None:
 
 def test_the_thresholds_in_use_are_those_of_the_study_rounded_up() -> None:
     """The sweep is long, so its table stands for it: what it asks for, and what is in use."""
-    page = (Path(__file__).parents[2] / "docs" / "train_diagnosis.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "theses" / "train_diagnosis.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(threshold_\w+|balise_floor)` \| (\S+) \| (\S+) \|", page, re.MULTILINE)
     starts = {s.name: s.start for s in TrainDiagnosis().parameters}
     assert len(rows) == 16  # of the preset `swept`, then of `wet_rails`

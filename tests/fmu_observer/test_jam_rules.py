@@ -1,5 +1,5 @@
 """Jam rules: the printed ones rule by rule and their latch-up, the repaired ones and the theorem of
-docs/jam_detection.md.
+docs/theses/jam_detection.md.
 """
 
 from __future__ import annotations

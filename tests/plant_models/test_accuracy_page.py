@@ -19,7 +19,7 @@ def test_the_error_at_the_shipped_step_is_that_of_the_page(
 
     journey = next(j for j in accuracy.JOURNEYS if j.what == run)
     (found,) = accuracy.errors(journey, (1.0,))
-    page = (DOCS / "accuracy.md").read_text(encoding="utf-8")
+    page = (DOCS / "reference" / "accuracy.md").read_text(encoding="utf-8")
     row = next(line for line in page.splitlines() if f"| `{journey.plant}` | {run} |" in line and "(shipped)" in line)
     said = next(word.split()[1] for word in row.split("|")[4].split(",") if word.split()[0] == output)
     assert found[output] == pytest.approx(float(said), rel=0.1)

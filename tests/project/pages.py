@@ -1,4 +1,4 @@
-"""The pages a reader sees, README.md, docs/*.md and docs/tutorials/*.md, and their fenced blocks. Reads files only."""
+"""The pages a reader sees, README.md and those of docs and its books, and their fenced blocks. Reads files only."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
 PACKAGES = ("plant_models", "fmu_observer", "fmus", "cosim")
-TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md")), *TUTORIALS]
+BOOKS = ("guide", "theses", "reference")
+PAGES = [README, *sorted(p for folder in (".", *BOOKS) for p in (ROOT / "docs" / folder).glob("*.md"))]
+STEP_BY_STEP = "<!-- each line is typed into a shell, in order -->"
+TUTORIALS = [page for page in PAGES if STEP_BY_STEP in page.read_text(encoding="utf-8")]
 
 MARK, FENCED = r"(?:^<!-- command: (?P<command>\w+) -->\n)?", r"^```(?P<language>\w+)\n(?P<code>.*?)^```$"
 FENCE = re.compile(MARK + FENCED, re.MULTILINE | re.DOTALL)

@@ -62,7 +62,7 @@ def test_a_script_gives_the_numbers_of_the_page(
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_the_page_shows_the_numbers_kept(folder: Path) -> None:
-    page = ROOT / "docs" / f"gallery_{folder.name}.md"
+    page = ROOT / "docs" / "theses" / f"gallery_{folder.name}.md"
     assert page.read_text(encoding="utf-8") == builder().page(folder)
 
 

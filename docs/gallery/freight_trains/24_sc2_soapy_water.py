@@ -25,8 +25,8 @@ BURSTS = (
 )
 SAND = (
     "asked for as the axles leave the slippery rail one by one; before, all four spin alike and the device is blind. A "
-    "chance: "
-    "over 10 draws of the rail's peak and of the odometer's phase it is asked for in 3 (docs/multi_vehicle_train.md)"
+    "chance: over 10 draws of the rail's peak and of the odometer's phase it is asked for in 3 "
+    "(docs/theses/multi_vehicle_train.md)"
 )
 
 if __name__ == "__main__":

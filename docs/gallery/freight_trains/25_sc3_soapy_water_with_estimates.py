@@ -1,7 +1,7 @@
 """Scenario Sc3: the rail of Sc2 under observer-based control: the effort is cut to what the rail bears.
 
 Whether an axle passes 15 % and whether sand is asked for is a matter of the receiver's seed:
-docs/multi_vehicle_train.md has 20.
+docs/theses/multi_vehicle_train.md has 20.
 """
 
 from __future__ import annotations

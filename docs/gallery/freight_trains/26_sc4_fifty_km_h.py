@@ -1,8 +1,8 @@
 """Scenario Sc4: soft acceleration to 50 km/h on soapy water, observer-based control: the command follows the slip, no
 sand.
 
-The command is cut before the slip is excessive: docs/multi_vehicle_train.md says in how many of 20 seeds an axle passes
-15 %.
+The command is cut before the slip is excessive: docs/theses/multi_vehicle_train.md says in how many of 20 seeds an axle
+passes 15 %.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ LENGTHS, DEPTHS = (0.2, 0.6, 1.0, 1.4, 2.0), (0.05, 0.1, 0.2, 0.5, 1.0)
 MEMBERS, NOISE = 1000, 0.02
 REAL = (
     "measured runs of the thesis against synthetic ones here; its nine electric runs have no miss and no false "
-    "alarm. The intervals of such counts are in docs/jam_detection.md"
+    "alarm. The intervals of such counts are in docs/theses/jam_detection.md"
 )
 PRINTED = (
     "with the reading held the residual has a bias of two thirds of the threshold: the printed rules tell a fault most "

@@ -26,7 +26,7 @@ WHAT = {
 }
 WHY = (
     "the thesis has 200 m between balises and prints figures only; train, wet rails, jams and skids are ours: "
-    "docs/amsterdam_utrecht.md"
+    "docs/theses/amsterdam_utrecht.md"
 )
 
 

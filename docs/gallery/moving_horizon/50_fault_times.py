@@ -39,7 +39,7 @@ TIMES = (
 NOISE_ONLY = (
     "median of three seeds, fault from 30 to 40 s. At zero pitch a gain of 5 shows in the noise alone: the alarm waits "
     "for a large sample. Over ten seeds at the instant of the benchmark the median is 12 samples, the largest 33, and "
-    "the limit of 10 is not kept (docs/wind_turbine.md)"
+    "the limit of 10 is not kept (docs/theses/wind_turbine.md)"
 )
 TORQUE = (
     "readings are compared half a sample late, as Tustin's rule has a held reference: what a step of the reference "
@@ -48,16 +48,16 @@ TORQUE = (
 ACTUATOR = (
     "excitation decides: here 14 m/s with turbulence and a controller that the fault disturbs; the wind of the thesis "
     "is not available. Three seeds of 100 s, fault from 60 s on; with ten seeds and the fault from 500 to 600 s the "
-    "medians are 18.5 s and 18 s, the largest 97.1 s and 28.9 s (docs/wind_turbine.md): the alarm waits until the "
-    "pitch moves"
+    "medians are 18.5 s and 18 s, the largest 97.1 s and 28.9 s (docs/theses/wind_turbine.md): the alarm waits until "
+    "the pitch moves"
 )
 EFFICIENCY = (
     "measured by sheet 51; the table sets no limit, and counts it as kept where the fault is detected. Ten seeds find "
-    "it within 230 s each (docs/wind_turbine.md)"
+    "it within 230 s each (docs/theses/wind_turbine.md)"
 )
 OTHERS = (
     "limits from ten other runs of 4400 s; counted are instants at which the pair of fault 2 is undecided, too: both "
-    "of its sensors then fit the model alike (docs/wind_turbine.md)"
+    "of its sensors then fit the model alike (docs/theses/wind_turbine.md)"
 )
 STRONG = {"mean_from": 14.0, "mean_to": 14.0, "sine_amplitude": 0.0}
 

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from shared.sheet import Sheet
 
-PAGE = Path(__file__).resolve().parents[2] / "train_diagnosis.md"
+PAGE = Path(__file__).resolve().parents[2] / "theses" / "train_diagnosis.md"
 STUDY = (
     "the thesis diagnoses a wind turbine; the train is ours. Journeys, rails and seeds other than those of thresholds"
 )

@@ -1,8 +1,8 @@
 """The window problem solved until nothing moves any more: Gauss-Newton steps, each a quadratic programme with bounds.
 
 Omar 2012, (4.2.3) and (1.4.78)-(1.4.81), for the very problem that `gauss_newton` gives a fixed number of passes. Not
-traceable: how many steps it takes depends on the values. `docs/moving_horizon.md` says by what measurement the solver
-was chosen.
+traceable: how many steps it takes depends on the values. `docs/theses/moving_horizon.md` says by what measurement the
+solver was chosen.
 """
 
 from __future__ import annotations

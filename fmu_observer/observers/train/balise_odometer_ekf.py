@@ -153,7 +153,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     events = BALISE_AND_ODOMETER
     parameters: tuple[Signal, ...] = OWN_PARAMETERS
     presets = {
-        # ours: for the position error on the line Amsterdam - Utrecht with drawn faults, see docs/tuning_the_train.md
+        # ours: for the position error, line Amsterdam - Utrecht with drawn faults: docs/theses/tuning_the_train.md
         "tuned": {
             "acceleration_density": 6.15e-6,
             "disturbance_density": 9.83e-8,

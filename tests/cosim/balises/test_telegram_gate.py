@@ -65,7 +65,7 @@ def test_what_was_doubted_is_told_once_with_what_became_of_it() -> None:
     telegrams: Any = [SimpleNamespace(stamp=float(i), outcomes={"obs": o}) for i, o in enumerate(outcomes)]
     assert list(_doubted("obs", telegrams)) == [
         "obs doubted 5 telegrams: 4 used (stamped 0 s, 3 s, 4 s, 5 s), 1 ignored (stamped 2 s); see "
-        "docs/telegram_gate.md."
+        "docs/theses/telegram_gate.md."
     ]
     assert list(_doubted("other", telegrams)) == []
 

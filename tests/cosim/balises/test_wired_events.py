@@ -1,4 +1,4 @@
-"""An event whose count is connected is told by its source: the wiring of docs/foreign_masters.md, in this master."""
+"""An event whose count is connected comes from its source, as in docs/guide/foreign_masters.md, in this master."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 STUDIES = ROOT / "docs" / "studies"
-PAGE = ROOT / "docs" / "mutation_study.md"
+PAGE = ROOT / "docs" / "reference" / "mutation_study.md"
 NAMES = ("manoeuvre", "deliveries", "mutants", "repetitions", "verdicts", "mutations")
 FEW_DELIVERIES = ("sign of an output", "unit km/h declared, numbers in km/h")
 EVERY = 11  # of the runs with another parameter, or under other conditions

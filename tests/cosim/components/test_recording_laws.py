@@ -101,9 +101,7 @@ def test_half_of_a_run_is_told_its_own_telegrams_only(tmp_path: Path) -> None:
     ("method", "bound"), [("auto", 1e-9), ("rollback", 1e-9), ("predict", 1e-8), ("interpolate", 1e-9)]
 )
 def test_balises_are_found_in_a_recording(method: str, bound: float, tmp_path: Path) -> None:
-    """At 12.5 m/s a balise at p is passed at p / 12.5; the bounds are those of docs/events.md, the cubic is exact on a
-    line.
-    """
+    """At 12.5 m/s a balise at p is passed at p / 12.5; bounds: docs/reference/events.md, cubics are exact on lines."""
     time = 0.05 * np.arange(41)
     rows = "\n".join(f"{t!r},{12.5 * t!r},12.5" for t in time.tolist())
     (tmp_path / "log.csv").write_text(f"time,position [m],speed [m/s]\n{rows}\n", encoding="utf-8")

@@ -149,7 +149,7 @@ def test_faults_of_the_other_sign_are_those_faults() -> None:
 @pytest.mark.compiler
 @pytest.mark.slow
 def test_the_tables_of_the_page_are_those_of_the_study() -> None:
-    page = (ROOT / "docs" / "amsterdam_utrecht.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "theses" / "amsterdam_utrecht.md").read_text(encoding="utf-8")
     outcome, found = shipped()
     for line in study().longest_gaps(found).splitlines()[2:]:
         label = line.split("|")[1].strip()

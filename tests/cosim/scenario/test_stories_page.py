@@ -21,7 +21,7 @@ def test_the_shipped_seed_is_within_the_table_of_twenty_seeds(name: str, monkeyp
     import stories  # type: ignore[import-not-found] # a script of the documentation
 
     outcome = Scenario.load(name).run(warn=lambda _warning: None)
-    page = (DOCS / "multi_vehicle_train.md").read_text(encoding="utf-8")
+    page = (DOCS / "theses" / "multi_vehicle_train.md").read_text(encoding="utf-8")
     told = {
         cells[1].strip(): cells[1 + int(name[-1])].strip()
         for line in page.splitlines()

@@ -55,7 +55,7 @@ def test_the_observer_knows_its_position_better_than_the_odometer_in_jams() -> N
 
 
 def test_every_miss_and_every_false_detection_has_a_cause(study: ModuleType) -> None:
-    """Drawings with misses and jams between two rows: docs/validation_campaign.md."""
+    """Drawings with misses and jams between two rows: docs/theses/validation_campaign.md."""
     found = [row for run in study.runs(["HS EBA", "AS EBA"], (1, 4, 11, 17, 19)) for row in study.traced(run)]
     assert {"missed", "false"} <= {row[2] for row in found}
     assert [row for row in found if row[6] == "not explained"] == []

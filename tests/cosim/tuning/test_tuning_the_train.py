@@ -1,4 +1,4 @@
-"""The study that writes the table of docs/tuning_the_train.md: its quick form runs and has the rows of the page."""
+"""The study that writes the table of docs/theses/tuning_the_train.md: its quick form runs and has its rows."""
 
 import re
 import sys

@@ -56,7 +56,7 @@ Trust = Literal["balises", "odometer"]
 
 _DEFAULT_MARGIN = 0.1
 _THETA_MAX = 8.0  # [1/s], the thesis's gain
-# [ours], see docs/certificates.md
+# [ours], see docs/reference/certificates.md
 FAR = {"innovation_decay": 3.0, "odometer_gain_position": 0.7, "odometer_gain_speed": 1.6}
 _SHARE_AT_BALISE = 0.8  # of the position error that a balise takes away in the end, with the gains FAR
 

@@ -1,4 +1,4 @@
-"""The table of errors in docs/algorithms.md is what comes out: recomputed against the closed form of the whole."""
+"""The table of errors in docs/reference/algorithms.md comes out: recomputed against the closed form of the whole."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from iterated_runs import run
 from test_algorithms import load, worst_error
 from test_fmus.masses import Chain, cuts
 
-PAGE = Path(__file__).parents[4] / "docs" / "algorithms.md"
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "algorithms.md"
 CHAIN = Chain.two()
 LONG = 5.0
 """Length of a run [s]."""

@@ -1,4 +1,4 @@
-"""The table of losses in docs/events.md is what comes out: events passed on at their instants, and not."""
+"""The table of losses in docs/reference/events.md is what comes out: events passed on at their instants, and not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from test_fmus.events import (
 
 import cosim
 
-PAGE = Path(__file__).parents[4] / "docs" / "events.md"
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "events.md"
 
 
 def off(
