@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from plant_models.registry import lazy_imports
 
 if TYPE_CHECKING:
+    from cosim.choice.benchmark import benchmark_observers
     from cosim.comparison.compare import compare
     from cosim.comparison.tolerance import Tolerance, Tolerances
     from cosim.comparison.verdict import Comparison
     from cosim.errors import CosimError, UnmetError
-    from cosim.observer_benchmark.benchmark import benchmark_observers
     from cosim.provenance.rerun import rerun
     from cosim.results.load_result import load_result
     from cosim.results.result import Result
@@ -67,7 +67,7 @@ __getattr__ = lazy_imports(
         "Tolerances": "cosim.comparison.tolerance",
         "Tuning": "cosim.tuning.tuning_result",
         "UnmetError": "cosim.errors",
-        "benchmark_observers": "cosim.observer_benchmark.benchmark",
+        "benchmark_observers": "cosim.choice.benchmark",
         "compare": "cosim.comparison.compare",
         "load_result": "cosim.results.load_result",
         "log_uniform": "cosim.studies.sampling_plans",

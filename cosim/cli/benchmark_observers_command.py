@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+from cosim.choice.benchmark import benchmark_observers
 from cosim.cli.arguments import QUIET, positive, scenario_arguments
 from cosim.cli.output import print_warning
 from cosim.cli.scenarios import load_scenario
-from cosim.observer_benchmark.benchmark import benchmark_observers
 from cosim.results.results_folder import check_writable
 from fmus.cli.commands import argument, one_of
 from fmus.cli.output import Output

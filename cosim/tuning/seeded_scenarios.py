@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.errors import ScenarioError
-from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
-from cosim.observer_benchmark.playback import (
+from cosim.choice.candidates import BenchmarkCandidate, find_candidates
+from cosim.choice.playback import (
     ScenarioParts,
     connection,
     find_parts,
     playback_scenario,
     recording_scenario,
 )
+from cosim.errors import ScenarioError
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
 

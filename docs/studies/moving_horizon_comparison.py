@@ -17,8 +17,8 @@ import numpy as np
 from page_tables import write_table
 
 from cosim import Outcome, Scenario
+from cosim.choice.benchmark import benchmark_observers
 from cosim.evaluation.balise_gaps import gap_errors, largest, root_mean_square
-from cosim.observer_benchmark.benchmark import benchmark_observers
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, WINDOW_OUTPUTS, Iterated
 from fmu_observer.formulas.moving_horizon.robust_loss import SCALES

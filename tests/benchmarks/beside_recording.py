@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from cosim import Scenario
-from cosim.observer_benchmark.benchmark import benchmark_observers
-from cosim.observer_benchmark.candidates import find_candidates
-from cosim.observer_benchmark.playback import find_parts, playback_scenario, recording_scenario
+from cosim.choice.benchmark import benchmark_observers
+from cosim.choice.candidates import find_candidates
+from cosim.choice.playback import find_parts, playback_scenario, recording_scenario
 from cosim.results.results_folder import write_results
 from cosim.tuning.costs import StateCost
 from cosim.tuning.replays import Replays

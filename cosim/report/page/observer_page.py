@@ -19,7 +19,7 @@ from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Column, Table, text_column
 
 if TYPE_CHECKING:
-    from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
+    from cosim.choice.benchmark_scores import BenchmarkScores
 from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -30,7 +30,7 @@ from matplotlib.figure import Figure
 from cosim.drawing.style import MARK, axes_or_new, new_figure, observer_line, styled
 
 if TYPE_CHECKING:
-    from cosim.observer_benchmark.observer_scores import ObserverScore
+    from cosim.choice.observer_scores import ObserverScore
 
 PAGE, PICTURE, DATA = "observers.html", "observers.png", "observers.json"
 

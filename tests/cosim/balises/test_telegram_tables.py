@@ -12,8 +12,8 @@ import pytest
 from cosim import Scenario
 from cosim.balises.layout import from_csv
 from cosim.balises.recorded import RecordedLayout, read_layout
+from cosim.choice.playback import train_observers
 from cosim.errors import ScenarioError
-from cosim.observer_benchmark.playback import train_observers
 from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord
 

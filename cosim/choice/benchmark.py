@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from cosim.choice.benchmark_scores import BenchmarkScores
+from cosim.choice.candidates import BenchmarkCandidate, find_candidates
+from cosim.choice.observer_runs import ObserverRun, ObserverRuns
+from cosim.choice.observer_scores import ObserverScore, divergence, gap_certified, longest_gap, measured
+from cosim.choice.playback import ScenarioParts, find_parts, recording_scenario
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.spec import ReportSpec
-from cosim.observer_benchmark.benchmark_scores import BenchmarkScores
-from cosim.observer_benchmark.candidates import BenchmarkCandidate, find_candidates
-from cosim.observer_benchmark.observer_runs import ObserverRun, ObserverRuns
-from cosim.observer_benchmark.observer_scores import ObserverScore, divergence, gap_certified, longest_gap, measured
-from cosim.observer_benchmark.playback import ScenarioParts, find_parts, recording_scenario
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import write_results

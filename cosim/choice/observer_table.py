@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any
 
+from cosim.choice.observer_scores import SEEN_GAP, ObserverScore
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.observer_benchmark.observer_scores import SEEN_GAP, ObserverScore
 from fmu_observer.certificates.finding import Finding
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table, error_column, name_column

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import fmu_observer
-from cosim.errors import ScenarioError, nearest
-from cosim.observer_benchmark.playback import (
+from cosim.choice.playback import (
     SHARED_PARAMETERS,
     Listener,
     ScenarioParts,
     settable,
     train_observers,
 )
+from cosim.errors import ScenarioError, nearest
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.run.component_models import make_declared
 from cosim.scenario.model_name import ModelName, settings_of

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from cosim.choice.observer_scores import ObserverScore
+from cosim.choice.observer_table import observer_table
 from cosim.evaluation.error_table import error_table
 from cosim.evaluation.spec import ReportSpec
-from cosim.observer_benchmark.observer_scores import ObserverScore
-from cosim.observer_benchmark.observer_table import observer_table
 from cosim.run.outcome import Outcome
 from fmus.tables.table import Parts, Readable, Table
 

@@ -10,14 +10,14 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from cosim.errors import CosimError
-from cosim.observer_benchmark.playback import (
+from cosim.choice.playback import (
     Listener,
     ScenarioParts,
     is_over_network,
     needed_components,
     playback_scenario,
 )
+from cosim.errors import CosimError
 from cosim.run.component_models import make_system
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.simulation.scenario import Scenario

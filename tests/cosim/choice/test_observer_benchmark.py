@@ -18,13 +18,9 @@ from hypothesis import strategies as st
 from small_scenarios import small
 
 from cosim import Scenario
-from cosim.errors import RunError, ScenarioError
-from cosim.evaluation.metrics import PhaseMetrics, _ErrorSize, phase_metrics
-from cosim.evaluation.spec import ReportSpec
-from cosim.master.master import Master
-from cosim.observer_benchmark.benchmark import ObserverBenchmark, benchmark_observers
-from cosim.observer_benchmark.candidates import find_candidates
-from cosim.observer_benchmark.observer_scores import (
+from cosim.choice.benchmark import ObserverBenchmark, benchmark_observers
+from cosim.choice.candidates import find_candidates
+from cosim.choice.observer_scores import (
     SEEN_GAP,
     ObserverScore,
     divergence,
@@ -34,8 +30,12 @@ from cosim.observer_benchmark.observer_scores import (
     longest_gap,
     telegram_outcomes,
 )
-from cosim.observer_benchmark.observer_table import observer_table
-from cosim.observer_benchmark.playback import find_parts, train_observers
+from cosim.choice.observer_table import observer_table
+from cosim.choice.playback import find_parts, train_observers
+from cosim.errors import RunError, ScenarioError
+from cosim.evaluation.metrics import PhaseMetrics, _ErrorSize, phase_metrics
+from cosim.evaluation.spec import ReportSpec
+from cosim.master.master import Master
 from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
