@@ -1,13 +1,14 @@
 """Writes the generated parts of README.md and of these pages, and the README's picture: ``python docs/generate.py``.
 
 A generated part stands between ``<!-- generated: NAME -->`` and ``<!-- end -->``. The tests compare the parts with what
-this script would write, so that no table can drift from the code. It touches README.md, ``docs/*.md`` and the
-picture only.
+this script would write, so that no table can drift from the code. It touches README.md, the pages of
+``docs`` and the picture only.
 """
 
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -31,6 +32,10 @@ from cosim.scenario.model_name import ModelName
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 
 DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS / "gallery"))
+
+import figure_index  # noqa: E402 - stands in a folder of scripts
+
 ROOT = DOCS.parent
 WORDS = DOCS / "scenario_keys.toml"
 PICTURE = DOCS / "images" / "main_picture.png"
@@ -261,6 +266,8 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ("README.md", "printed table"): printed_table,
     ("README.md", "observers"): certificate_table,
     ("docs/reference/certificates.md", "observers"): certificate_table,
+    ("docs/theses/gallery.md", "figures"): figure_index.figures,
+    ("docs/theses/gallery.md", "studies"): figure_index.studies,
     **{("docs/reference/scenario_files.md", name): schema_page(name) for name in schema_tables()},
     **{("docs/reference/expectations.md", name): schema_page(name) for name in expectation_tables() if on_page(name)},
     ("docs/reference/expectations.md", "expectations"): all_expectations,
