@@ -1,8 +1,8 @@
 """Optimisers on the published tuning problem: the six variances of the motor's Kalman filter, 30 seeds of every method.
 
-``python docs/studies/optimisers.py`` prints the table of docs/guide/tuning.md, with ``--write`` it puts its rows there,
-and draws docs/images/optimisers.png where all methods ran; that takes about twenty minutes. ``--only GA`` runs the
-methods whose label begins so, ``--seeds N`` the first N seeds.
+``python docs/studies/optimisers.py`` prints the table of docs/reference/tuning.md, with ``--write`` it puts its rows
+there, and draws docs/images/optimisers.png where all methods ran; that takes about twenty minutes. ``--only GA`` runs
+the methods whose label begins so, ``--seeds N`` the first N seeds.
 
 The drive is run once for a noise record of 10 000 samples; candidates are members of a batch over what the filter
 heard, and all see the same record.
