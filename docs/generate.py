@@ -1,8 +1,8 @@
-"""Writes the generated parts of README.md and of these pages, and the README's picture: ``python docs/generate.py``.
+"""Writes the generated parts of these pages, and the README's picture: ``python docs/generate.py``.
 
 A generated part stands between ``<!-- generated: NAME -->`` and ``<!-- end -->``. The tests compare the parts with what
-this script would write, so that no table can drift from the code. It touches README.md, the pages of
-``docs`` and the picture only.
+this script would write, so that no table can drift from the code. It touches the pages of ``docs`` and
+the picture only.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ sys.path.insert(0, str(DOCS / "gallery"))
 import figure_index  # noqa: E402 - stands in a folder of scripts
 
 ROOT = DOCS.parent
+FIRST_RUN = "docs/guide/first_run.md"
 WORDS = DOCS / "scenario_keys.toml"
 PICTURE = DOCS / "images" / "main_picture.png"
 PART = r"(<!-- generated: {name} -->\n)(.*?)(<!-- end -->)"
@@ -89,7 +90,7 @@ def default_run() -> Outcome:
 
 
 def _said_by_the_command(_warning: str) -> None:
-    """The README says what the run warns about; here it would only be noise."""
+    """The page says what the run warns about; here it would only be noise."""
 
 
 def write_picture() -> None:
@@ -263,8 +264,7 @@ def _kind(annotation: Any) -> str:
 
 
 PARTS: dict[tuple[str, str], Callable[[], str]] = {
-    ("README.md", "printed table"): printed_table,
-    ("README.md", "observers"): certificate_table,
+    (FIRST_RUN, "printed table"): printed_table,
     ("docs/reference/certificates.md", "observers"): certificate_table,
     ("docs/theses/gallery.md", "figures"): figure_index.figures,
     ("docs/theses/gallery.md", "studies"): figure_index.studies,

@@ -1,4 +1,4 @@
-"""The README keeps its word: its two commands, its printed table, its list of dependencies, its links."""
+"""The README keeps its word: its two commands, its length, its list of dependencies, its links."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
-from pages import PACKAGES, PAGES, README, ROOT, blocks, generator
+from pages import PACKAGES, PAGES, README, ROOT, blocks
 
-import fmus.cli
 from cosim import shipped_scenarios
-from cosim.studies.measures import error_measures
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LIKE_AN_IMPORT = re.compile(r"^\s*(?:from|import) (\w+)", re.MULTILINE)  # or like a sentence
@@ -64,45 +61,8 @@ def test_the_ci_script_takes_the_commands_from_the_readme(name: str) -> None:
     assert f"run_readme {name}" in script
 
 
-def test_the_printed_table_is_what_the_run_prints() -> None:
-    generate = generator()
-    stated = generate.part(README.read_text(encoding="utf-8"), "printed table").splitlines()
-    actual = generate.printed_table().splitlines()
-    assert len(stated) == len(actual)
-    for ours, theirs in zip(stated, actual, strict=True):
-        ours_cells, theirs_cells = re.split(r"  +", ours.strip()), re.split(r"  +", theirs.strip())
-        assert len(ours_cells) == len(theirs_cells)
-        for a, b in zip(ours_cells, theirs_cells, strict=True):
-            # 10 %: sliding modes chatter, and another processor or library may round differently
-            assert float(a) == pytest.approx(float(b), rel=0.1) if _is_number(b) else a.strip("-") == b.strip("-")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-@pytest.mark.compiler
-def test_the_first_example_makes_sense_from_the_first_balise_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With the FMU that one command builds: no warning, errors that slip explains, roles without a report table."""
-    monkeypatch.chdir(tmp_path)
-    assert fmus.cli.main(["build", "locomotive", "--fmi", "2", "-o", "vendor.fmu"]) == 0
-    code = next(b.code for b in blocks(README) if b.language == "python" and "vendor.fmu" in b.code)
-    exec(compile(code.partition("print(")[0], str(README), "exec"), names := {})
-    outcome = names["outcome"]
-    assert outcome.warnings == []
-    measures = error_measures(outcome)
-    slip = np.abs(outcome["train.wheel_speed"] - outcome["train.speed"]).max()
-    assert 0.0 < measures["observer.speed_error_max"] < 1.2 * slip < 0.5
-    assert measures["observer.position_error_max"] < 5.0
-    assert np.abs(outcome["observer.slip"]).max() < 0.1
-    assert len(outcome.result.events) >= 5
-    assert outcome.spec.odometer == "train.wheel_speed"
+def test_the_readme_is_read_in_five_minutes() -> None:
+    assert len(README.read_text(encoding="utf-8").split()) <= 900
 
 
 # -- dependencies ---------------------------------------------------------------------------------------------------
@@ -158,5 +118,6 @@ def test_the_extras_are_named(extra: str) -> None:
 def test_links_and_pictures_exist(page: Path) -> None:
     prose = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     targets = [t for t in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", prose) if not t.startswith("https://")]
-    missing = [t for t in targets if not (page.parent / t).exists() and not (page.parent / f"{t}.md").exists()]
-    assert missing == []
+    written = f"{shlex.split(command('run'))[-1]}/report.html"  # by the run of the README
+    there = {t for t in targets if (page.parent / t).exists() or (page.parent / f"{t}.md").exists() or t == written}
+    assert sorted(set(targets) - there) == []
