@@ -10,12 +10,11 @@ from __future__ import annotations
 import atexit
 import os
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
-from typing import Any
 
+from cosim.process.call_clock import CallClock
 from cosim.process.last_call import LAST_CALL
 
 ERROR = 2
@@ -80,14 +79,11 @@ def limited_calls(seconds: float | None) -> Iterator[None]:
 
 
 def _keep_time(seconds: float, over: threading.Event) -> None:
-    seen: Any = None
-    since = time.monotonic()
-    while not over.wait(min(0.1, seconds / 4.0)):
-        now = LAST_CALL.now()
-        if now != seen or not now[0]:
-            seen, since = now, time.monotonic()
-        elif time.monotonic() - since > seconds:
-            _give_up(f"has not returned for {seconds:g} s, the limit that master.call_timeout sets")
+    clock, pause = CallClock(LAST_CALL), min(0.1, seconds / 4.0)
+    while not over.wait(pause):
+        clock.add(pause)
+        if why := clock.over_limit:
+            _give_up(why)
 
 
 def _give_up(what: str) -> None:

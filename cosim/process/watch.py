@@ -16,6 +16,7 @@ from contextlib import suppress
 from time import monotonic
 from typing import Any
 
+from cosim.process.call_clock import CallClock
 from cosim.process.interruption import STOPPING
 from cosim.process.last_call import LAST_CALL
 
@@ -82,8 +83,7 @@ class _Watch:
     def __init__(self, child: int) -> None:
         self.child = child
         self._asked: float | None = None
-        self._seen: tuple[int, float] = (0, 0.0)
-        self._same = 0.0  # the present call has been the present one for so long [s]
+        self._clock = CallClock(LAST_CALL)
         self._why = ""
 
     def wait(self) -> int:
@@ -135,13 +135,10 @@ class _Watch:
 
     def _check_duration(self, elapsed: float) -> None:
         """End the process where its present call takes too long; `elapsed` since the last check [s]."""
-        now = LAST_CALL.now()
-        self._same = self._same + elapsed if now == self._seen and now[0] else 0.0
-        self._seen = now
-        limit = LAST_CALL.seconds_at_most
-        if limit and self._same > limit:
-            self._end(f"has not returned for {limit:g} s, the limit that master.call_timeout sets")
-        elif self._asked is not None and min(self._same, monotonic() - self._asked) > GRACE:
+        self._clock.add(elapsed)
+        if why := self._clock.over_limit:
+            self._end(why)
+        elif self._asked is not None and min(self._clock.seconds, monotonic() - self._asked) > GRACE:
             self._end("does not return; the run was interrupted, and its process ended")
 
     def _end(self, why: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import signal
 import sys
+import tempfile
 from multiprocessing import connection, spawn
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ def serve(handle: int, page: str, script: dict[str, str]) -> None:
         script: where the classes of the script are found that jobs need; empty where they need none.
     """
     LAST_CALL.attach(Path(page))
+    LAST_CALL.timed = True
+    tempfile.tempdir = str(Path(page).parent)  # what a process that dies leaves behind is removed with it
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is interrupted, and ends this process
     pipe = _opened(handle)
     if script:

@@ -14,19 +14,23 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing import spawn
 from multiprocessing.connection import Pipe, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import monotonic
 from typing import Any
 
 from cosim.errors import RunError
+from cosim.process.call_clock import CallClock
 from cosim.process.last_call import make_page
 from cosim.runs.job import Ended, Failure, Job, pickled
 
 _STOP_SECONDS = 5.0
+_POLL = 0.1
+"""How often is looked at calls that may take too long [s]."""
 _SERVE = (
     "import json, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "
     "handle, path, page, script = map(json.loads, sys.argv[1:]); sys.path[:] = path; "
@@ -72,8 +76,7 @@ class Team:
         try:
             occupy()
             while busy:
-                ready = wait([worker.pipe for worker in busy])
-                for worker in [w for w in busy if w.pipe in ready]:
+                for worker in _ready(busy):
                     job, ended = worker.job, worker.answer()
                     busy.remove(worker)
                     if worker.dead:
@@ -109,6 +112,17 @@ class Team:
         self.close()
 
 
+def _ready(busy: Sequence[_Worker]) -> list[_Worker]:
+    """Those of the workers whose answers can be read, after a while at most; a call that takes too long is ended."""
+    begin = monotonic()
+    answers = wait([worker.pipe for worker in busy], _POLL)
+    elapsed = min(monotonic() - begin, 2.0 * _POLL)  # this program may have been stopped meanwhile
+    for worker in busy:
+        if worker.pipe not in answers:
+            worker.check_duration(elapsed)
+    return [worker for worker in busy if worker.pipe in answers]
+
+
 class _Worker:
     """One process and the pipe to it.
 
@@ -126,6 +140,7 @@ class _Worker:
         self._folder = TemporaryDirectory(prefix="worker-")
         page = Path(self._folder.name) / "last_call"
         self._last = make_page(page)
+        self._clock, self._why = CallClock(self._last), ""
         words = [json.dumps(value) for value in (theirs.fileno(), sys.path, str(page), script)]
         self.process = subprocess.Popen([sys.executable, "-c", _SERVE, *words], **_inherited(theirs.fileno()))
         theirs.close()  # so that the pipe ends when the process does
@@ -145,12 +160,23 @@ class _Worker:
             self.dead = True
             return Ended(failure=self._end())
 
+    def check_duration(self, elapsed: float) -> None:
+        """End the process where its present call takes too long.
+
+        Args:
+            elapsed: since the last check [s].
+        """
+        self._clock.add(elapsed)
+        if why := self._clock.over_limit:
+            self._why = f"{self._last.words()} {why}"
+            self.process.kill()
+
     def _end(self) -> Failure:
         """How the process ended."""
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(_STOP_SECONDS)
-        if self._last.noted:
-            return Failure(self._last.noted)
+        if said := self._why or self._last.noted:
+            return Failure(said)
         code = self.process.returncode
         words = ": ".join(filter(None, (self._last.words(), _how_it_ended(code))))
         return Failure(words, outside=code in _FROM_OUTSIDE)

@@ -154,7 +154,7 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
     page.call[0] = 1
     for _ in range(4):
         looking._check_duration(0.2)
-    assert ended == ["has not returned for 0.5 s, the limit that master.call_timeout sets"]
+    assert ended == ["has not returned for 0.5 s, the limit that call_timeout sets"]
 
 
 def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,7 +167,7 @@ def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.Monke
         assert ended == []
         time.sleep(0.3)
     LAST_CALL.call[0] = 0
-    assert ended[0] == "has not returned for 0.1 s, the limit that master.call_timeout sets"
+    assert ended[0] == "has not returned for 0.1 s, the limit that call_timeout sets"
 
 
 @pytest.mark.parametrize("number", STOPPING[1:], ids=lambda n: n.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any
 import pytest
 from worker_tasks import Task, process_id, square
 
+from cosim.process.exit_guard import limited_calls
+from cosim.process.last_call import LAST_CALL
 from cosim.runs.engine import run_jobs
 from cosim.runs.job import Failure, perform
 from cosim.runs.journal import Journal
@@ -64,6 +67,20 @@ def die_once(path: str) -> str:
         Path(path).touch()
         square("die")
     return "alive"
+
+
+def test_a_call_that_lets_no_thread_run_is_ended_too() -> None:
+    """The process that asks keeps the time: of a regular expression Python comes back to nothing else."""
+    with Team(1) as team:
+        ends = list(team.each([Task(look_for_ever, 0.3), Task(square, 2)]))
+    assert [ended.row for _, ended in ends] == [None, 4]
+    words = "component 'own' in doStep at t = 0.2 s has not returned for 0.3 s, the limit that call_timeout sets"
+    assert ends[0][1].failure == Failure(words)
+
+
+def look_for_ever(limit: float) -> bool:
+    with limited_calls(limit), LAST_CALL.making("own", "doStep", 0.2):
+        return re.fullmatch("(a+)+", 50 * "a" + "b") is not None
 
 
 SCRIPT = """
