@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.calibration.least_squares import Fit, fit
+from cosim.calibration.least_squares import Fit, NoSlopeError, fit
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
-from cosim.calibration.runs import Hidden, Runs
+from cosim.calibration.runs import Hidden, Runs, in_words
 from cosim.errors import nearest
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Parts, Readable, Table, name_column, text_column
@@ -201,10 +201,24 @@ def _fit(runs: Runs, recorded: RecordedSignals, start: Mapping[str, float], meas
 
     try:
         return fit(simulate, np.array(list(start.values())), measured, **limits)
+    except NoSlopeError as error:
+        reached = in_words(dict(zip(start, error.parameters.tolist(), strict=True)))
+        names = ", ".join(name for i, name in enumerate(start) if i in error.which)
+        raise CalibrationError(
+            f"The fit ended at {reached}: runs with {names} a little above and a little below that give no numbers, so "
+            f"that no slope is known. {_last_failure(runs)}Begin with other first guesses, or leave {names} out."
+        ) from error
     except ValueError as error:
         if isinstance(error, CalibrationError):
             raise
-        raise CalibrationError(f"The fit cannot begin with these first guesses: {error}") from error
+        raise CalibrationError(
+            f"The fit cannot begin with these first guesses: {error}. {_last_failure(runs)}".rstrip()
+        ) from error
+
+
+def _last_failure(runs: Runs) -> str:
+    """Why a run failed, where one did, with a space behind it."""
+    return f"The last run that failed, with {runs.failures[-1].rstrip('.')}. " if runs.failures else ""
 
 
 def _demand_effects(found: Fit, names: tuple[str, ...], recorded: RecordedSignals) -> None:

@@ -105,7 +105,7 @@ class Fit:
         Args:
             level: probability that an interval covers the true value, between 0 and 1.
         """
-        quantile = float(scipy.stats.t.ppf(0.5 + 0.5 * level, self.freedom))
+        quantile = float(scipy.special.stdtrit(self.freedom, 0.5 + 0.5 * level))
         return np.asarray(quantile * np.sqrt(np.diagonal(self.covariance)))
 
     def covers(self, truth: Array, level: float) -> bool:
@@ -118,7 +118,7 @@ class Fit:
         away = (truth - self.parameters) / self.sizes
         scaled = self.covariance / np.outer(self.sizes, self.sizes)
         distance = float(away @ np.linalg.pinv(scaled, hermitian=True) @ away)
-        return distance <= count * float(scipy.stats.f.ppf(level, count, self.freedom))
+        return distance <= count * float(scipy.special.fdtri(count, self.freedom, level))
 
 
 def fit(
@@ -145,12 +145,25 @@ def fit(
 
     Raises:
         ValueError: the simulation at the start gives no finite number.
+        NoSlopeError: simulations on both sides of a point give none.
     """
     sizes = np.where(start != 0.0, np.abs(start), 1.0) if sizes is None else sizes
     residuals = _Residuals(simulate, measured, sizes, low, high)
     if not np.isfinite(residuals(start)).all():
         raise ValueError("the simulation at the start of the fit gives values that are no finite numbers")
     return _fit(residuals, start, noise)
+
+
+class NoSlopeError(ValueError):
+    """A fit cannot go on: simulations beside a point that it has reached give no finite numbers.
+
+    Attributes:
+        parameters: where it stands, shape (p,). which: numbers of the parameters whose slope is not known.
+    """
+
+    def __init__(self, parameters: Array, which: list[int]) -> None:
+        super().__init__("the simulations beside the point that a fit has reached give no finite numbers")
+        self.parameters, self.which = parameters, which
 
 
 class _Residuals:
@@ -172,14 +185,25 @@ class _Residuals:
             return np.where(self.known, self._measured - self._simulate(points), 0.0)
 
     def jacobian(self, parameters: Array) -> Array:
-        """Derivatives by central differences inside the bounds, shape (q, n, p)."""
+        """Derivatives by central differences inside the bounds, shape (q, n, p); by one side where the run on the other
+        one gives no numbers.
+
+        Raises:
+            NoSlopeError: the runs on both sides of a parameter give no numbers.
+        """
         steps = _DIFFERENCE * np.maximum(np.abs(parameters), self.sizes)
         low, high = self.bounds
         above = np.minimum(parameters + steps, high * self.sizes)
         below = np.maximum(parameters - steps, low * self.sizes)
-        moved = np.diag(above - parameters), np.diag(below - parameters)
-        found = self._several(np.concatenate([parameters + moves for moves in moved]))
-        return np.moveaxis((found[: len(steps)] - found[len(steps) :]) / (above - below)[:, None, None], 0, -1)
+        moves = np.array([above - parameters, below - parameters])
+        found = self._several(np.concatenate([parameters + np.diag(move) for move in moves]))
+        found = found.reshape(2, len(steps), *found.shape[1:])
+        lost = ~np.isfinite(found).all(axis=(2, 3))
+        if lost.any():
+            if lost.all(axis=0).any():
+                raise NoSlopeError(parameters, np.flatnonzero(lost.all(axis=0)).tolist())
+            found[lost], moves[lost] = self(parameters), 0.0
+        return np.moveaxis((found[0] - found[1]) / (moves[0] - moves[1])[:, None, None], 0, -1)
 
     @property
     def bounds(self) -> tuple[Array, Array]:

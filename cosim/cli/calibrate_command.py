@@ -9,11 +9,13 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+import cosim
 from cosim import calibration
 from cosim.calibration.fitting import Calibration, calibrate
+from cosim.calibration.fmu_runs import CALL_TIMEOUT, FmuRuns
 from cosim.calibration.recorded_signals import CalibrationError, Selection, sort_columns
 from cosim.calibration.running_resistance import RunningResistance
-from cosim.calibration.runs import FmuRuns, Runs, ScenarioRuns
+from cosim.calibration.runs import Runs
 from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, settings_argument
 from cosim.cli.output import save_figure, write_text
 from cosim.cli.scenarios import between_samples, parse_setting, setting_number
@@ -22,7 +24,6 @@ from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import check_writable
 from cosim.runs.journal import Journal
-from cosim.simulation.scenario import Scenario
 from fmus import cached_fmu
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
@@ -107,7 +108,13 @@ ARGUMENTS = (
     argument("--stop", type=float, default=_RUN_SECONDS, help="of an FMU that is driven: end of the run [s] (60)"),
     argument("--plot", type=Path, metavar="FILE", help="write signals and residuals as a picture"),
     PARAMETERS_FILE,
-    argument("--out", type=Path, metavar="DIR", help="of a scenario: folder of the journal of the runs"),
+    argument("--out", type=Path, metavar="DIR", help="folder of the journal of the runs, which --resume goes on with"),
+    argument(
+        "--call-timeout",
+        type=float,
+        metavar="SECONDS",
+        help=f"how long a call of an FMU may last ({CALL_TIMEOUT:g}; of a scenario master.call_timeout)",
+    ),
     *MANY_RUNS,
 )
 
@@ -160,7 +167,9 @@ def _recording(options: argparse.Namespace) -> tuple[Result, dict[str, float]]:
         raise ScenarioError(
             f"{options.recording}: an FMU is driven; say by which input and how hard: --drive effort=60e3 [N]."
         )
-    scenario = Scenario.fmu(options.recording, stop=options.stop, step=options.step or _RUN_STEP, parameters=driven)
+    scenario = cosim.Scenario.fmu(
+        options.recording, stop=options.stop, step=options.step or _RUN_STEP, parameters=driven
+    )
     outcome = scenario.run(warn=lambda _text: None)
     if outcome.failure is not None:
         raise CosimError(f"{options.recording}: {outcome.failure}")
@@ -182,17 +191,36 @@ def _runs(options: argparse.Namespace, inputs: Mapping[str, Any]) -> Runs:
     if not names:
         raise CalibrationError("--parameters: say what is fitted, such as --parameters mass=80e3.")
     guesses = _numbers("--parameters", [text for text in options.parameters if "=" in text])
-    if str(options.model).lower().endswith(".fmu") or options.model in PLANTS:
-        path = cached_fmu(PLANTS[options.model](), fmi_version=3) if options.model in PLANTS else options.model
-        fixed = _numbers("--set", options.settings)
-        return FmuRuns(path, names, fixed=fixed, guesses=guesses, interface=options.interface, step=options.step)
-    scenario = Scenario.load(options.model)
-    for name, value in map(parse_setting, options.settings):
-        scenario.set(name, value)
     if options.resume and options.out is None:
         raise CalibrationError("--resume goes on with the runs in a folder: say which, --out DIR.")
     journal = options.out and Journal(check_writable(options.out), resume=options.resume, retry=options.retry)
-    return ScenarioRuns(scenario, names, guesses, workers=options.workers, scheduler=options.scheduler, journal=journal)
+    where = {"workers": options.workers, "scheduler": options.scheduler, "journal": journal}
+    if str(options.model).lower().endswith(".fmu") or options.model in PLANTS:
+        return _fmu_runs(options, names, guesses, where)
+    scenario = cosim.Scenario.load(options.model)
+    for name, value in map(parse_setting, options.settings):
+        scenario.set(name, value)
+    if options.call_timeout is not None:
+        scenario.set("master.call_timeout", options.call_timeout)
+    runs: Runs = calibration.ScenarioRuns(scenario, names, guesses, **where)
+    return runs
+
+
+def _fmu_runs(
+    options: argparse.Namespace, names: Sequence[str], guesses: Mapping[str, float], where: Mapping[str, Any]
+) -> Runs:
+    """Runs of an FMU, or of that of a train model of the package."""
+    path = cached_fmu(PLANTS[options.model](), fmi_version=3) if options.model in PLANTS else options.model
+    return FmuRuns(
+        path,
+        names,
+        fixed=_numbers("--set", options.settings),
+        guesses=guesses,
+        interface=options.interface,
+        step=options.step,
+        call_timeout=CALL_TIMEOUT if options.call_timeout is None else options.call_timeout,
+        **where,
+    )
 
 
 def _running_resistance(options: argparse.Namespace, inputs: Mapping[str, Any]) -> RunningResistance:

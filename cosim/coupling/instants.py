@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from fmpy.model_description import ModelVariable
-
 from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
 from cosim.components.recording_data import Recording
 from cosim.coupling.connection import Connection
-from fmus.fmi.types import FLOATING_TYPES
+from fmus.fmi.types import is_continuous
 
 Signal = tuple[str, str]
 """(component, variable) of a source; an array is one signal."""
@@ -83,15 +81,6 @@ def followed(components: Mapping[str, Component], connections: Sequence[Connecti
         for c in connections
         if c.source[0] in components and c.source[1] in components[c.source[0]].line_outputs
     )
-
-
-def is_continuous(variable: ModelVariable) -> bool:
-    """Whether a variable changes all the time.
-
-    Args:
-        variable: of a description.
-    """
-    return variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
 
 
 def _waits_for_events(source: Component, target: Component, connection: Connection) -> bool:

@@ -9,11 +9,11 @@ from cosim.components.component import Component
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import ClockConnection, connect_clocks
 from cosim.coupling.connection import Connection, Link, connect
-from cosim.coupling.instants import is_continuous
 from cosim.network.outputs import NAME as NETWORK
 from cosim.run.network import Network, make_network
 from cosim.run.network_connections import connect_over
 from cosim.run.task import RunTask
+from fmus.fmi.types import is_continuous
 from plant_models.hybrid.units import Unit
 
 

@@ -20,7 +20,7 @@ from cosim.results.results_folder import check_writable
 from cosim.run.results_manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
 from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
-from cosim.scenario.saving import plain
+from cosim.scenario.toml_values import plain
 from fmus.tables.plain_data import jsonable
 from fmus.versions import versions
 from plant_models.hybrid.noise import RUN_SEED

@@ -14,7 +14,7 @@ from uuid import uuid4
 from cosim.run.results_manifest import sha256
 from cosim.scenario.origin import ForeignFile
 from cosim.scenario.paths import map_paths
-from cosim.scenario.saving import plain
+from cosim.scenario.toml_values import plain
 from fmus.tables.plain_data import jsonable
 from fmus.versions import versions
 

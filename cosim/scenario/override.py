@@ -8,8 +8,8 @@ from typing import Any
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.model_name import named, settings_of
 from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file, move_option_files
-from cosim.scenario.saving import plain
 from cosim.scenario.scenario_tables import ComponentTable
+from cosim.scenario.toml_values import plain
 
 TABLES = ("balises", "network", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}

@@ -9,29 +9,14 @@ from __future__ import annotations
 
 import shutil
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import tomli_w
 
 from cosim.errors import OutputError, ScenarioError
 from cosim.scenario.paths import map_paths, relative
 from cosim.scenario.schema import ScenarioTable
-
-
-def plain(value: Any) -> Any:
-    """The value in the types that TOML has: NumPy's numbers and arrays, tuples and paths become numbers, lists and
-    texts.
-    """
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items() if entry is not None}
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist() if isinstance(value, np.ndarray) else value.item()
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    return str(value) if isinstance(value, Path) else value
+from cosim.scenario.toml_values import plain
 
 
 def scenario_text(table: ScenarioTable, folder: Path, target: Path | None = None) -> str:

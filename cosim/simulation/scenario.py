@@ -22,9 +22,10 @@ from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.origin import Origin
 from cosim.scenario.override import case_values, component_from_script, override, value_from_script
 from cosim.scenario.package_names import is_package, stem
-from cosim.scenario.saving import plain, save_scenario, scenario_text
+from cosim.scenario.saving import save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
 from cosim.scenario.shipped import shipped_scenarios
+from cosim.scenario.toml_values import plain
 from cosim.structure.run_structure import Structure
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from cosim.errors import ScenarioError
-from cosim.scenario.saving import plain
+from cosim.scenario.toml_values import plain
 
 Mode = Literal["grid", "zip", "latin", "random"]
 Variation = dict[str, Any]

@@ -20,9 +20,10 @@ from page_tables import write_table
 import fmus
 from cosim import Scenario
 from cosim.calibration.fitting import Calibration, calibrate
+from cosim.calibration.fmu_runs import FmuRuns
 from cosim.calibration.recorded_signals import RecordedSignals, Selection, sort_columns
 from cosim.calibration.running_resistance import RunningResistance
-from cosim.calibration.runs import FmuRuns, Runs
+from cosim.calibration.runs import Runs
 from cosim.results.load_result import load_result
 from plant_models import PLANTS
 

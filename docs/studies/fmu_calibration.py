@@ -14,8 +14,8 @@ import numpy as np
 
 import fmus
 from cosim.calibration.fitting import calibrate
+from cosim.calibration.fmu_runs import FmuRuns
 from cosim.calibration.recorded_signals import RecordedSignals
-from cosim.calibration.runs import FmuRuns
 from plant_models import PLANTS
 
 RECORDINGS = 500

@@ -47,6 +47,15 @@ def size(variable: ModelVariable) -> int:
     return prod(variable.shape) if variable.shape else 1
 
 
+def is_continuous(variable: ModelVariable) -> bool:
+    """Whether a variable changes all the time.
+
+    Args:
+        variable: of a description.
+    """
+    return variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
+
+
 def getter_type(kind: str, fmi_version: int) -> str:
     """The type in the name of the functions that read and write a variable type.
 

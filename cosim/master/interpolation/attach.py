@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 
 from cosim.components.recording import RecordingComponent
-from cosim.coupling.instants import is_continuous
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
 from cosim.master.interpolation.first_order_hold import FirstOrderHold, KnownInputs, Method
 from cosim.master.interpolation.interpolators import make_interpolator
+from fmus.fmi.types import is_continuous
 
 
 def attach_interpolators(plan: Plan, method: Method | Literal["hold"]) -> Mapping[str, str]:

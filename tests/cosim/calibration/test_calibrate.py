@@ -13,8 +13,9 @@ import pytest
 import cosim
 import fmus
 from cosim.calibration.fitting import calibrate
+from cosim.calibration.fmu_runs import FmuRuns
 from cosim.calibration.recorded_signals import RecordedSignals
-from cosim.calibration.runs import FmuRuns, ScenarioRuns
+from cosim.calibration.scenario_runs import ScenarioRuns
 from cosim.cli import main
 from cosim.errors import CosimError
 from cosim.runs.journal import Journal, read_lines

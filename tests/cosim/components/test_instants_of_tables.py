@@ -21,8 +21,8 @@ from cosim import Scenario
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.subject import make_subject
 from cosim.calibration.fitting import calibrate
+from cosim.calibration.fmu_runs import FmuRuns
 from cosim.calibration.recorded_signals import Selection, sort_columns
-from cosim.calibration.runs import FmuRuns
 from cosim.cli import calibrate_command
 from cosim.errors import CosimError
 from cosim.results.load_result import load_result
