@@ -299,7 +299,7 @@ def summary_of(header: Header) -> dict[str, Any]:
         header: what the baseline says of itself.
     """
     components = [
-        {key: getattr(entry, key) for key in entry.__dataclass_fields__} | {"source": entry.file}
+        {key: getattr(entry, key) for key in entry.__dataclass_fields__ if key != "delivery"} | {"source": entry.file}
         for entry in header.components
     ]
     summary: dict[str, Any] = {"title": header.title, "versions": dict(header.versions), **header.span}

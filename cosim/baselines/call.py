@@ -9,8 +9,9 @@ from typing import Any
 
 from cosim.baselines.baseline_files import read_baseline
 from cosim.baselines.regression import Regression, check, regression
-from cosim.baselines.subject import Subject, make_subject
+from cosim.baselines.subject import Subject, after_its_delivery, make_subject
 from cosim.baselines.update import Update, plan_update
+from cosim.comparison.common_change import common_changes
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError
@@ -69,7 +70,9 @@ class Call:
         # before the run: it may be long
         wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None
         chosen = None if signals is None else tuple(signals)
-        return cls(make_subject(what, folder, **arguments), path, wanted, chosen, every)
+        with after_its_delivery(path, what, folder):
+            subject = make_subject(what, folder, **arguments)
+        return cls(subject, path, wanted, chosen, every)
 
     @property
     def _given(self) -> Any:
@@ -107,21 +110,21 @@ class Call:
 
     @staticmethod
     def worst(found: Comparison) -> list[str]:
-        """What differs, the worst first, in lines.
+        """What differs in lines: in what was run, in common, and in each signal, the worst first; then other notes.
 
         Args:
             found: what was found.
         """
-        lines = [_line(signal) for signal in found.failed]
+        lines = [change.text for change in common_changes(found)]
+        lines += [_line(signal) for signal in found.failed]
         lines += [difference.text for difference in found.event_differences]
-        return [*lines[:WORST], *found.notes]
+        return [*found.causes, *lines[:WORST], *(note for note in found.notes if note not in found.causes)]
 
 
 def _line(signal: Any) -> str:
     if signal.findings:
         return str(signal.findings[0].text)
-    near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
-    return f"{signal.name}: {signal.status}{near}"
+    return f"{signal.name}: {signal.status}{signal.hint}"
 
 
 def _tolerances_of(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
 from cosim.baselines.baseline import Header
+from cosim.baselines.delivery import Delivery
 from cosim.baselines.model_identity import Identity
 from cosim.baselines.recipe import Recipe
 from cosim.comparison.tolerance import Tolerances
@@ -15,7 +16,7 @@ from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import SignalInfo
 
 FORMAT = "fmu-observer baseline"
-VERSION = "1.0"
+VERSION = "1.1"
 """Of the layout: a file with another number before the point is refused, with a higher one behind it is read."""
 DEFAULTS: Mapping[str, Any] = {
     "parameters": {},
@@ -25,6 +26,7 @@ DEFAULTS: Mapping[str, Any] = {
     "sha256": "",
     "display_unit": None,
     "description": "",
+    "delivery": None,
 }
 
 
@@ -40,7 +42,7 @@ def header_data(header: Header, folder: Path) -> dict[str, Any]:
         "title": header.title,
         "run": header.recipe.to_data(folder),
         "span": dict(header.span),
-        "components": [_short(asdict(component)) for component in header.components],
+        "components": [_component_data(component) for component in header.components],
         "signals": [_short(asdict(signal)) for signal in header.signals],
         "tolerances": _tolerances_data(header.tolerances),
         "selection": None if header.selection is None else list(header.selection),
@@ -50,6 +52,11 @@ def header_data(header: Header, folder: Path) -> dict[str, Any]:
         "digest": header.digest,
         "versions": dict(header.versions),
     }
+
+
+def _component_data(component: Identity) -> dict[str, Any]:
+    delivery = None if component.delivery is None else component.delivery.to_data()
+    return _short({**asdict(replace(component, delivery=None)), "delivery": delivery})
 
 
 def _short(data: dict[str, Any]) -> dict[str, Any]:
@@ -107,7 +114,7 @@ def _header(data: Mapping[str, Any], folder: Path, version: str) -> Header:
         title=str(data["title"]),
         recipe=Recipe.from_data(data["run"], folder),
         span={key: float(data["span"][key]) for key in ("start", "stop", "step")},
-        components=[_known(Identity, entry) for entry in data["components"]],
+        components=[_component(entry) for entry in data["components"]],
         signals=[_known(SignalInfo, entry) for entry in data["signals"]],
         tolerances=_tolerances_from(data["tolerances"]),
         selection=data.get("selection"),
@@ -118,6 +125,12 @@ def _header(data: Mapping[str, Any], folder: Path, version: str) -> Header:
         versions=dict(data.get("versions", {})),
         version=version,
     )
+
+
+def _component(entry: Mapping[str, Any]) -> Identity:
+    found: Identity = _known(Identity, entry)
+    stated = entry.get("delivery")
+    return found if stated is None else replace(found, delivery=Delivery.from_data(stated))
 
 
 def _known(kind: Any, entry: Mapping[str, Any]) -> Any:

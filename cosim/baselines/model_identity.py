@@ -1,5 +1,5 @@
-"""Which model a component of a run was: enough to separate a new delivery from another model. Reads FMU files to digest
-them.
+"""Which model a component of a run was, enough to separate a new delivery from another model, and what that delivery
+states. Reads FMU files.
 """
 
 from __future__ import annotations
@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cosim.baselines.delivery import Delivery
+from cosim.components.description import read_description
+from cosim.errors import FmuLoadError
 from cosim.results.result import Result
 from plant_models.disk_cache.folder import cache_folder
 
@@ -23,6 +26,7 @@ class Identity:
         fmi_version: ``1.0``, ``2.0`` or ``3.0``. guid: GUID or instantiation token.
         file: name of the FMU file, without folders; empty for models that ship. sha256: of that file.
         parameters: start values that were set. options, preset: of a shipped model.
+        delivery: what the description of that FMU states; None for models that ship, and where it is not known.
     """
 
     name: str
@@ -35,6 +39,7 @@ class Identity:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     preset: str | None = None
+    delivery: Delivery | None = None
 
 
 def identities(result: Result) -> list[Identity]:
@@ -60,6 +65,7 @@ def _identity(entry: Mapping[str, Any]) -> Identity:
         parameters=dict(entry.get("parameters") or {}),
         options=dict(entry.get("options") or {}),
         preset=entry.get("preset"),
+        delivery=_delivery(path) if path else None,
     )
 
 
@@ -69,6 +75,14 @@ def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
     if entry.get("kind") != "FMU" or not path.is_file() or cache_folder() in path.parents:
         return None
     return path
+
+
+def _delivery(path: Path) -> Delivery | None:
+    """What the description of an FMU states; None where the file is no FMU any more: a result may be older than it."""
+    try:
+        return Delivery.of(read_description(path, path.name))
+    except FmuLoadError:
+        return None
 
 
 def file_digest(path: Path) -> str:

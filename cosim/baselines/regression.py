@@ -4,14 +4,15 @@ different.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from cosim.baselines.baseline import Baseline
+from cosim.baselines.causes import Pair, causes, same_models
 from cosim.baselines.draft import resolve, resolved, versions_of
-from cosim.baselines.model_identity import Identity, identities
-from cosim.comparison.compare import compare_results
+from cosim.baselines.model_identity import identities
+from cosim.comparison.compare import compare_results, run_differences
 from cosim.comparison.tolerance import Tolerances
 from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
@@ -21,6 +22,7 @@ from fmus.tables.plain_data import jsonable
 
 MODELS = ("FMU", "block")
 """Components that are models; a recording that is played back is not."""
+NOTHING_ELSE = "What was run is as the baseline states it: models, parameters, times and versions."
 
 
 @dataclass(frozen=True)
@@ -52,18 +54,19 @@ def check(
     """
     outcome = result if isinstance(result, Outcome) else None
     actual = result if isinstance(result, Result) else result.result
-    _demand_same_models(actual, baseline)
+    pairs = same_models(baseline.header.components, identities(actual))
+    _demand_same_models(pairs, baseline)
     if not len(actual.table):
         raise ComparisonError(f"The run is empty: it has no rows to compare with {baseline.label}.")
     names = [info.name for info in (*baseline.result.signals, *actual.signals)]
-    comparison = compare_results(
-        baseline.result,
-        _as_in_header(_selected(actual, baseline)),
-        resolved(tolerances or baseline.tolerances, names),
-        labels=(baseline.label, label),
-    )
-    notes = (*baseline.notes, *_notes(actual, baseline), *comparison.notes)
-    return regression(replace(comparison, notes=notes), outcome, actual, baseline)
+    shown = _as_in_header(_selected(actual, baseline))
+    allowed = resolved(tolerances or baseline.tolerances, names)
+    comparison = compare_results(baseline.result, shown, allowed, labels=(baseline.label, label))
+    found = causes(pairs, run_differences(baseline.result, shown))
+    if not found and pairs and not comparison.equal:
+        found = [NOTHING_ELSE]
+    notes = dict.fromkeys([*baseline.notes, *found, *comparison.notes])
+    return regression(replace(comparison, causes=found, notes=tuple(notes)), outcome, actual, baseline)
 
 
 def regression(
@@ -81,13 +84,13 @@ def regression(
     return Regression(**given, outcome=outcome, actual=actual, baseline=baseline)
 
 
-def _demand_same_models(result: Result, baseline: Baseline) -> None:
+def _demand_same_models(pairs: Sequence[Pair], baseline: Baseline) -> None:
     """Refuse a result of another model; the same model with another GUID is a new delivery.
 
     Raises:
         BaselineError: a component is of another model; says both.
     """
-    for before, now in _same_models(baseline.header.components, identities(result)):
+    for before, now in pairs:
         if before.kind in MODELS and now.kind in MODELS and before.model and now.model and before.model != now.model:
             raise BaselineError(
                 f"{baseline.label} is a baseline of another FMU: {before.name} was the model '{before.model}' "
@@ -116,22 +119,3 @@ def _as_in_header(result: Result) -> Result:
         return result
     summary = {**result.summary, "components": jsonable(result.summary["components"]), "versions": versions_of(result)}
     return replace(result, summary=summary)
-
-
-def _notes(result: Result, baseline: Baseline) -> Iterable[str]:
-    """What the comparison of two results does not say itself."""
-    for before, now in _same_models(baseline.header.components, identities(result)):
-        if before.guid == now.guid and before.sha256 and now.sha256 and before.sha256 != now.sha256:
-            yield f"{before.name}: the file {now.file} is not the one of the baseline, though it has the same GUID."
-        elif before.guid != now.guid and now.kind == "FMU" and before.fmi_version == now.fmi_version:
-            yield f"{before.name}: a new delivery of the model '{now.model}'."
-        for name in sorted({*before.options, *now.options}):
-            old, new = before.options.get(name, "its default"), now.options.get(name, "its default")
-            if old != new:
-                yield f"{before.name}: option {name} is {new} instead of {old}."
-
-
-def _same_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[tuple[Identity, Identity]]:
-    """Components that both runs have, with what they were in each."""
-    by_name = {identity.name: identity for identity in now}
-    return [(identity, by_name[identity.name]) for identity in before if identity.name in by_name]

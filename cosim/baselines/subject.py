@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from cosim.baselines.baseline import Baseline
+from cosim.baselines.baseline_files import read_baseline
+from cosim.baselines.delivery import Delivery
 from cosim.baselines.recipe import Recipe
-from cosim.errors import BaselineError, ScenarioError
+from cosim.components.description import read_description
+from cosim.errors import BaselineError, CosimError, ScenarioError
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.scenario.fmu_alone import FmuAlone
@@ -74,11 +78,44 @@ def run_again(
     recipe = baseline.header.recipe if fmu is None else baseline.header.recipe.of(fmu)
     stimuli = baseline.more.get("stimuli")
     if stimuli is None or recipe.inputs:
-        return _run_recipe(recipe, progress, warn)
+        with after_its_delivery(baseline.path, recipe.source):
+            return _run_recipe(recipe, progress, warn)
     with TemporaryDirectory(prefix="fmu-reference-") as folder:
         table = Path(folder) / "inputs.csv"
         table.write_bytes(stimuli)
         return _run_recipe(replace(recipe, inputs=str(table)), progress, warn)
+
+
+@contextmanager
+def after_its_delivery(path: Path, what: Any, folder: Path = Path()) -> Iterator[None]:
+    """What cannot be run is explained by what its delivery changed, if anything.
+
+    Args:
+        path: of the baseline; there may be none yet. what: the FMU that is run. folder: where its relative path starts.
+
+    Raises:
+        BaselineError: something cannot be run, and the description of the FMU is not that of the baseline.
+        CosimError: something cannot be run.
+    """
+    try:
+        yield
+    except CosimError as error:
+        if changes := _delivered_changes(path, what, folder):
+            raise BaselineError(f"{', '.join(changes)}\n{error}") from error
+        raise
+
+
+def _delivered_changes(path: Path, what: Any, folder: Path) -> list[str]:
+    """What the description of an FMU alone states otherwise than that of its baseline; nothing where either is not
+    known.
+    """
+    if not isinstance(what, str | Path) or Path(what).suffix.lower() != ".fmu" or not path.is_file():
+        return []
+    try:
+        former = next((c.delivery for c in read_baseline(path).header.components if c.delivery), None)
+        return former.changes_to(Delivery.of(read_description(folder / what))) if former else []
+    except CosimError:
+        return []
 
 
 def make_subject(

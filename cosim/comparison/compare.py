@@ -25,7 +25,8 @@ Given = Tolerance | Mapping[str, Any] | float
 
 
 _RUN_KEYS = ("scenario", "start", "stop", "step")
-COMPONENT_KEYS = {"model": "is model", "guid": "has the GUID", "fmi_version": "has FMI version", "preset": "has preset"}
+MODEL_KEYS = {"model": "is model", "fmi_version": "has FMI version", "preset": "has preset"}
+GUID = {"guid": "has the GUID"}
 
 
 def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tuple[str, str]) -> list[str]:
@@ -46,19 +47,31 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
     if bare[0] != bare[1]:
         without, with_units = labels if bare[0] else labels[::-1]
         lines.append(f"{without} names no units; its numbers were taken to be in those of {with_units}.")
-    one, two = reference.summary, result.summary
-    lines += [
-        f"{key}: {two[key]} instead of {one[key]}."
-        for key in _RUN_KEYS
-        if key in one and key in two and one[key] != two[key]
-    ]
-    lines += _versions(one.get("versions"), two.get("versions"))
-    lines += _components(one.get("components"), two.get("components"))
+    lines += _components(reference.summary, result.summary, GUID)
+    lines += run_differences(reference, result)
     names = list(dict.fromkeys([*_unknown_names(reference), *_unknown_names(result)]))
     lines += [
         f"The tolerance for {given!r} fits no signal; {nearest(given, names)}" for given in tolerances.unused(names)
     ]
     return lines
+
+
+def run_differences(reference: Result, result: Result) -> list[str]:
+    """How what was run differs: models and parameters, then times, then versions; a line each.
+
+    Args:
+        reference: what was compared with.
+        result: what was compared.
+    """
+    one, two = reference.summary, result.summary
+    lines = [line for pair in _in_both(one, two) for line in _parameters(*pair)]
+    lines += _components(one, two, MODEL_KEYS)
+    lines += [
+        f"{key}: {two[key]} instead of {one[key]}."
+        for key in _RUN_KEYS
+        if key in one and key in two and one[key] != two[key]
+    ]
+    return lines + _versions(one.get("versions"), two.get("versions"))
 
 
 def _states_no_units(side: Result) -> bool:
@@ -79,23 +92,27 @@ def _versions(one: Any, two: Any) -> list[str]:
     return [f"Other versions: {', '.join(other)}."] if other else []
 
 
-def _components(one: Any, two: Any) -> list[str]:
-    if not (_is_list(one) and _is_list(two)):
+def _components(one: Mapping[str, Any], two: Mapping[str, Any], words: Mapping[str, str]) -> list[str]:
+    """What components of both runs say otherwise under the keys of `words`."""
+    return [
+        f"{before['name']} {verb} {now[key]} instead of {before[key]}."
+        for before, now in _in_both(one, two)
+        for key, verb in words.items()
+        if key in before and key in now and before[key] != now[key]
+    ]
+
+
+def _in_both(one: Mapping[str, Any], two: Mapping[str, Any]) -> list[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+    """What the two runs state of their common components."""
+    sides = one.get("components"), two.get("components")
+    if not all(map(_is_list, sides)):
         return []
-    known = {entry["name"]: entry for entry in two}
-    lines = []
-    for entry in (e for e in one if e["name"] in known):
-        now, name = known[entry["name"]], entry["name"]
-        lines += [
-            f"{name} {verb} {now[key]} instead of {entry[key]}."
-            for key, verb in COMPONENT_KEYS.items()
-            if key in entry and key in now and entry[key] != now[key]
-        ]
-        lines += _parameters(name, entry.get("parameters"), now.get("parameters"))
-    return lines
+    known = {entry["name"]: entry for entry in sides[1] or ()}
+    return [(entry, known[entry["name"]]) for entry in sides[0] or () if entry["name"] in known]
 
 
-def _parameters(name: str, one: Any, two: Any) -> list[str]:
+def _parameters(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    one, two, name = before.get("parameters"), now.get("parameters"), before["name"]
     if not isinstance(one, Mapping) or not isinstance(two, Mapping) or one == two:
         return []
     return [
@@ -300,7 +317,23 @@ class _Pair:
         if self.tolerances.ignores(name):
             return SignalComparison(name, info.unit, "ignored", tolerance)
         near = [*_nearest(name, self.extra), *_nearest(name, self.has)] if status == "missing" else []
-        return SignalComparison(name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3])
+        same = self._same_values(name) if status == "missing" else ""
+        return SignalComparison(
+            name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3], same_values=same
+        )
+
+    def _same_values(self, name: str) -> str:
+        """A signal that only the result has, and that is this one but for its name; or an empty text."""
+        reference, result = self.results
+        if len(reference.time) != len(result.time):
+            return ""
+        allowed = self.tolerances.for_signal(name)
+        values = np.asarray(reference[name], dtype=float)
+        limit = allowed.value_for(Curve(reference.time, values).scale)
+        if not np.any(np.abs(values) > limit):
+            return ""  # zeros have no name
+        fits = (n for n in self.extra if np.all(np.abs(np.asarray(result[n], dtype=float) - values) <= limit))
+        return next(fits, "")
 
     def _other_unit(self, name: str, one: str, two: str, why: str) -> SignalComparison:
         text = f"{name}: the result is in {two or '1'}, the reference in {one or '1'}; not compared: {why}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import isnan, nan
 from typing import Any
 
+from cosim.comparison.common_change import common_changes
 from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
 from fmus.tables.numbers import DASH
 from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
@@ -24,6 +25,7 @@ _COLUMNS = (
     Column("max_error_at", "At", "s", "Where it is largest", write=_instant),
     Column("allowed", "Allowed", "", "Where the error is largest"),
     Column("max_shift", "Largest shift", "s", "Of instants", short="Shift"),
+    Column("share_of_range", "Of range", "%", "Largest error as a share of the range of the reference", factor=100.0),
     Column("rms_error", "Error, rms"),
     Column("share_outside", "Outside", "%", "Share of the time outside the tolerance", factor=100.0),
     text_column("verdict", "Verdict"),
@@ -42,7 +44,11 @@ _POINT_COLUMNS = (
     Column("error", "error", write="{:+.4g}".format),
 )
 SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
-FINDINGS_SHOWN, EVENTS_SHOWN, _FAILED_SHOWN = 4, 10, 40
+MOST_LINES = 32
+"""Of a comparison where not all is asked for: pytest adds the baseline and where the pages are, and 40 fit a screen."""
+_CAUSES, _CHANGES, _ROWS, _NOTES = 3, 3, 6, 4
+_NOTES_OF_EQUAL = 10
+_ALL = 10**9
 
 
 def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
@@ -51,23 +57,64 @@ def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
 
 
 def comparison_parts(comparison: Comparison, verbose: bool = False) -> Parts:
-    """A comparison for people: the verdict in a line first.
+    """A comparison for people: what was different in what was run, the verdict in a line, what the differences have in
+    common, how large they are, and where.
 
     Args:
         comparison: what was found.
-        verbose: all signals, findings, telegrams and packets; else those that fail, a few findings each.
+        verbose: all signals, findings, telegrams and packets; else what fits `MOST_LINES`, the worst first.
     """
     shared = _shared(comparison)
     shown = _shown(comparison, verbose, shared)
-    limit = len(shown) if verbose else _FAILED_SHOWN
-    more = [f"... and {len(shown) - limit} more signals that differ"] if len(shown) > limit else []
-    parts: list[Table | str] = [_headline(comparison)]
-    parts.append(replace(signals_table(shown[:limit]), notes=more))
-    parts += [f"  all {count} signals: {text}" for text, count in shared.items()]
-    for signal in shown[:limit]:
-        parts += _details(signal, verbose, shared)
-    parts += _events(comparison, verbose)
-    return [*parts, "\n".join(f"note: {note}" for note in comparison.notes)]
+    head = _head(comparison, _ALL if verbose else _CAUSES)
+    common = [*(change.text for change in common_changes(comparison))]
+    common += [f"all {count} signals: {text}" for text, count in shared.items()]
+    table = _worst_signals(shown, _ALL if verbose else _ROWS)
+    others = [f"note: {note}" for note in comparison.notes if note not in comparison.causes]
+    most_notes = _ALL if verbose else _NOTES_OF_EQUAL if comparison.equal else _NOTES
+    notes = "\n".join(_first(others, most_notes, "notes"))
+    above = [*head, "\n".join(f"  {line}" for line in _first(common, _ALL if verbose else _CHANGES, "changes")), table]
+    room = _ALL if verbose else MOST_LINES - len(joined([*above, notes]).splitlines()) - 2
+    return [*above, *_symptoms(comparison, shown, shared, verbose, room), notes]
+
+
+def _head(comparison: Comparison, most: int) -> list[str]:
+    """The verdict; behind the causes where something differs."""
+    if comparison.equal:
+        return [_headline(comparison), "\n".join(f"note: {cause}" for cause in comparison.causes[:most])]
+    return ["\n".join([*_first(comparison.causes, most, "differences of what was run"), _headline(comparison)])]
+
+
+def _first(lines: Sequence[str], most: int, what: str) -> list[str]:
+    """The first of some lines, and how many more there are."""
+    return list(lines) if len(lines) <= most else [*lines[: most - 1], f"... and {len(lines) - most + 1} more {what}"]
+
+
+def _worst_signals(shown: Sequence[SignalComparison], most: int) -> Table:
+    more = [f"... and {len(shown) - most} more signals that differ"] if len(shown) > most else []
+    return replace(signals_table(shown[:most]), notes=more)
+
+
+def _symptoms(
+    comparison: Comparison,
+    shown: Sequence[SignalComparison],
+    shared: Mapping[str, int],
+    verbose: bool,
+    room: int,
+) -> Parts:
+    """Where and how signals, telegrams and packets differ: a line for each, then the worst points as far as there is
+    room.
+    """
+    if verbose:
+        details = [part for signal in shown for part in _details(signal, shared)]
+        return [*details, *_events(comparison, _ALL)]
+    lines = [line for signal in shown for line in _findings(signal, shared)[:1]]
+    events = ["\n".join(text.splitlines()) for text in _events(comparison, max(2, room // 2))]
+    left = room - sum(len(text.splitlines()) + 1 for text in events)
+    findings = "\n".join(_first(lines, max(2, left), "lines: see --verbose"))
+    points = next(filter(None, (_points(signal, shared) for signal in shown)), "")
+    needed = len(joined([findings, points]).splitlines()) + 1
+    return [findings, *([points] if needed <= left else []), *events]
 
 
 def _shown(comparison: Comparison, verbose: bool, shared: Mapping[str, int]) -> list[SignalComparison]:
@@ -130,7 +177,8 @@ def signals_table(signals: Sequence[SignalComparison], failed: Sequence[SignalCo
 def _row(signal: SignalComparison) -> list[Any]:
     compared = signal.status in ("equal", "within", "differs")
     at = signal.max_error_at if signal.max_error else nan
-    errors = [signal.max_error, at, signal.allowed, signal.max_shift if compared else nan, signal.rms_error]
+    shift = signal.max_shift if compared else nan
+    errors = [signal.max_error, at, signal.allowed, shift, signal.share_of_range, signal.rms_error]
     return [signal.name, signal.unit or "1", *errors, signal.share_outside if compared else nan, _verdict(signal)]
 
 
@@ -139,27 +187,27 @@ def _verdict(signal: SignalComparison) -> str:
     return VERDICTS.get(signal.status) or f"differs: {', '.join(kinds)}"
 
 
-def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int]) -> Parts:
+def _findings(signal: SignalComparison, shared: Mapping[str, int]) -> list[str]:
+    """What was found of a signal, the worst first, a line each."""
     if signal.status == "missing":
-        near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
-        return [f"  {signal.name}: missing in the result{near}"]
-    findings = _own(signal, shared)
-    limit = len(findings) if verbose else FINDINGS_SHOWN
-    lines = [f"  {finding.text}" for finding in findings[:limit]]
-    if len(findings) > limit:
-        lines.append(f"  {signal.name}: ... and {len(findings) - limit} more findings")
-    points = signal.worst if any(finding.kind == "value" for finding in findings) else ()
+        return [f"  {signal.name}: missing in the result{signal.hint}"]
+    return [f"  {finding.text}" for finding in _own(signal, shared)]
+
+
+def _points(signal: SignalComparison, shared: Mapping[str, int]) -> Table | str:
+    """The worst points of a signal whose values differ."""
+    points = signal.worst if any(finding.kind == "value" for finding in _own(signal, shared)) else ()
     title = f"worst points of {signal.name}"
-    return ["\n".join(lines), Table(title, _POINT_COLUMNS, points, title=f"  {title}:")]
+    return Table(title, _POINT_COLUMNS, points, title=f"  {title}:") if points else ""
 
 
-def _events(comparison: Comparison, verbose: bool) -> list[str]:
-    parts = []
-    for what, events in (("telegrams", comparison.events), ("packets", comparison.packets)):
-        differences = events.differences
-        limit = len(differences) if verbose else EVENTS_SHOWN
-        lines = [f"{what}:", *(f"  {difference.text}" for difference in differences[:limit])]
-        if len(differences) > limit:
-            lines.append(f"  ... and {len(differences) - limit} more")
-        parts += ["\n".join(lines)] if differences else []
-    return parts
+def _details(signal: SignalComparison, shared: Mapping[str, int]) -> Parts:
+    return ["\n".join(_findings(signal, shared)), _points(signal, shared)]
+
+
+def _events(comparison: Comparison, most: int) -> list[str]:
+    """Telegrams and packets that differ, in `most` lines together at most, as far as there is one for each."""
+    kinds = [("telegrams", comparison.events), ("packets", comparison.packets)]
+    lists = [(what, [f"  {d.text}" for d in events.differences]) for what, events in kinds if events.differences]
+    share = max(1, most // max(1, len(lists)) - 2)
+    return ["\n".join([f"{what}:", *_first(lines, share, what)]) for what, lines in lists]

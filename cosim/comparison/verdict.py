@@ -88,6 +88,7 @@ class SignalComparison:
     Args:
         name: of the signal. unit: SI unit of the reference. status: see `Status`.
         tolerance: in use. allowed: difference in value allowed [unit]. allowed_time: in time [s].
+        scale: range of the reference, of which a relative tolerance is a share [unit].
         max_error: largest difference in value beyond what the allowed time explains [unit]; NaN where nothing was
             compared.
         max_error_at: when [s].
@@ -97,6 +98,7 @@ class SignalComparison:
         worst: the worst points, largest excess first, a few: (time [s], reference, result, error).
         findings: everything beyond tolerance, worst first.
         nearest: for a missing signal, names in the result that look like it.
+        same_values: for a missing signal, the name of one that only the result has, with its values.
         curves: for pictures; None where there is nothing to draw.
     """
 
@@ -106,6 +108,7 @@ class SignalComparison:
     tolerance: Tolerance
     allowed: float = float("nan")
     allowed_time: float = float("nan")
+    scale: float = float("nan")
     max_error: float = float("nan")
     max_error_at: float = float("nan")
     max_shift: float = 0.0
@@ -114,7 +117,20 @@ class SignalComparison:
     worst: Sequence[tuple[float, float, float, float]] = ()
     findings: Sequence[ComparisonFinding] = ()
     nearest: Sequence[str] = ()
+    same_values: str = ""
     curves: Curves | None = None
+
+    @property
+    def share_of_range(self) -> float:
+        """Largest error as a share of the range of the reference [1]; NaN where there is no range."""
+        return self.max_error / self.scale if self.scale > 0.0 else float("nan")
+
+    @property
+    def hint(self) -> str:
+        """Where a missing signal may be found, in words that follow others; empty where nothing is known."""
+        if self.same_values:
+            return f"; {self.same_values} has its values"
+        return f"; nearest: {', '.join(self.nearest)}" if self.nearest else ""
 
     @property
     def passed(self) -> bool:
@@ -164,6 +180,7 @@ class Comparison:
         signals: one entry for each signal, in the order of the reference, extra ones last.
         events: of the telegrams. packets: of the packets of a network.
         notes: what to know beside it: other versions, other parameters, unused tolerances.
+        causes: of the notes, how what was run differs from what the reference is of; the likeliest cause first.
         extra_fails: whether signals that only the result has count as a difference.
     """
 
@@ -174,6 +191,7 @@ class Comparison:
     notes: Sequence[str] = ()
     extra_fails: bool = False
     packets: EventComparison = field(default_factory=EventComparison)
+    causes: Sequence[str] = ()
 
     @property
     def equal(self) -> bool:
@@ -214,6 +232,7 @@ class Comparison:
             "events": _event_data(self.events),
             "packets": _event_data(self.packets),
             "notes": list(self.notes),
+            "causes": list(self.causes),
         }
 
 
@@ -236,6 +255,7 @@ def _signal_data(signal: SignalComparison) -> dict[str, Any]:
         "status",
         "allowed",
         "allowed_time",
+        "scale",
         "max_error",
         "max_error_at",
         "max_shift",
@@ -252,4 +272,5 @@ def _signal_data(signal: SignalComparison) -> dict[str, Any]:
             {k: getattr(f, k) for k in ("kind", "time", "end", "size", "allowed", "text")} for f in signal.findings
         ],
         "nearest": list(signal.nearest),
+        "same_values": signal.same_values,
     }

@@ -167,11 +167,9 @@ class FmuRegression:
     def _explanation(self, call: Call, found: Regression, files: Mapping[str, str]) -> str:
         from cosim.comparison.comparison_text import comparison_text  # noqa: PLC0415 - only for what differs
 
-        names = [signal.name for signal in found.failed] or ["telegrams"]
-        what = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
-        head = f"{what}: not as in the baseline {self._shown(call.path)}."
+        files = {"baseline": self._shown(call.path), **files}
         where = [f"{kind:>8}: {path}" for kind, path in files.items()]
-        return "\n".join([head, "", comparison_text(found).rstrip(), "", *where, UPDATE])
+        return "\n".join([comparison_text(found).rstrip(), "", *where, UPDATE])
 
     def _draw(self, found: Regression, path: Path) -> dict[str, str]:
         """Page and pictures of a difference; where they cannot be made, why."""

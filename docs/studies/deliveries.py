@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from plant_models.hybrid import output_signal
+from plant_models.hybrid import CommunicationEvent, memory, output_signal
 from plant_models.railway.vehicle.locomotive import Locomotive
 
 KMH = 3.6  # km/h in a metre a second
@@ -134,3 +134,39 @@ class DoubleStep(Locomotive):
     """Twice the internal step."""
 
     internal_step = Locomotive.internal_step * 2.0
+
+
+class CoarseStep(Locomotive):
+    """An internal step of a hundredth of a second."""
+
+    internal_step = 1e-2
+
+
+class Gain(Locomotive):
+    """Every output 1 % larger."""
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {name: 1.01 * value for name, value in super().output(t, x, u, p).items()}
+
+
+class OneSampleLate(Locomotive):
+    """The speeds of train and wheel are those of the communication point before, which both ends of a step sample."""
+
+    states: Any = (
+        *Locomotive.states,
+        *(memory(f"{age}_{name}", "m/s") for age in ("last", "former") for name in ("speed", "wheel_speed")),
+    )
+    events = (CommunicationEvent("sampling", description="Speeds are sampled"),)
+
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        now = super().output(t, x, u, p)
+        return {
+            "former_speed": x.last_speed,
+            "former_wheel_speed": x.last_wheel_speed,
+            "last_speed": now["speed"],
+            "last_wheel_speed": now["wheel_speed"],
+        }
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        given = super().output(t, x, u, p)
+        return {**given, "speed": x.former_speed, "wheel_speed": x.former_wheel_speed}

@@ -168,8 +168,7 @@ def _in_words(signal: SignalComparison) -> str:
     """What is wrong with a signal, in a line."""
     if signal.findings:
         return _text(signal, signal.findings[0])
-    near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
-    return VERDICTS.get(signal.status, "differs") + near
+    return VERDICTS.get(signal.status, "differs") + signal.hint
 
 
 def _text(signal: SignalComparison, finding: ComparisonFinding) -> str:

@@ -224,7 +224,7 @@ def test_a_damaged_table_is_refused_in_words(kind: str, says: str, tmp_path: Pat
     [
         (lambda text: "{" + text[1:-20], "not readable as JSON"),
         (lambda text: "<<<<<<< HEAD\n" + text, "line 1: holds the conflict of a merge"),
-        (lambda text: text.replace('"version": "1.0"', '"version": "2.0"'), "version 2.0 of the layout"),
+        (lambda text: text.replace('"version": "1.1"', '"version": "2.0"'), "version 2.0 of the layout"),
         (lambda text: text.replace("fmu-observer baseline", "something"), "not a baseline"),
         (lambda text: text.replace('"signals": [', '"singals": [', 1), "'signals' is missing"),
         (lambda text: text.replace('"kind": "result"', '"kind": "cake"'), "run.kind is 'cake'"),

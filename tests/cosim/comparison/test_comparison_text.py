@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_results import STRICT, compared, made
 
 from cosim.comparison.compare import compare_results, notes
-from cosim.comparison.comparison_text import comparison_text
+from cosim.comparison.comparison_text import MOST_LINES, comparison_text
 from cosim.comparison.tolerance import Tolerance, Tolerances
+from cosim.comparison.verdict import EventComparison, EventDifference
 from cosim.results.result import BaliseRecord
 
 TIME = np.arange(101) * 0.01
@@ -38,7 +41,7 @@ def test_text_shows_what_differs_and_verbose_all() -> None:
     comparison = compared(reference, result)
     text = comparison_text(comparison)
     assert text.startswith("result DIFFERS from reference: 1 within tolerance, 1 differ, 1 missing, 1 extra;")
-    assert "gone: missing in the result; nearest: gone_" in text
+    assert "gone: missing in the result; gone_ has its values" in text
     assert "too high" in text
     assert "worst points" in text
     assert "train.place" not in text
@@ -94,10 +97,45 @@ def test_notes_tell_versions_parameters_and_misspelt_tolerances() -> None:
     two = made(TIME, y=TIME, summary=run(guid="{2}", parameters={"mass": 1.5}) | {"versions": {"numpy": "2.1"}})
     assert notes(one, replace(two, failure="it blew up"), Tolerances(by_signal={"yy": STRICT}), ("A", "B")) == [
         "B: the run ended early: it blew up",
-        "Other versions: numpy 2.1 instead of 2.0.",
         "plant has the GUID {2} instead of {1}.",
         "Parameter plant.mass is 1.5 instead of 1.0.",
         "Parameter plant.drag is its default instead of 2.0.",
+        "Other versions: numpy 2.1 instead of 2.0.",
         "The tolerance for 'yy' fits no signal; did you mean 'y'?",
     ]
     assert "note: Other versions" in comparison_text(compare_results(one, two))
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.integers(0, 60),
+    st.integers(0, 5),
+    st.integers(0, 40),
+    st.integers(0, 40),
+    st.integers(0, 9),
+    st.integers(0, 9),
+    st.booleans(),
+)
+def test_a_difference_fits_a_screen_and_begins_with_its_cause(
+    differ: int, missing: int, telegrams: int, packets: int, causes: int, notes: int, ends: bool
+) -> None:
+    """Many signals, telegrams, causes and notes at once: what there is more is counted, and the first of each shown."""
+    some = {f"train.s{k}": SPEED + k for k in range(differ)}
+    other = {name: np.roll(values, 40 + k) for k, (name, values) in enumerate(some.items())}
+    gone = {f"gone{k}": TIME for k in range(missing)}
+    events = [BaliseRecord(0.01 * k, 0.6, f"b{k}", 5.0, 5.0) for k in range(telegrams)]
+    one = made(TIME, y=TIME, **some, **gone, events=[BaliseRecord(0.5, 0.6, "own", 5.0, 5.0)])
+    two = made(TIME[:-1] if ends else TIME, y=TIME[: 100 if ends else 101], events=events)
+    if not ends:
+        two = made(TIME, y=TIME, **other, events=events)
+    found = compared(one, two)
+    reasons = [f"cause {k}" for k in range(causes)]
+    sent = [EventDifference("missing", None, None, f"packet {k} is missing") for k in range(packets)]
+    remarks = [*reasons, *(f"remark {k}" for k in range(notes))]
+    found = replace(found, causes=reasons, notes=remarks, packets=EventComparison(differences=sent))
+    lines = comparison_text(found).splitlines()
+    assert len(lines) <= MOST_LINES
+    assert [line for line in lines if line.startswith("cause")] == reasons[: 3 if causes <= 3 else 2]
+    assert found.equal or not causes or lines[0] == "cause 0"
+    assert any("DIFFERS" in line or "agrees" in line for line in lines[: 1 + min(causes, 3)])
+    assert len(comparison_text(found, verbose=True).splitlines()) >= len(lines)

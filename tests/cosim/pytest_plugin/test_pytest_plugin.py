@@ -106,10 +106,12 @@ def test_ten_lines_beside_a_vendor_fmu(pytester: pytest.Pytester) -> None:
     changed.assert_outcomes(failed=1)
     changed.stdout.fnmatch_lines(
         [
-            "*fmu.position and 1 more: not as in the baseline baselines*test_traction-100000.0.json.*",
+            "Parameter fmu.mass is 80800.0 instead of its default.",
+            "result DIFFERS from test_traction-100000.0.json: 2 differ*",
+            "*both signals scale by +11.3 %",
             "*fmu.speed*",
             "*worst points*",
-            "note: Parameter fmu.mass is 80800.0*",
+            "*baseline: baselines*test_traction-100000.0.json",
             "*html: .pytest_fmu*comparison.html",
             "*png: .pytest_fmu*.png",
         ],
