@@ -35,6 +35,7 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS / "gallery"))
 
 import figure_index  # noqa: E402 - stands in a folder of scripts
+import small_picture  # noqa: E402
 
 ROOT = DOCS.parent
 FIRST_RUN = "docs/guide/first_run.md"
@@ -96,8 +97,7 @@ def _said_by_the_command(_warning: str) -> None:
 def write_picture() -> None:
     """The main picture of the default run, for the README."""
     outcome = default_run()
-    PICTURE.parent.mkdir(exist_ok=True)
-    main_picture(outcome.result, outcome.spec).savefig(PICTURE, dpi=110)
+    small_picture.save_small(main_picture(outcome.result, outcome.spec), PICTURE)
 
 
 def printed_table() -> str:

@@ -15,16 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from PIL import Image
 from shared.line import SAME, Line, table
+from shared.small_picture import save_small
 
 from cosim.drawing.style import RC
 from fmus.tables.table import Table, text_column
 
 mpl.use("Agg")
 mpl.rcParams.update(RC)
-
-COLOURS = 256
 
 
 class Sheet:
@@ -86,11 +84,7 @@ class Sheet:
         content["lines"] = [line.content() for line in self.lines]
         (self.out / f"{self.name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
         if figure is not None:
-            path = self.out / f"{self.name}.png"
-            figure.savefig(path, dpi=80)
-            with Image.open(path) as picture:  # curves need few colours: half of the size or less
-                smaller = picture.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-            smaller.save(path, optimize=True)
+            save_small(figure, self.out / f"{self.name}.png")
 
 
 def sheet_text(lines: list[Line]) -> str:
