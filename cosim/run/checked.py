@@ -14,7 +14,9 @@ from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled, couple
 from cosim.run.layouts import make_layout
 from cosim.run.loaded_components import LoadedComponents, load_components
+from cosim.run.missing_sources import require_sources
 from cosim.run.network_remarks import network_warnings
+from cosim.run.plausible_masses import mass_warnings
 from cosim.run.remarks import Remarks
 from cosim.run.step_schedule import StepSchedule, stepping_groups
 from cosim.run.task import RunTask
@@ -54,6 +56,8 @@ def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks,
     stated = _parse_tables(task, remarks)
     loaded = load_components(task, building, remarks, resources)
     coupled = couple(task, stated.links, loaded.components)
+    remarks.warn(*require_sources(task.table, loaded.components, coupled.connections))
+    remarks.warn(*mass_warnings(task.table.components, loaded.components))
     if coupled.network is not None:
         remarks.note(*coupled.network.notes())
         remarks.warn(*network_warnings(coupled.network, task.table, loaded.components, task.where))

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cosim.components.component import Component
-from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
+from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.graph import undeclared
 from cosim.run.component_models import make_system, values_in_use
-from cosim.run.loaded_components import names_with_starts
 from cosim.scenario.schema import ScenarioTable
 
 ROUNDING = 1e-9  # of a period over a step
@@ -25,8 +24,7 @@ def coupling_warnings(
     Returns:
         Texts that warn, and texts that only explain.
     """
-    free = unconnected_inputs(connections, components.values(), names_with_starts(table))
-    doubts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
+    doubts = []
     deaf = [
         name for name, of in table.components.items() if of.tolerance is not None and components[name].fmi_version == 1
     ]

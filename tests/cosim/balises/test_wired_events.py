@@ -37,7 +37,7 @@ def wired(fields: tuple[str, ...] = FIELDS, **balises: Any) -> Scenario:
         options={"layout": "positions", "balise_capacity": CAPACITY},
         parameters={"positions": [*LAYOUT["positions"], 1e30]},
     )
-    scenario.connect(
+    scenario.set("driver.odometer", 0.0).connect(
         "driver.effort -> locomotive.effort, observer.effort",
         "locomotive.wheel_speed -> odometer.wheel_speed",
         "odometer.reading -> observer.odometer",  # no loop, in which what is held would depend on the other connections

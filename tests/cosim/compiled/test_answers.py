@@ -31,7 +31,8 @@ def run(stepper: str) -> np.ndarray:
     """A receiver that counts missing samples, and says at a telegram what Python must finish."""
     scenario = Scenario(stop=0.4, step=0.1, certificates="ignore").master(stepper=stepper)
     scenario.add("train", model="longitudinal_train", parameters={"train_speed": 20.0}, **{"as": "fmu3"})
-    scenario.add("observer", observer="stopping_uio", preset="repaired", **{"as": "fmu3"})
+    alone = {"odometer": 0.0}
+    scenario.add("observer", observer="stopping_uio", preset="repaired", parameters=alone, **{"as": "fmu3"})
     scenario.balises(layout="positions", positions=[2.0], position="train.position", speed="train.speed")
     outcome = scenario.run(warn=lambda _: None)
     assert outcome.failure is None

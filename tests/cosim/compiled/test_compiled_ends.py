@@ -135,7 +135,9 @@ def test_without_a_compiler_python_does_it_and_says_so(tmp_path: Path, monkeypat
 
 
 def test_a_block_in_the_plan_stays_with_python(tmp_path: Path) -> None:
-    scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("odometer", model="odometer", **{"as": "block3"})
+    alone = {"wheel_speed": 0.0}
+    scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1)
+    scenario.add("odometer", model="odometer", parameters=alone, **{"as": "block3"})
     stepper = scenario.run(warn=lambda _: None).result.summary["master"]["stepper"]
     assert (stepper["name"], stepper["steps_compiled"]) == ("python", 0)
     assert "odometer runs in Python" in stepper["reason"]

@@ -258,7 +258,9 @@ def test_the_command_line_logs_calls_beside_the_results(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.toml").write_text(
-        'stop = 0.2\nstep = 0.1\n[components.driver]\nmodel = "driver"\nas = "block3"\n', encoding="utf-8"
+        'stop = 0.2\nstep = 0.1\n[components.driver]\nmodel = "driver"\nas = "block3"\n'
+        "parameters = { odometer = 0.0 }\n",
+        encoding="utf-8",
     )
     quiet = ["run", "own.toml", "--quiet", "--no-report"]
     assert main([*quiet, "--log-calls"]) == 0

@@ -141,15 +141,6 @@ def test_units_that_do_not_fit_are_refused_with_both_names() -> None:
         scenario.run()
 
 
-def test_an_unconnected_input_keeps_its_start_value_and_is_reported() -> None:
-    scenario = small()
-    scenario._data["connections"] = scenario._data["connections"][:2]
-    outcome = scenario.run()
-    assert any(
-        "Unconnected inputs" in w and "driver.odometer" in w and "observer.odometer" in w for w in outcome.warnings
-    )
-
-
 # -- the command line
 # ---------------------------------------------------------------------------------------------------
 

@@ -50,7 +50,8 @@ def moved(name: str, preset: str | None) -> bool:
 def warned(name: str, preset: str | None) -> list[str]:
     scenario = cosim.Scenario(stop=0.2, step=0.1)
     scenario.add("train", model="longitudinal_train", parameters={"train_speed": 20.0})
-    scenario.add("observer", observer=name, **({} if preset is None else {"preset": preset}))
+    alone = dict.fromkeys({"odometer", "measured_odometer"} & {s.name for s in OBSERVERS[name]().inputs}, 0.0)
+    scenario.add("observer", observer=name, parameters=alone, **({} if preset is None else {"preset": preset}))
     scenario.balises(layout="positions", positions=[2.0], position="train.position", speed="train.speed")
     texts: list[str] = []
     scenario.run(warn=texts.append)
@@ -77,7 +78,7 @@ def test_a_deaf_observer_is_told_before_the_run(name: str, preset: str | None) -
 @pytest.mark.parametrize(("mass", "told"), [(873e3, 0), (120e3, 1), (2000e3, 1)])
 def test_a_preset_of_another_train_is_told_before_the_run(mass: float, told: int) -> None:
     scenario = cosim.Scenario(stop=0.2, step=0.1)
-    scenario.add("observer", observer="balise_odometer_ekf", preset="tuned", parameters={"mass": mass})
+    scenario.add("observer", observer="balise_odometer_ekf", preset="tuned", parameters={"mass": mass, "odometer": 0.0})
     texts: list[str] = []
     scenario.run(warn=texts.append)
     found = [text for text in texts if "is made for" in text]

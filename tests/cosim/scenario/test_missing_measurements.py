@@ -178,7 +178,7 @@ def test_balises_are_found_and_told_by_what_is_always_there(key: str) -> None:
     scenario.add(
         "train", model="longitudinal_train", can_be_missing=["position" if key == "position" else "acceleration"]
     )
-    scenario.add("observer", observer="takagi_sugeno_cdo")
+    scenario.add("observer", observer="takagi_sugeno_cdo", parameters={"odometer": 0.0})
     sources = {"position": "train.position", "speed": "train.speed", "odometer": "train.acceleration"}
     scenario.balises(layout="spacing", spacing=10.0, track_end=100.0, **sources)
     with pytest.raises(CosimError, match=rf"balises\.{key}: train\.\w+ can be missing"):

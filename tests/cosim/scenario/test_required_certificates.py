@@ -217,8 +217,8 @@ def test_a_lossy_odometer_is_not_hidden_by_balises_of_which_the_distance_is_know
 
 def test_a_component_that_tells_at_instants_of_its_own_is_refused() -> None:
     s = Scenario(stop=0.2, step=0.05, certificates="require")
-    s.add("reader", model="balise_reader", **{"as": "block2"})
-    s.add("observer", observer="takagi_sugeno_cdo", **{"as": "block2"})
+    s.add("reader", model="balise_reader", parameters={"speed": 0.0}, **{"as": "block2"})
+    s.add("observer", observer="takagi_sugeno_cdo", parameters={"odometer": 0.0}, **{"as": "block2"})
     s.connect(*(f"reader.balise_{field} -> observer.balise_{field}" for field in ("count", "time", "position")))
     assert "another component triggers its event 'balise'" in applied(s)
 

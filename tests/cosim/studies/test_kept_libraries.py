@@ -68,7 +68,7 @@ def test_a_library_is_loaded_once_and_makes_way(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(kept_libraries, "load_fmu", load)
     scenario = Scenario(stop=0.2, step=0.01).add("train", model="locomotive").add("odometer", model="odometer")
-    scenario.set("train.train_speed", 10.0)
+    scenario.connect("train.wheel_speed -> odometer.wheel_speed").set("train.train_speed", 10.0)
     first, second = (scenario.run().result for _ in range(2))
     assert sorted(loaded) == ["odometer", "train"]
     assert_same(first, second)

@@ -100,7 +100,7 @@ def test_what_cannot_be_replayed(run: Outcome) -> None:
     with pytest.raises(ReplayError, match=r"differs from the run: speed is .* at 0\.007 s"):
         Replay(replace(run, result=replace(run.result, table=changed)), "filter")
     told = cosim.Scenario(stop=0.1, step=0.1, certificates="ignore").add(
-        "it", observer="discrete_uio", **{"as": "block3"}
+        "it", observer="discrete_uio", parameters={"odometer": 0.0}, **{"as": "block3"}
     )
     with pytest.raises(ReplayError, match="receives events"):
         Replay(told.run(), "it")
