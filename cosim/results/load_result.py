@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from cosim.errors import OutputError, nearest
+from cosim.errors import OutputError
 from cosim.results.formats.columns import check_time
 from cosim.results.formats.foreign_csv import read_foreign_csv
 from cosim.results.formats.foreign_mat import read_foreign_mat
@@ -16,6 +16,14 @@ from cosim.results.record_rows import EVENTS_SUFFIX, TELEGRAM_ROWS
 from cosim.results.result import Result
 from cosim.results.result_data import ResultData
 from cosim.results.results_folder import SUMMARY, read_results
+from fmus.near_files import near_files
+
+_NO_RESULTS = {
+    ".toml": "a scenario, which 'cosim run' runs",
+    ".ssp": "a scenario, which 'cosim run' runs",
+    ".fmu": "an FMU",
+}
+"""What files are that are taken for results, by their endings."""
 
 
 def load_result(path: str | Path) -> Result:
@@ -39,7 +47,9 @@ def load_result(path: str | Path) -> Result:
     if source.is_dir():
         return Result.of(_folder(source))
     if not source.exists():
-        raise OutputError(f"There is no {source}; {_neighbours(source)}")
+        raise OutputError(f"There is no {source}; {near_files(source)}")
+    if source.suffix.lower() in _NO_RESULTS:
+        raise OutputError(f"{source} is {_NO_RESULTS[source.suffix.lower()]}; expected a results folder or a table.")
     folder = source.parent
     if source.name in table_files().values() and (folder / SUMMARY).is_file():
         return Result.of(read_results(folder, table=source.name))
@@ -77,12 +87,6 @@ def _holds(folder: Path) -> str:
     if below:
         return f"Results are in: {', '.join(str(folder / name) for name in below[:5])}."
     return f"It holds: {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}." if names else "It is empty."
-
-
-def _neighbours(path: Path) -> str:
-    if not path.parent.is_dir():
-        return f"nor is there a folder {path.parent}."
-    return nearest(path.name, sorted(p.name for p in path.parent.iterdir() if not p.name.startswith(".")))
 
 
 def _reader(path: Path) -> Callable[[Path], ResultData]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import ProvenanceError
+from fmus.near_files import near_files
 
 MADE_FROM, MANIFEST, SCENARIO, FILES = "made_from", "manifest.json", "scenario.toml", "files"
 FORMAT = 1
@@ -102,7 +103,8 @@ def read_manifest(directory: str | Path) -> Manifest:
     if not file.is_file():
         if not (folder / "summary.json").is_file():
             raise ProvenanceError(
-                f"{folder} is no results folder: it has neither summary.json nor {MADE_FROM}/{MANIFEST}."
+                f"{folder} is no results folder: it has neither summary.json nor {MADE_FROM}/{MANIFEST}; "
+                f"{near_files(folder / 'scenario.toml', '.toml')}"
             )
         raise ProvenanceError(
             f"{folder} does not say how it was made: it has no {MADE_FROM}/{MANIFEST}. An older version wrote it, or "

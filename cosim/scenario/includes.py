@@ -18,6 +18,7 @@ from cosim.scenario.package_names import is_package
 from cosim.scenario.paths import absolute, map_paths
 from cosim.scenario.shipped import shipped_file, shipped_scenarios
 from cosim.scenario.toml_file import read_toml
+from fmus.near_files import near_files
 
 CONNECTIONS = "connections"
 Key = tuple[str, ...]
@@ -79,14 +80,17 @@ def find_file(name: str | Path, folder: Path = Path()) -> Path:
         ScenarioError: there is none.
     """
     path = folder / name
-    if path.suffix != ".toml" and not path.is_file():
+    if path.is_file():
+        if path.suffix.lower() == ".fmu":
+            raise ScenarioError(f"{path} is an FMU and no scenario; 'cosim new {path}' writes one to start from.")
+        return path
+    if not path.suffix:
         shipped = shipped_file(str(name))
-        if not shipped.is_file():
-            raise ScenarioError(f"No scenario {str(name)!r}; {nearest(str(name), shipped_scenarios())}")
-        path = shipped
-    if not path.is_file():
-        raise ScenarioError(f"Scenario file {path} does not exist.")
-    return path
+        if shipped.is_file():
+            return shipped
+        hint = nearest(str(name), [*shipped_scenarios(), *(p.name for p in folder.glob("*.toml"))])
+        raise ScenarioError(f"No scenario {str(name)!r}; {hint}")
+    raise ScenarioError(f"Scenario file {path} does not exist; {near_files(path, '.toml', '.ssp')}")
 
 
 def read_tables(path: Path, chain: Sequence[Path] = ()) -> Tables:

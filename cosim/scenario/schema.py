@@ -6,6 +6,7 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from functools import cache
 from math import ulp
 from pathlib import Path
@@ -29,6 +30,7 @@ from cosim.scenario.scenario_tables import (
     ReportTable,
     Tolerance,
 )
+from cosim.scenario.wrong_values import wrong_value
 from cosim.toml_table import Name, Seed, TomlTable
 from fmus.fmi.standard import TIME_TOLERANCE
 from plant_models.hybrid.noise import RUN_SEED
@@ -161,8 +163,26 @@ def parse_scenario(data: dict[str, Any], where: str, folder: Path | None = None)
     try:
         return ScenarioTable.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        lines = [_explain(dict(item)) for item in error.errors() if not _of_another_form(dict(item))]
+        if not data.get("components") and not _REQUIRED & data.keys():
+            expected = "expected stop = 60.0, step = 0.01, and a table [components.NAME] for each component"
+            raise ScenarioError(f"{where} holds no scenario; {expected}.") from error
+        items = [dict(item) for item in error.errors() if not _of_another_form(dict(item))]
+        misplaced = {item["loc"][-1] for item in items if _is_misplaced(item)}
+        lines = [_explain(item) for item in items if (item["type"], item["loc"][-1:]) not in _missing(misplaced)]
         raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+
+
+_REQUIRED = frozenset({"stop", "step"})
+
+
+def _missing(keys: Iterable[str]) -> set[tuple[str, tuple[str, ...]]]:
+    """Kind and place of the errors that keys of the whole scenario are missing."""
+    return {("missing", (key,)) for key in keys}
+
+
+def _is_misplaced(item: dict[str, Any]) -> bool:
+    """Whether a key of the whole scenario stands in one of its tables, as it does below the head of one."""
+    return item["type"] == "extra_forbidden" and len(item["loc"]) > 1 and item["loc"][-1] in ScenarioTable.model_fields
 
 
 EXPECTED = {
@@ -183,18 +203,30 @@ def _of_another_form(item: dict[str, Any]) -> bool:
 
 def _explain(item: dict[str, Any]) -> str:
     place = _place(item["loc"])
-    message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
-        key = str(item["loc"][-1])
-        return f"{place}: unknown key; {nearest(key, _known_keys(item['loc']))}"
+        return f"{place}: unknown key; {_hint(item)}"
+    if item["type"] == "missing":
+        return f"{place}: is missing"
     given = item.get("input")
     if item["type"] == "value_error" or isinstance(given, dict):
-        return f"{place}: {message}"
+        return f"{place}: {str(item['msg']).removeprefix('Value error, ')}"
+    message = wrong_value(item)
     if item["loc"][-1:] == ("float",):
         message = "expected a number, or a list of numbers for a vector"
     key = str(item["loc"][2]) if item["loc"][:1] == ("components",) and len(item["loc"]) > 2 else ""
     message = EXPECTED.get(key, message)
     return f"{place}: {message} (got {json.dumps(given, default=str)})"
+
+
+def _hint(item: dict[str, Any]) -> str:
+    """Where a key belongs that is unknown where it stands."""
+    location, key = item["loc"], str(item["loc"][-1])
+    if _is_misplaced(item):
+        return f"{key} is a key of the whole scenario and stands above the first [table]"
+    hint = nearest(key, _known_keys(location))
+    if location[0] != "components" or len(location) != 3 or hint.startswith(f"did you mean '{key[:1]}"):
+        return hint
+    return f"a parameter of the model stands in [components.{location[1]}.parameters]"
 
 
 def _place(location: tuple[Any, ...]) -> str:

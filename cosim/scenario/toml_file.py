@@ -4,13 +4,13 @@ given.
 
 from __future__ import annotations
 
-import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
+from cosim.scenario.toml_mistakes import mistake
+
 _ARCHIVE = b"PK\x03\x04"
-_CONFLICT = re.compile(r"(<{7}|={7}|>{7})( |$)")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -35,7 +35,4 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        marked = next((n for n, line in enumerate(text.splitlines(), start=1) if _CONFLICT.match(line)), None)
-        if marked is not None:
-            raise ValueError(f"line {marked} begins the conflict of a merge; resolve it") from error
-        raise ValueError(str(error)) from error
+        raise ValueError(mistake(text, str(error))) from error

@@ -9,12 +9,14 @@ from typing import Any
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.fmu_report import describe_file, description_parts, problems_of
+from fmus.near_files import near_files
 
 OK, PROBLEMS = 0, 1
 
 GROUP = "FMUs"
 PLACE = 1
 HELP = "what an FMU says about itself, and whether it is valid"
+EXAMPLES = ("fmus info vendor.fmu",)
 PARSER: dict[str, Any] = {}
 ARGUMENTS = (argument("file", type=Path, metavar="FILE"),)
 
@@ -26,7 +28,7 @@ def execute(options: argparse.Namespace) -> Output:
         FileNotFoundError: there is no such file.
     """
     if not options.file.is_file():
-        raise FileNotFoundError(f"{options.file} does not exist; give the path of an FMU.")
+        raise FileNotFoundError(f"{options.file} does not exist; {near_files(options.file, '.fmu')}")
     data, problems = describe_file(options.file), problems_of(options.file)
     parts = [*description_parts(data), "\n".join(f"problem: {problem}" for problem in problems)]
     return Output(parts, data | {"problems": problems}, code=PROBLEMS if problems else OK)

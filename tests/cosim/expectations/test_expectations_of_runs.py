@@ -126,7 +126,7 @@ SCHEMA = [
     ({"max": 1.0}, "the key 'check'"),
     ({"check": "speed_error"}, "'max', 'rms' or both"),
     ({"check": "speed_error", "mx": 1.0}, "did you mean 'max'"),
-    ({"check": "speed_error", "max": -1.0}, "greater than or equal to 0"),
+    ({"check": "speed_error", "max": -1.0}, "expected at least 0"),
     ({"check": "speed_error", "max": 1.0, "from": 2.0, "to": 1.0}, "must lie behind"),
     ({"check": "signal", "signal": "a.b"}, "'min', 'max' or 'final'"),
     ({"check": "signal", "signal": "a.b", "min": 2.0, "max": 1.0}, "lies above"),

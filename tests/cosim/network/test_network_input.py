@@ -27,7 +27,7 @@ SETTINGS = NetworkSettings((Node("a", ("x.y",)),), period=0.02)
         ({"nodes": {"a": ["source.sine", "source.sine"]}}, "owned twice by 'a'"),
         ({"nodes": {"a": ["source.sine"]}}, "no node of the network owns source.ramp_value"),
         ({"nodes": {**NODES, "x": ["source.speed"]}}, "source: no variable 'speed'"),
-        ({"period": 0.0}, "network.period: Input should be greater than 0"),
+        ({"period": 0.0}, "network.period: expected more than 0"),
         ({"period": None}, "either 'period'"),
         ({"period": 0.02, "cycle": 0.02}, "either 'period'"),
         ({"period": 1e-9}, "is too short"),

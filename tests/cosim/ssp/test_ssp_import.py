@@ -397,6 +397,6 @@ def test_times_come_from_the_structure_or_else_from_the_fmus(load: Load, tmp_pat
 
     table = one('<DefaultExperiment stopTime="1.0" stepSize="0.3"/>').table()
     assert (table.stop, table.step) == (1.0, 0.25)  # the longest that divides the run and is not longer
-    with pytest.raises(ValueError, match=r"stop: Field required"):
+    with pytest.raises(ValueError, match=r"stop: is missing"):
         one("").table()
     assert one("").set("stop", 2.0).set("step", 0.5).table().step == 0.5

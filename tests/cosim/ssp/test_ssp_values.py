@@ -137,7 +137,7 @@ def structure(folder: Path, tail: str, unit: str = "m/s") -> Path:
 def test_a_run_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], stop: str) -> None:
     path = structure(tmp_path, f'{UNITS}<ssd:DefaultExperiment startTime="0" stopTime="{stop}"/>')
     assert main(["show", str(path)]) == 2
-    assert "stop: Input should be a finite number" in capsys.readouterr().err
+    assert "stop: expected a finite number" in capsys.readouterr().err
 
 
 @pytest.mark.compiler

@@ -1,0 +1,79 @@
+"""What was expected in place of a value that a table refuses, in plain words, with what is likely meant."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from cosim.errors import nearest
+from plant_models.hybrid.units import UnitError, parse_unit
+
+_COMMA = re.compile(r"\s*([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)\s*")
+_WITH_UNIT = re.compile(r"\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*([A-Za-zµ°%][\w/.°%]*)\s*")
+_CHOICE = re.compile(r"'([^']*)'")
+_NUMBER = "expected a number"
+_KINDS = {
+    "float_parsing": _NUMBER,
+    "float_type": _NUMBER,
+    "int_parsing": "expected a whole number",
+    "int_type": "expected a whole number",
+    "int_from_float": "expected a whole number",
+    "bool_parsing": "expected true or false",
+    "bool_type": "expected true or false",
+    "finite_number": "expected a finite number",
+    "string_type": "expected a text, in quotation marks",
+    "list_type": "expected a list, as in [1, 2]",
+    "dict_type": "expected a table",
+    "model_type": "expected a table",
+    "missing": "is missing",
+}
+"""By the kinds of errors of pydantic."""
+_BOUNDS: Mapping[str, tuple[str, str]] = {
+    "greater_than": ("gt", "expected more than {:g}"),
+    "greater_than_equal": ("ge", "expected at least {:g}"),
+    "less_than": ("lt", "expected less than {:g}"),
+    "less_than_equal": ("le", "expected at most {:g}"),
+}
+
+
+def wrong_value(item: Mapping[str, Any]) -> str:
+    """What was expected.
+
+    Args:
+        item: an error of pydantic, of a value that has another kind or lies out of its range.
+
+    Returns:
+        A part of a sentence, without the place and without the value that was given.
+    """
+    kind, given, context = str(item["type"]), item.get("input"), item.get("ctx", {})
+    if kind == "literal_error":
+        choices = _CHOICE.findall(str(context.get("expected", "")))
+        hint = nearest(given, choices) if isinstance(given, str) else ""
+        return f"expected {context['expected']}" + (f"; {hint}" if hint.startswith("did you mean") else "")
+    if kind in _BOUNDS:
+        key, text = _BOUNDS[kind]
+        return text.format(context[key])
+    expected = _KINDS.get(kind, str(item["msg"]))
+    return expected + (_meant(given) if _NUMBER in expected and isinstance(given, str) else "")
+
+
+def _meant(given: str) -> str:
+    """What a text that stands in place of a number may mean."""
+    for form, meant in ((_COMMA, _with_point), (_WITH_UNIT, _without_unit)):
+        found = form.fullmatch(given)
+        if found is not None:
+            return meant(*found.groups())
+    return ""
+
+
+def _with_point(whole: str, part: str) -> str:
+    return f"; write a point in place of the comma: {whole}.{part}"
+
+
+def _without_unit(value: str, unit: str) -> str:
+    try:
+        meaning = parse_unit(unit.replace("km/h", "km.h-1"))
+    except UnitError:
+        return " without a unit, in SI units"
+    return f" without its unit, in SI units: {float(value) * meaning.factor + meaning.offset:g}"

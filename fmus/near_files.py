@@ -1,0 +1,32 @@
+"""Files that may be meant by a path that leads nowhere. Standard library only."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+
+_ALIKE = 0.65
+_MOST = 3
+
+
+def near_files(path: Path, *endings: str) -> str:
+    """A hint with the names of files nearest to one that does not exist.
+
+    Args:
+        path: that leads nowhere. endings: of names that can be meant, such as ``.toml``; none for any.
+
+    Returns:
+        The end of a sentence: the nearest names, or what there is, or that there is no folder.
+    """
+    if any(ord(c) < 32 for c in str(path)):
+        return "in its name \\ was read as the begin of a control character; write / or single quotation marks."
+    folder = path.parent
+    if not folder.is_dir():
+        return f"there is no folder {folder}."
+    names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
+    fitting = [name for name in names if not endings or name.lower().endswith(endings)]
+    near = get_close_matches(path.name, fitting, _MOST, _ALIKE)
+    if near:
+        return f"did you mean {', '.join(repr(str(folder / name)) for name in near)}?"
+    shown = ", ".join(fitting[:8]) + (", ..." if len(fitting) > 8 else "")
+    return f"in that folder there is: {shown}." if fitting else f"that folder has no {' or '.join(endings) or 'file'}."
