@@ -50,6 +50,7 @@ class CatalogueEntry:
     Args:
         name: of the model. room: where it lives, in words. description, source: as the model says.
         presets: their names. preset: the default one, or None. options: that shape its equations.
+        inputs: that have to be connected, but those of events. events: that reach it from outside.
     """
 
     name: str
@@ -59,6 +60,14 @@ class CatalogueEntry:
     presets: tuple[str, ...]
     preset: str | None
     options: tuple[Option, ...]
+    inputs: tuple[str, ...]
+    events: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """All its words, in small letters, for those who search."""
+        words = (self.name, self.description, self.source, *self.presets, *self.inputs, *self.events)
+        return " ".join([*words, *(option.name for option in self.options)]).lower()
 
 
 def catalogue() -> dict[str, CatalogueEntry]:
@@ -96,12 +105,13 @@ def _entry_of_others(registry: Registry[Any], name: str) -> CatalogueEntry:
         return _entry(_read([name])[0])
     except Exception as error:  # whatever the code of others raises
         reason = str(error) if isinstance(error, RegistryError) else f"{registry.origin(name)}: {explained(error)}"
-        return CatalogueEntry(name, _UNUSABLE, " ".join(reason.split()), "", (), None, ())
+        return CatalogueEntry(name, _UNUSABLE, " ".join(reason.split()), "", (), None, (), (), ())
 
 
 def _entry(data: dict[str, Any]) -> CatalogueEntry:
     options = tuple(Option(**option) for option in data["options"])
-    return CatalogueEntry(**data | {"presets": tuple(data["presets"]), "options": options})
+    lists = {key: tuple(data[key]) for key in ("presets", "inputs", "events")}
+    return CatalogueEntry(**data | lists | {"options": options})
 
 
 def _key(names: list[str]) -> str:

@@ -94,7 +94,7 @@ def recipe_entry(name: str) -> dict[str, Any]:
         name: model name, one of `RECIPES`.
     """
     cls = RECIPES[name]
-    presets, chosen = _recipe_presets(name)
+    model = _as_declared(cls)
     options = [
         {
             "name": option,
@@ -105,7 +105,14 @@ def recipe_entry(name: str) -> dict[str, Any]:
         for option, default in _recipe_options(name).items()
     ]
     said = {"name": name, "room": _room(name), "description": cls.description, "source": cls.source}
-    return said | {"presets": presets, "preset": chosen, "options": options}
+    payload = {signal.name for event in model.triggered_events for signal in event.payload}
+    return said | {
+        "presets": list(model.presets),
+        "preset": model.default_preset,
+        "options": options,
+        "inputs": [s.name for s in model.inputs if not s.optional and s.name not in payload],
+        "events": [event.name for event in model.triggered_events],
+    }
 
 
 def _room(name: str) -> str:
@@ -116,14 +123,12 @@ def _room(name: str) -> str:
     return words[0].upper() + words[1:]
 
 
-def _recipe_presets(name: str) -> tuple[list[str], str | None]:
-    """Presets of a model with its default options, and the default preset."""
-    cls = RECIPES[name]
+def _as_declared(cls: type[HybridSystem]) -> Any:
+    """A model with its default options, on which presets and signals may depend; its class where it has none."""
     required = (
         p.default is Parameter.empty and p.kind is not Parameter.VAR_KEYWORD for p in signature(cls).parameters.values()
     )
-    made = cls if any(required) else cls()  # presets may depend on the options
-    return list(made.presets), made.default_preset
+    return cls if any(required) else cls()
 
 
 def _nearest(name: str, known: Mapping[str, Any]) -> str:

@@ -1,57 +1,152 @@
-"""``cosim list``: scenarios, plants and observers that ship, with their sources; or the variants in an SSP file."""
+"""``cosim list``: observers to begin with; scenarios, plants and observers that ship, hold a word or fit an FMU or a
+scenario; or the variants in an SSP file.
+"""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 from cosim import ssp
+from cosim.errors import ScenarioError
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
 from fmu_observer import OBSERVERS
-from fmus.catalogue import catalogue
+from fmu_observer.recommended import RECOMMENDED
+from fmus.catalogue import CatalogueEntry, catalogue
 from fmus.cli.commands import argument
 from fmus.cli.list_command import COLUMNS, model_data, model_tables
 from fmus.cli.output import Output
 from fmus.tables.table import Table, pairs_table
 from plant_models import PLANTS
 
-KINDS = ("scenarios", "models", "observers", "all")
-
-
-def _what(text: str) -> str:
-    if text not in KINDS and not is_package(text):
-        raise argparse.ArgumentTypeError(f"choose from {', '.join(KINDS)}, or give an .ssp file (got {text!r})")
-    return text
-
+KINDS = ("scenarios", "models", "observers")
+ALL = "all"
 
 GROUP = "Models and files"
 PLACE = 1
-HELP = "list scenarios, plants and observers"
-PARSER = {"description": "Scenarios, plants and observers with their sources."}
-ARGUMENTS = (argument("what", nargs="?", type=_what, default="all", help=f"{', '.join(KINDS)}, or an .ssp file"),)
+HELP = "list scenarios, plants and observers; those that hold a word; those that fit an FMU"
+EXAMPLES = (
+    "cosim list",
+    "cosim list observers",
+    "cosim list balise",
+    "cosim list models wheel --all",
+    "cosim list --for vendor.fmu",
+)
+PARSER = {
+    "description": "Observers to begin with; or scenarios, plants and observers, all or those that hold the words.",
+    "epilog": "Exit codes: 0 done, 2 nothing holds the words.",
+}
+ARGUMENTS = (
+    argument(
+        "words",
+        nargs="*",
+        metavar="WHAT",
+        help=f"{', '.join((*KINDS, ALL))}, words to search for, or an .ssp file for its variants",
+    ),
+    argument("--all", action="store_true", help="all of them, with sources, presets and options"),
+    argument(
+        "--for",
+        dest="target",
+        metavar="FILE",
+        type=Path,
+        help="observers whose inputs this FMU (.fmu) or scenario (.toml, .ssp) can give",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What is listed.
+
+    Args:
+        scenarios: title and source by name. models, observers: of the catalogue.
+    """
+
+    scenarios: Mapping[str, Mapping[str, str]]
+    models: Sequence[CatalogueEntry]
+    observers: Sequence[CatalogueEntry]
+
+    def data(self, kinds: Sequence[str]) -> dict[str, Any]:
+        """All that is known of them, by kind."""
+        data = {"scenarios": dict(self.scenarios), "models": model_data(self.models)}
+        data["observers"] = model_data(self.observers)
+        return {kind: data[kind] for kind in kinds}
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """The lists that the options ask for."""
-    if is_package(options.what):
-        variants = ssp.list_variants(options.what)
+    """The lists that the options ask for.
+
+    Raises:
+        ScenarioError: nothing holds the words.
+    """
+    if options.target is not None:
+        from cosim.cli.fitting_observers import fitting_output  # noqa: PLC0415 - it reads FMUs and scenarios
+
+        return fitting_output(options.target, catalogue())
+    if options.words and is_package(options.words[0]):
+        variants = ssp.list_variants(options.words[0])
         return Output(["variants:", pairs_table("variants", variants)], {"variants": variants})
-    parts: list[Table | str] = []
-    data: dict[str, Any] = {}
-    if options.what in ("scenarios", "all"):
-        data["scenarios"] = scenarios = {name: _scenario(name) for name in shipped_scenarios()}
-        rows = [[name, "\n".join([s["description"], f"[{s['source']}]"])] for name, s in scenarios.items()]
-        parts += ["scenarios:", Table("scenarios", COLUMNS, rows)]
+    kinds = [kind for kind in KINDS if kind in options.words] or list(KINDS)
+    words = [word.lower() for word in options.words if word not in (*KINDS, ALL)]
+    found = _found(kinds, words)
+    brief = not options.all and ALL not in options.words
+    if brief and not words and "observers" in kinds:
+        return _first_screen(found, kinds)
+    return Output(_parts(found, brief=brief), found.data(kinds))
+
+
+def _found(kinds: Sequence[str], words: Sequence[str]) -> _Found:
+    """What holds all the words, of these kinds."""
     known = catalogue()
-    for kind, registry in (("models", PLANTS), ("observers", OBSERVERS)):
-        if options.what in (kind, "all"):
-            entries = [known[name] for name in registry]
-            parts += [f"{kind}:", *model_tables(kind, entries)]
-            data[kind] = model_data(entries)
-    return Output(parts, data)
+    scenarios = {name: _scenario(name) for name in (shipped_scenarios() if "scenarios" in kinds else ())}
+    entries = {
+        kind: [known[name] for name in registry if kind in kinds and _holds(known[name].text, words)]
+        for kind, registry in (("models", PLANTS), ("observers", OBSERVERS))
+    }
+    fitting = {n: s for n, s in scenarios.items() if _holds(" ".join([n, *s.values()]).lower(), words)}
+    if words and not (fitting or entries["models"] or entries["observers"]):
+        near = get_close_matches(words[0], [*KINDS, *known, *scenarios], 3, 0.65)
+        hint = f"did you mean {', '.join(map(repr, near))}?" if near else "'cosim list --all' lists everything."
+        raise ScenarioError(f"Nothing that ships holds {' and '.join(map(repr, words))}; {hint}")
+    return _Found(fitting, entries["models"], entries["observers"])
 
 
-def _scenario(name: str) -> dict[str, Any]:
+def _holds(text: str, words: Sequence[str]) -> bool:
+    return all(word in text for word in words)
+
+
+def _scenario(name: str) -> dict[str, str]:
     tables = shipped_tables(name)
     return {"description": tables.get("title", ""), "source": tables.get("source", "")}
+
+
+def _first_screen(found: _Found, kinds: Sequence[str]) -> Output:
+    """The observers to begin with, and how to see the others."""
+    others = len(found.observers) - len(RECOMMENDED)
+    more = [f"{others} more: cosim list observers --all. What fits your train: cosim list --for vendor.fmu."]
+    if len(kinds) == len(KINDS):
+        more += [
+            f"{len(found.scenarios)} scenarios: cosim list scenarios. {len(found.models)} plants and sensors: cosim "
+            "list models. By a word: cosim list balise."
+        ]
+    table = Table("recommended", COLUMNS, list(RECOMMENDED.items()))
+    parts = ["observers to begin with:", table, "\n".join(more)]
+    return Output(parts, {"recommended": dict(RECOMMENDED)} | found.data(kinds))
+
+
+def _parts(found: _Found, *, brief: bool) -> list[Table | str]:
+    """Tables of what was found, a line each where they are brief."""
+    rows = [
+        [name, s["description"] if brief else f"{s['description']}\n[{s['source']}]"]
+        for name, s in found.scenarios.items()
+    ]
+    parts: list[Table | str] = ["scenarios:", Table("scenarios", COLUMNS, rows)] if rows else []
+    for kind, entries in (("models", found.models), ("observers", found.observers)):
+        if entries:
+            parts += [f"{kind}:", *model_tables(kind, entries, brief=brief)]
+    return parts

@@ -13,6 +13,10 @@ from fmus.tables.table import Table, name_column, text_column
 GROUP = "Models"
 PLACE = 1
 HELP = "models that can be exported, with their presets and options"
+EXAMPLES = (
+    "fmus list",
+    "fmus list --json",
+)
 PARSER: dict[str, Any] = {}
 ARGUMENTS = ()
 COLUMNS = (name_column("name"), text_column("description"))
@@ -24,14 +28,23 @@ def execute(_options: argparse.Namespace) -> Output:
     return Output(model_tables("models", entries), {"models": model_data(entries)})
 
 
-def model_tables(key: str, entries: Iterable[CatalogueEntry]) -> list[Table]:
+def summary(entry: CatalogueEntry) -> str:
+    """What a model is, in one line.
+
+    Args:
+        entry: of the catalogue.
+    """
+    return " ".join(entry.description.split())
+
+
+def model_tables(key: str, entries: Iterable[CatalogueEntry], *, brief: bool = False) -> list[Table]:
     """Models with their descriptions, sources, presets and options, a table for each room that they live in.
 
     Args:
-        key: of the tables in data. entries: of the catalogue.
+        key: in data. entries: of the catalogue. brief: whether descriptions alone are shown.
     """
     return [
-        Table(key, COLUMNS, [[entry.name, _described(entry)] for entry in members], title=f"# {room}")
+        Table(key, COLUMNS, [[e.name, summary(e) if brief else _described(e)] for e in members], title=f"# {room}")
         for room, members in by_room(entries).items()
     ]
 
@@ -44,11 +57,13 @@ def model_data(entries: Iterable[CatalogueEntry]) -> dict[str, dict[str, Any]]:
     """
     return {
         entry.name: {
-            "description": " ".join(entry.description.split()),
+            "description": summary(entry),
             "room": entry.room,
             "source": entry.source,
             "presets": list(entry.presets),
             "preset": entry.preset,
+            "inputs": list(entry.inputs),
+            "events": list(entry.events),
             "options": {o.name: {"default": o.default, "choices": _choices(o)} for o in _settable(entry)},
         }
         for entry in entries
@@ -57,7 +72,7 @@ def model_data(entries: Iterable[CatalogueEntry]) -> dict[str, dict[str, Any]]:
 
 def _described(entry: CatalogueEntry) -> str:
     """Description, source, presets and options, a line each."""
-    lines = [" ".join(entry.description.split()), *([f"[{entry.source}]"] if entry.source else [])]
+    lines = [summary(entry), *([f"[{entry.source}]"] if entry.source else [])]
     if entry.presets:
         default = f" (default {entry.preset})" if entry.preset else ""
         lines.append(f"presets: {', '.join(entry.presets)}{default}")

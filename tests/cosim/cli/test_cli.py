@@ -18,6 +18,8 @@ from cosim.cli import main
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import RunError
 from cosim.results.results_folder import read_results
+from fmu_observer import OBSERVERS
+from fmu_observer.recommended import RECOMMENDED
 
 
 @pytest.fixture
@@ -100,14 +102,61 @@ def test_list_names_everything_with_its_source(capsys: pytest.CaptureFixture[str
     assert observers <= set(data["observers"])
     for name, observer in data["observers"].items():
         assert observer["source"].strip(), name
-    assert main(["list", "observers"]) == 0
+    assert main(["list", "observers", "--all"]) == 0
     printed = capsys.readouterr().out
     assert "as_published" in printed
     assert "scenarios:" not in printed
 
 
+def test_list_begins_with_what_is_recommended(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "choosing_an_observer.md").read_text(encoding="utf-8")
+    assert len(RECOMMENDED) == 5
+    for name in RECOMMENDED:
+        assert name in OBSERVERS
+        assert f"`{name}`" in page
+    for line in (["list"], ["list", "observers"]):
+        assert main(line) == 0
+        printed = capsys.readouterr().out
+        assert [name for name in RECOMMENDED if name in printed] == list(RECOMMENDED)
+        assert len(printed.splitlines()) < 15
+        assert "cosim list observers --all" in printed
+
+
+def test_list_finds_what_holds_all_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "Balise", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert {"balise_reader"} == set(data["models"])
+    assert {"amsterdam_utrecht", "worn_wheel"} <= set(data["scenarios"])
+    assert set(RECOMMENDED) <= set(data["observers"])  # not by their words, but by their events
+    assert main(["list", "observers", "balise", "covariance", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) == {"observers"}
+    assert main(["list", "locomotve"]) == 2
+    assert "Nothing that ships holds 'locomotve'; did you mean 'locomotive'?" in capsys.readouterr().err
+
+
+def test_list_for_a_scenario_names_observers_whose_inputs_it_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fitting(scenario: Scenario) -> dict[str, Any]:
+        assert main(["list", "--for", str(scenario.save(tmp_path / "own.toml")), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    whole = fitting(small())
+    assert whole["observers"][:5] == list(RECOMMENDED)
+    assert "nothing gives its inputs" in whole["misfits"]["thau"]
+    assert len(whole["observers"]) + len(whole["misfits"]) == len(OBSERVERS)
+    coasting = Scenario(stop=1.0, step=0.1).add("train", model="longitudinal_train").add("odometer", model="odometer")
+    coasting.add("observer", observer="odometer_reset")
+    coasting.connect("train.wheel_speed -> odometer.wheel_speed", "odometer.reading -> observer.odometer")
+    without = fitting(coasting)
+    assert "odometer_reset" in without["misfits"]  # there are no balises
+    assert without["misfits"]["quasi_lpv_uio"] == "nothing gives its input effort"
+    coasting.balises(layout="spacing", spacing=10.0, track_end=90.0, position="train.position", speed="train.speed")
+    assert [name for name in RECOMMENDED if name in fitting(coasting)["observers"]] == ["odometer_reset"]
+
+
 def test_list_groups_by_room_and_shows_what_options_may_be(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list"]) == 0
+    assert main(["list", "--all"]) == 0
     lines = capsys.readouterr().out.splitlines()
     room = next(i for i, line in enumerate(lines) if line.startswith("# What drives"))
     names = [line.split()[0] for line in lines[room + 1 :] if line[:1].isalpha()]
