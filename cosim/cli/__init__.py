@@ -21,6 +21,17 @@ PROGRAM = CommandProgram(
     "Co-simulate train observers with train plant FMUs, balise events exact.",
     __name__,
     ("Run", "Study", "Compare", "Observers", "Models and files"),
+    (
+        ("See a train and observers run", "cosim run freight_profile_d"),
+        ("Put your FMU beside an observer", "cosim new vendor.fmu\ncosim run vendor.toml"),
+        ("Find the observer that fits", "cosim benchmark-observers vendor.toml"),
+        (
+            "Check a new delivery of an FMU",
+            "cosim baseline make vendor.toml vendor.json\ncosim baseline check vendor.json",
+        ),
+        ("Take an observer away as an FMU", "fmus build quasi_lpv_uio"),
+    ),
+    {".toml": "run", ".ssp": "run", ".fmu": "new"},
     (CosimError,),
     ends_like_ctrl_c,
     lambda error, _: str(error),

@@ -286,6 +286,16 @@ def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument
 GROUP = "Compare"
 PLACE = 3
 HELP = "make, check and update baselines"
+EXAMPLES = (
+    "cosim baseline make vendor.toml vendor.json",
+    "cosim baseline make vendor.fmu vendor.json --stop 60 --step 0.01",
+    "cosim baseline check vendor.json",
+    "cosim baseline check vendor.json --against new/vendor.fmu",
+    "cosim baseline show vendor.json",
+    "cosim baseline update vendor.json",
+    "cosim baseline embed vendor.json vendor.fmu -o vendor_with_reference.fmu",
+    "cosim baseline extract vendor_with_reference.fmu vendor.json",
+)
 PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
 ARGUMENTS = (
     Actions(

@@ -26,6 +26,7 @@ def _names(text: str) -> list[str]:
 GROUP = "Observers"
 PLACE = 1
 HELP = "compare observers on one recorded run"
+EXAMPLES = ("cosim benchmark-observers vendor.toml",)
 PARSER = {
     "description": (
         "Run the plant side of a scenario once, play it back to several observers, each alone, and compare errors,"

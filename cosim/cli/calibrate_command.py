@@ -41,6 +41,10 @@ FORMER = {
     "effort=N_OR_NAME for --effort, --set mass=KG for --mass, --set minimum_speed=M_S and --set resolution=M_S2 for "
     "these options, and of an FMU --drive NAME=VALUE for --input NAME and --set"
 }
+EXAMPLES = (
+    "cosim calibrate vendor.fmu measured.csv --parameters mass=80e3",
+    "cosim calibrate running_resistance measured.csv --set mass=80e3",
+)
 PARSER = {
     "description": (
         "Fit parameters of an FMU, a train model of the package or a scenario to a recording by least squares, with "

@@ -30,6 +30,10 @@ GROUP = "Observers"
 PLACE = 2
 HELP = "gaps, delays and errors for which observers are certified"
 FORMER = {"bound": "cosim certify OBSERVER --error M_S --missing N", "limits": "cosim certify OBSERVER"}
+EXAMPLES = (
+    "cosim certify takagi_sugeno_cdo",
+    "cosim certify vendor.toml",
+)
 PARSER = {
     "description": (
         "What holds for an observer with its gains: how long gaps between samples and delays may be, as printed, "

@@ -39,6 +39,10 @@ KINDS = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
 GROUP = "Compare"
 PLACE = 1
 HELP = "compare a result with a reference"
+EXAMPLES = (
+    "cosim compare results/old results/new",
+    "cosim compare baseline.json results/new --html difference.html",
+)
 PARSER = {
     "description": "Compare a result with a reference: signals in tolerance tubes, telegrams as events.",
     "epilog": EPILOG,

@@ -21,6 +21,10 @@ GROUP = "Models and files"
 PLACE = 4
 HELP = "write a scenario as SSP, a result in another format, the trajectory behind a recording"
 FORMER = {"convert": "cosim export SOURCE TARGET", "reference": "cosim export SOURCE TARGET --trajectory"}
+EXAMPLES = (
+    "cosim export vendor.toml vendor.ssp",
+    "cosim export results/vendor vendor.mat",
+)
 PARSER = {
     "description": (
         "Write for other tools. TARGET.ssp: SOURCE is a scenario, written as a system structure package. Any other "

@@ -20,6 +20,10 @@ from plant_models.user_file import names_a_file, names_code
 GROUP = "Models and files"
 PLACE = 2
 HELP = "describe an FMU, an SSP file, a plant or an observer"
+EXAMPLES = (
+    "cosim info vendor.fmu",
+    "cosim info quasi_lpv_uio",
+)
 PARSER = {
     "description": (
         "Interfaces, platforms and variables of an FMU; the systems, components and connections in an SSP; or what"

@@ -26,6 +26,10 @@ from plant_models.user_file import names_code
 GROUP = "Models and files"
 PLACE = 5
 HELP = "linearise an FMU or a model at a point"
+EXAMPLES = (
+    "cosim linearise locomotive",
+    "cosim linearise vendor.fmu",
+)
 PARSER = {
     "description": (
         "Linearise an FMU, a plant or an observer at a point. Model exchange and models of ours give matrices of "

@@ -13,6 +13,10 @@ from fmus.cli.output import Output
 GROUP = "Models and files"
 PLACE = 3
 HELP = "write a starter scenario for an FMU"
+EXAMPLES = (
+    "cosim new vendor.fmu",
+    "cosim new vendor.fmu --observer quasi_lpv_uio -o trial.toml",
+)
 PARSER = {
     "description": (
         "Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position, "

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import OutputError
+from fmus.cli.colour import coloured
 from fmus.plain import plain
 
 
@@ -25,7 +26,7 @@ def print_warning(text: str) -> None:
     Args:
         text: of the warning.
     """
-    print_notice(f"warning: {plain(text)}")
+    print_notice(f"{coloured('warning:', 'doubtful', sys.stderr)} {plain(text)}")
 
 
 def ignore(_text: str) -> None:

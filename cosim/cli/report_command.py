@@ -26,6 +26,10 @@ MOST_SIGNALS = 16  # figures on a page
 GROUP = "Compare"
 PLACE = 2
 HELP = "report of results, or of several laid over each other"
+EXAMPLES = (
+    "cosim report results/vendor",
+    "cosim report results/dry results/wet",
+)
 PARSER = {
     "description": (
         "Make the report of a results folder again, or lay several results over each other on one page: the first "

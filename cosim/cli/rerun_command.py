@@ -33,6 +33,10 @@ def _share(text: str) -> float:
 GROUP = "Run"
 PLACE = 3
 HELP = "run results again and compare"
+EXAMPLES = (
+    "cosim rerun results/vendor",
+    "cosim rerun results/vendor --set plant.mass=82e3",
+)
 PARSER = {"description": DESCRIPTION}
 ARGUMENTS = (
     argument("directory", metavar="DIR", help="a results folder"),

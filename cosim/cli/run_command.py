@@ -42,6 +42,12 @@ SEEDS = "seeds"
 GROUP = "Run"
 PLACE = 1
 HELP = "run a scenario"
+EXAMPLES = (
+    "cosim run freight_profile_d",
+    "cosim run vendor.toml --out results/today",
+    "cosim run vendor.toml --set plant.mass=82e3 --seed 7",
+    "cosim run vendor.toml --seeds 20 --workers 4",
+)
 PARSER = {
     "description": "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP).",
     "epilog": (

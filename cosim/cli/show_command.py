@@ -13,6 +13,10 @@ from fmus.cli.output import Output
 GROUP = "Run"
 PLACE = 2
 HELP = "show components, connections, order and loops"
+EXAMPLES = (
+    "cosim show vendor.toml",
+    "cosim show vendor.toml --picture vendor.svg",
+)
 PARSER = {"description": "Components, connections, order and loops, without a run."}
 ARGUMENTS = (
     *scenario_arguments(),

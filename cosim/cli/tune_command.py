@@ -38,6 +38,7 @@ def _seeds(text: str) -> list[int]:
 GROUP = "Study"
 PLACE = 2
 HELP = "search parameters for the smallest cost over several seeds"
+EXAMPLES = ("cosim tune vendor.toml --observer observer --parameters theta=0.5:5:log",)
 PARSER = {
     "description": (
         "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and judge "

@@ -18,6 +18,13 @@ PROGRAM = CommandProgram(
     "Export train models and observers as FMUs, and check FMUs.",
     __name__,
     ("Models", "FMUs"),
+    (
+        ("Find a model or an observer", "fmus list"),
+        ("Export it as an FMU", "fmus build quasi_lpv_uio"),
+        ("See what an FMU declares", "fmus info vendor.fmu"),
+        ("See how far it can be trusted", "fmus check vendor.fmu"),
+    ),
+    {".fmu": "check"},
     EXPECTED,
     interruptible,
     in_words,

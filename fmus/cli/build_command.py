@@ -28,13 +28,6 @@ from plant_models.user_file import load_class, make, names_a_file, names_code
 
 Version = Literal[2, 3]
 VERSIONS: dict[str, tuple[Version, ...]] = {"2": (2,), "3": (3,), "both": (2, 3)}
-EPILOG = """\
-examples:
-  fmus build takagi_sugeno_cdo --fmi 3 --platform all -o out/
-  fmus build locomotive odometer driver --fmi both -o out/
-  fmus build my_model.py:Trolley --platform host,x86_64-windows
-  fmus build my_model.py:Classifier --hosted
-"""
 
 
 @dataclass(frozen=True)
@@ -49,7 +42,14 @@ class _BuildJob:
 GROUP = "Models"
 PLACE = 2
 HELP = "export models as native FMUs"
-PARSER = {"epilog": EPILOG, "formatter_class": argparse.RawDescriptionHelpFormatter}
+EXAMPLES = (
+    "fmus build quasi_lpv_uio",
+    "fmus build takagi_sugeno_cdo --fmi 3 --platform all -o out/",
+    "fmus build locomotive odometer driver --fmi both -o out/",
+    "fmus build my_model.py:Trolley --platform host,x86_64-windows",
+    "fmus build my_model.py:Classifier --hosted",
+)
+PARSER: dict[str, Any] = {}
 ARGUMENTS = (
     argument("names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName"),
     argument("--all", action="store_true", help="all models that 'fmus list' shows"),

@@ -33,6 +33,7 @@ _COLUMNS = (name_column("check"), name_column("verdict"), text_column("detail"))
 GROUP = "FMUs"
 PLACE = 2
 HELP = "how far an FMU can be trusted: validity and behaviour"
+EXAMPLES = ("fmus check vendor.fmu",)
 PARSER: dict[str, Any] = {}
 ARGUMENTS = (
     argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0"),

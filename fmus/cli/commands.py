@@ -3,8 +3,8 @@ it. Only the file of the command in use is loaded.
 
 Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `PLACE`, its
 number there in order of use, `HELP`, one line, and where there are any `FORMER`, old spellings with what is typed now;
-then ``PARSER``, the keywords of its parser, ``ARGUMENTS``, what the parser takes, and a function ``execute`` unless it
-consists of `Actions`.
+then ``EXAMPLES``, lines as they are typed, ``PARSER``, the keywords of its parser, ``ARGUMENTS``, what the parser
+takes, and a function ``execute`` unless it consists of `Actions`.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from pathlib import Path
 from typing import Any
 
 from fmus.cli.output import Output
+from fmus.cli.parsers import MISTAKE, Parser, print_error
 from fmus.cli.signals import BROKEN_PIPE, forget_output
-from fmus.plain import plain
-from fmus.tables.table import Table, name_column, text_column
+from fmus.tables.table import Table, joined, name_column, text_column
 from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
 
 Execute = Callable[[argparse.Namespace], Output]
 """Runs a command with its options."""
 _ENDING = "_command.py"
-_FAILED = 2
+_DONE = 0
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,9 @@ class Actions:
         """Add them to the parser of the command."""
         subparsers = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
         for action in self.actions:
-            _fill(subparsers.add_parser(action.name, **action.parser), action.arguments, action.execute)
+            below = subparsers.add_parser(action.name, **action.parser)
+            below.examples = [line for line in parser.examples if line.startswith(f"{below.prog} ")]
+            _fill(below, action.arguments, action.execute)
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,9 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
     Args:
         subparsers: of the program. name: of the command. module: its file.
     """
-    _fill(subparsers.add_parser(name, **module.PARSER), module.ARGUMENTS, getattr(module, "execute", None))
+    parser = subparsers.add_parser(name, **module.PARSER)
+    parser.examples = module.EXAMPLES
+    _fill(parser, module.ARGUMENTS, getattr(module, "execute", None))
 
 
 def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None) -> None:
@@ -162,7 +166,9 @@ class CommandProgram:
 
     Args:
         name: of the program. description: one line. package: the room of the commands' files.
-        groups: of commands, in the order of the help. expected: errors that are for the user.
+        groups: of commands, in the order of the help. tasks: what users come for, each with what they type: shown
+            where nothing was typed. files: what is done with a file, by its ending, where no command was typed.
+        expected: errors that are for the user.
         within: in what a command runs. in_words: what the user reads of an error and the options.
     """
 
@@ -170,6 +176,8 @@ class CommandProgram:
     description: str
     package: str
     groups: Sequence[str]
+    tasks: Sequence[tuple[str, str]]
+    files: Mapping[str, str]
     expected: tuple[type[BaseException], ...]
     within: Callable[[], AbstractContextManager[None]]
     in_words: Callable[[BaseException, argparse.Namespace], str]
@@ -183,6 +191,9 @@ class CommandProgram:
         Returns:
             The exit code: that of the command, 2 for an error or an interruption, 141 where nobody reads any more.
         """
+        if not words:
+            print(self.first_screen())
+            return _DONE
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
             self.parser(words).parse_args(words, options)
@@ -195,10 +206,17 @@ class CommandProgram:
             forget_output()
             return BROKEN_PIPE
         except self.expected as error:
-            print(f"{self.name}: {plain(self.in_words(error, options))}", file=sys.stderr)
+            print_error(self.name, self.in_words(error, options))
         except KeyboardInterrupt:
-            print(f"{self.name}: interrupted.", file=sys.stderr)
-        return _FAILED
+            print_error(self.name, "interrupted.")
+        return MISTAKE
+
+    def first_screen(self) -> str:
+        """What users come for, with the commands for it."""
+        columns = [name_column("task"), text_column("commands")]
+        tasks = Table("tasks", columns, [(f"  {task}", typed) for task, typed in self.tasks])
+        more = f"All commands: {self.name} --help. Of one of them: {self.name} COMMAND --help."
+        return joined([self.description, tasks, more], terminal_width())
 
     def parser(self, words: Sequence[str]) -> argparse.ArgumentParser:
         """The parser of the program; of the commands, only the one that is used is loaded.
@@ -206,8 +224,7 @@ class CommandProgram:
         Args:
             words: behind the name of the program.
         """
-        raw = argparse.RawDescriptionHelpFormatter
-        parser = argparse.ArgumentParser(prog=self.name, description=self.description, formatter_class=raw)
+        parser = Parser(prog=self.name, description=self.description, formatter_class=argparse.RawTextHelpFormatter)
         versions = "versions of the package and of what it runs on"
         parser.add_argument("--version", action=_Version, nargs=0, help=versions)
         how = f"one of those below; '{self.name} COMMAND --help' says what it takes"
@@ -219,7 +236,7 @@ class CommandProgram:
             return parser
         commands = find_commands(self.package)
         if used is not None:
-            parser.error(_unknown(used, commands))
+            parser.error(_unknown(used, commands, self))
         parser.epilog = "commands:\n\n" + _listed(commands, self.groups)
         return parser
 
@@ -246,8 +263,11 @@ def _declared(name: str, file: Path) -> Command:
     return Command(name, found["GROUP"], found["PLACE"], found["HELP"], found.get("FORMER", {}))
 
 
-def _unknown(name: str, commands: Sequence[Command]) -> str:
+def _unknown(name: str, commands: Sequence[Command], program: CommandProgram) -> str:
     """What a word is now that was a command, or what may be meant."""
+    command = program.files.get(Path(name).suffix.lower())
+    if command is not None:
+        return f"{name!r} is no command; did you mean '{program.name} {command} {name}'?"
     former = {old: now for command in commands for old, now in command.former.items()}
     if name in former:
         return f"{name!r} has become: {former[name]}"

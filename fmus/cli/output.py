@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fmus.cli.parsers import print_error
 from fmus.plain import plain
 from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Parts, Table, joined
@@ -63,7 +63,7 @@ class Output:
         if text:
             print(text)
         for failure in self.failures:
-            print(f"{program}: {plain(failure)}", file=sys.stderr)
+            print_error(program, failure)
         if self.error is not None:
             raise self.error
         return self.code

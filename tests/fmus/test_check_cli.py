@@ -103,4 +103,4 @@ def test_wrong_usage_ends_with_two(arguments: list[str], capsys: Output) -> None
     with pytest.raises(SystemExit) as stopped:
         main(arguments)
     assert stopped.value.code == 2
-    assert "usage: fmus check" in capsys.readouterr().err
+    assert "see 'fmus check --help'" in capsys.readouterr().err
