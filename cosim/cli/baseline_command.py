@@ -172,7 +172,7 @@ def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) ->
 
 def _drawn(output: Output, found: Sequence[Regression], folder: Path) -> Output:
     """The same with the pages; what was found is kept where one cannot be written."""
-    from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - matplotlib only for those who draw
+    from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - only for those who write
 
     files: dict[str, Path] = {}
     try:

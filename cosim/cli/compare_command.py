@@ -66,8 +66,10 @@ ARGUMENTS = (
     ),
     ArgumentGroup(
         (
-            argument("--html", metavar="FILE", help="write a page with pictures of the signals that differ"),
-            argument("--plots", metavar="DIR", help="write these pictures as PNG files"),
+            argument(
+                "--html", metavar="FILE", help="write a page to explore both sides, the tolerance and what differs"
+            ),
+            argument("--plots", metavar="DIR", help="draw the signals that differ as PNG files"),
             one_of(
                 argument("--quiet", action="store_true", help="print the verdict only"),
                 argument("--verbose", action="store_true", help="print all signals and everything that was found"),
@@ -141,16 +143,15 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
 
 def _drawn(found: Output, comparison: Comparison, options: argparse.Namespace) -> Output:
     """The same with page and pictures, as they were asked for; what was found is kept where one cannot be written."""
-    from cosim.report.page.comparison import (  # noqa: PLC0415 - matplotlib only for those who draw
+    from cosim.report.page.comparison import (  # noqa: PLC0415 - only for those who write
         draw_pictures,
         write_page,
         write_pictures,
     )
 
     try:
-        pictures = draw_pictures(comparison)
-        files = {"page": write_page(comparison, options.html, pictures)} if options.html else {}
-        drawn = write_pictures(pictures, options.plots) if options.plots else {}
+        files = {"page": write_page(comparison, options.html)} if options.html else {}
+        drawn = write_pictures(draw_pictures(comparison), options.plots) if options.plots else {}
     except OutputError as error:
         return replace(found, error=error)
     none = ["no pictures: nothing that differs can be drawn"] if options.plots and not drawn else []

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from cosim.errors import ComparisonError, nearest
 from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.report.overlay.overlaid_runs import make_runs
+from cosim.report.page.overlay import write_overlay_page
+from cosim.report.page.run_page import write_report, write_report_page
 from cosim.results.load_result import load_result
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from cosim.results.result import Result
 
 OVERLAY = "overlay.html"
-MOST_SIGNALS = 16  # figures on a page
+MOST_SIGNALS = 16  # panels that a page opens with
 
 GROUP = "Compare"
 PLACE = 2
@@ -48,6 +50,7 @@ ARGUMENTS = (
         metavar="PATTERN",
         help="for several runs: recorded signals to draw as well, e.g. 'train.*'; may be repeated",
     ),
+    argument("--figures", action="store_true", help="draw the figures as PNG files, too, in figures beside the page"),
 )
 
 
@@ -68,25 +71,22 @@ def execute(options: argparse.Namespace) -> Output:
 
 def _one(options: argparse.Namespace, path: Path, result: Result, spec: ReportSpec) -> Path:
     """The report of one run: beside its results, or where it is asked for."""
-    from cosim.report.page.run_page import write_report, write_report_page  # noqa: PLC0415 - matplotlib is loaded last
-
     if options.signals:
-        raise ComparisonError("--signals is for several runs; one run's report shows the signals that have a role.")
+        raise ComparisonError("--signals is for several runs; one run's page offers all of them.")
     if options.out is not None:
-        return write_report_page(result, spec, options.out)
+        return write_report_page(result, spec, options.out, figures=options.figures)
     if not path.is_dir():
         raise ComparisonError(f"{path} is no results folder: say with --out FILE.html where its report is to go.")
-    return write_report(result, spec, path)
+    return write_report(result, spec, path, figures=options.figures)
 
 
 def _several(
     options: argparse.Namespace, results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str]
 ) -> Path:
-    from cosim.report.page.overlay import write_overlay_page  # noqa: PLC0415 - matplotlib is loaded last
-
     names = list(dict.fromkeys(name for result in results for name in (result.table.dtype.names or ())[1:]))
     signals = _matching(options.signals, names)
-    return write_overlay_page(make_runs(results, specs, labels), options.out or OVERLAY, signals=signals)
+    runs = make_runs(results, specs, labels)
+    return write_overlay_page(runs, options.out or OVERLAY, signals, figures=options.figures)
 
 
 def _labels(text: str | None, paths: Sequence[Path]) -> list[str]:
@@ -118,7 +118,7 @@ def _matching(patterns: Sequence[str], names: Sequence[str]) -> list[str]:
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
     if len(chosen) > MOST_SIGNALS:
         raise ComparisonError(
-            f"--signals: {len(chosen)} signals match; a page holds {MOST_SIGNALS} figures. Choose some."
+            f"--signals: {len(chosen)} signals match; a page opens with {MOST_SIGNALS} of them. Choose some."
         )
     return chosen
 

@@ -74,6 +74,7 @@ ARGUMENTS = (
     ),
     *MANY_RUNS,
     argument("--no-report", action="store_true", help="write result files only"),
+    argument("--figures", action="store_true", help="draw the figures of the report as PNG files, too"),
     argument(
         "--strict", action="store_true", help="refuse an SSP of wrong form; exit with 1 when the run gave warnings"
     ),
@@ -112,7 +113,7 @@ def execute(options: argparse.Namespace) -> Output:
     if options.seeds and outcome.failure is None:
         study = _study(scenario, options, directory / SEEDS)
         outcome = outcome.with_summary(seed_study=study.to_data())
-        paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / SEEDS / "index.csv"}
+        paths = _written(outcome, directory, options) | {"seeds": directory / SEEDS / "index.csv"}
     return _output(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
 
 
@@ -127,9 +128,14 @@ class _Results:
     def write(self, outcome: Outcome) -> None:
         """Take the outcome and write it."""
         self.outcome = outcome.asked_by(self.options.command_line)
-        self.paths = self.outcome.write(self.directory, report=not self.options.no_report)
+        self.paths = _written(self.outcome, self.directory, self.options)
         LAST_CALL.note(json.dumps({"written": str(self.directory)}))
         shutil.rmtree(self.directory / SPARE, ignore_errors=True)
+
+
+def _written(outcome: Outcome, directory: Path, options: argparse.Namespace) -> dict[str, Path]:
+    """Write results and report, as the options ask; paths by kind."""
+    return outcome.write(directory, report=not options.no_report, figures=options.figures)
 
 
 def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, call_log: Path | None) -> None:

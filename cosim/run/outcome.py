@@ -87,12 +87,14 @@ class Outcome:
         """The same outcome, to say that this command line asked for it and no script."""
         return self if self.origin is None else replace(self, origin=replace(self.origin, command=command))
 
-    def write(self, directory: str | Path, *, report: bool = True, files_up_to: float = 50e6) -> dict[str, Path]:
+    def write(
+        self, directory: str | Path, *, report: bool = True, figures: bool = False, files_up_to: float = 50e6
+    ) -> dict[str, Path]:
         """Write result files, how they were made, and, where wanted, the report.
 
         Args:
             directory: the folder; results that an earlier run left there are replaced.
-            report: whether to write the page as well.
+            report: whether to write the page as well. figures: whether to draw its figures as PNG files, too.
             files_up_to: FMUs, recordings and other files of the scenario up to this size are copied to
                 ``made_from/files``; of larger ones path and hash are noted [bytes].
 
@@ -108,9 +110,9 @@ class Outcome:
         if self.origin is not None:
             paths["made_from"] = Path(directory) / "made_from" / "manifest.json"
         if report:
-            from cosim.report.page.run_page import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
+            from cosim.report.page.run_page import write_report  # noqa: PLC0415 - loaded only for a report
 
-            paths["report"] = write_report(self.result, self.spec, directory)
+            paths["report"] = write_report(self.result, self.spec, directory, figures=figures)
         else:
             remove_report(directory)
         return paths

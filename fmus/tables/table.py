@@ -5,7 +5,7 @@ on a page and as data. Standard library only.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from fmus.tables.numbers import error_number, number
@@ -88,7 +88,7 @@ class Table:
     Args:
         key: in data, where it stands beside others. columns: names first. rows: values in the order of the columns.
         title: above it in a terminal. notes: below it in a terminal.
-        bad: texts of cells that stand out on a page. links: addresses by texts of cells that lead there from a page.
+        bad: texts of cells that stand out on a page.
 
     Raises:
         ValueError: a row has more or fewer values than there are columns.
@@ -100,7 +100,6 @@ class Table:
     title: str = ""
     notes: Sequence[str] = ()
     bad: Container[str] = BAD
-    links: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for row in self.rows:

@@ -90,6 +90,7 @@ def open_page(
         page = context.new_page()
         page.emulate_media(media=media)
         page.goto(Path(path).resolve().as_uri(), wait_until="load")
+        page.wait_for_function(READY)
         yield page
 
 
@@ -113,6 +114,7 @@ def page_problems(path: str | Path, *, alone: bool = True) -> list[str]:
         page = context.new_page()
         problems = _listen(page, file.as_uri(), alone)
         page.goto(file.as_uri(), wait_until="load")
+        page.wait_for_function(READY)
         problems += page.evaluate(STRUCTURE)
         for width in (DESKTOP, PHONE):
             page.set_viewport_size({"width": width, "height": 900})
@@ -231,4 +233,9 @@ WORDS = """() => {
 }"""
 """Every word of the page, also those in closed details, which must open in print."""
 
-FIGURES = "() => [...document.images].filter((i) => !/^data:image.svg|[.]svg$/.test(i.src)).length"
+FIGURES = """() => document.querySelectorAll("canvas").length +
+  [...document.images].filter((i) => !/^data:image.svg|[.]svg$/.test(i.src)).length"""
+"""Pictures and drawn curves."""
+
+READY = "() => [...document.querySelectorAll('#explorer')].every((e) => e.dataset.ready)"
+"""Whether the curves of a live page are drawn."""

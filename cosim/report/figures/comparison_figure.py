@@ -15,7 +15,20 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from cosim.comparison.verdict import ComparisonFinding, Curves, SignalComparison
-from cosim.drawing.style import ALARM, AMBER, BLACK, BLUE, GRID, MARK, TIME, axes_or_new, headline, new_figure, styled
+from cosim.drawing.style import (
+    ALARM,
+    AMBER,
+    BLACK,
+    BLUE,
+    GRID,
+    MARK,
+    TIME,
+    axes_or_new,
+    headline,
+    new_figure,
+    png,
+    styled,
+)
 from cosim.report.figures.drawing import curve, legend_above, thin
 from cosim.report.figures.scales import bounded, value_limits
 from fmus.tables.numbers import number
@@ -112,6 +125,15 @@ def comparison_picture(signal: SignalComparison) -> Figure:
         legend_above(whole)
         legend_above(zoom, ["reference", "result", "tolerance tube"])
     return figure
+
+
+def comparison_png(signal: SignalComparison) -> bytes:
+    """The figure of `comparison_picture` as PNG.
+
+    Args:
+        signal: the comparison, with its curves.
+    """
+    return png(comparison_picture(signal))
 
 
 def _worst_window(signal: SignalComparison) -> tuple[float, float] | None:

@@ -16,7 +16,6 @@ from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, s
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
 from cosim.report.figures.scales import bounded, value_limits
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
-from cosim.results.result import Result
 
 WIDTH, _FIRST_PANEL, _NEXT_PANEL = 8.2, 3.3, 2.2  # inches
 KMH = 3.6  # km/h in a m/s
@@ -134,30 +133,6 @@ def _signal_figure(runs: Sequence[OverlayRun], name: str) -> Figure | None:
         values = bounded(run.result[name])
         ax.plot(*thin(run.result.time, np.where(np.isfinite(values), values, np.nan)), label=run.label, **run_line(i))
     return _finished([ax], f"{name} [{unit or 'unit unknown'}]")
-
-
-def changing_signals(runs: Sequence[OverlayRun], most: int) -> list[str]:
-    """Common signals that differ most between the first run and the others, relative to their range, in column order.
-
-    Args:
-        runs: from `make_runs`. most: how many names at most.
-    """
-    first = runs[0].result
-    common = [
-        n for n in (first.table.dtype.names or ())[1:] if all(recorded(run.result, n) is not None for run in runs)
-    ]
-    changes = {name: max((_change(first, run, name) for run in runs[1:]), default=0.0) for name in common}
-    chosen = sorted(common, key=lambda name: -changes[name])[:most]
-    return [name for name in common if name in chosen]
-
-
-def _change(first: Result, run: OverlayRun, name: str) -> float:
-    """Largest difference to the first run, in ranges of its values."""
-    values, other = (bounded(np.nan_to_num(result[name])) for result in (first, run.result))
-    if not np.array_equal(first.time, run.result.time):  # rows of events are met by those of the same time only
-        other = np.interp(first.time, run.result.time, other)
-    reach = float(np.ptp(values)) or max(float(np.max(np.abs(values))), 1e-300)
-    return float(np.max(np.abs(other - values))) / reach
 
 
 def _panels(runs: Sequence[OverlayRun], has: Callable[[OverlayRun, str], bool]) -> list[Panel]:

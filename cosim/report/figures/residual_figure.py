@@ -13,10 +13,9 @@ from cosim.evaluation.roles import recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import logarithmic, thin
 from cosim.report.figures.panel import Panel
+from cosim.report.page.derived_curves import RATIO
 from cosim.results.result import Result
 
-RATIO = "ratio_"
-"""Begin of the name of an output that is a residual divided by its threshold [1]."""
 FLOOR = 0.1  # smallest ratio that is drawn
 
 

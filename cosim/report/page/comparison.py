@@ -1,5 +1,5 @@
-"""A comparison as files: one HTML page that needs nothing else, its pictures, its data. Touches only the folder it is
-given.
+"""A comparison as files: one HTML page that needs nothing else, its data, pictures where they are asked for. Touches
+only the folder it is given.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from math import inf, isfinite
 from pathlib import Path
 
 from cosim.comparison.comparison_text import VERDICTS, signals_table
-from cosim.comparison.verdict import Comparison, ComparisonFinding, SignalComparison
-from cosim.drawing.style import png
-from cosim.report.figures.comparison_figure import comparison_picture
+from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
+from cosim.report.live.live_page import Card, Folded, LivePage, Mood, Rows, Section, Verdict
+from cosim.report.live.render import live_page
+from cosim.report.page.comparison_curves import comparison_marks, comparison_panels, comparison_recordings
 from cosim.report.page.page_files import explained, page_bytes, write_file
-from cosim.report.page.render import render
-from cosim.report.page.run_statements import Statement
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Table
@@ -28,41 +27,42 @@ FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
 
 
-def write_comparison(comparison: Comparison, directory: str | Path) -> dict[str, Path]:
-    """Write a comparison to a folder: page, data, and one picture for each of the worst signals.
+def write_comparison(comparison: Comparison, directory: str | Path, *, pictures: bool = False) -> dict[str, Path]:
+    """Write a comparison to a folder: page and data, and where they are asked for pictures of the worst signals.
 
     Args:
         comparison: what to write. directory: the folder; created where it does not exist.
+        pictures: whether they are drawn.
 
     Returns:
-        Paths: ``html``, ``json``, and, where a signal that differs can be drawn, ``png`` (the worst one's picture) and
+        Paths: ``html``, ``json``, and, where a signal that differs was drawn, ``png`` (the worst one's picture) and
         ``pictures`` (the folder with all of them).
 
     Raises:
         OutputError: the folder cannot be written.
     """
     folder = Path(directory)
-    pictures = draw_pictures(comparison)
+    drawn = draw_pictures(comparison) if pictures else {}
     with _explained(folder):
         _remove_pictures(folder / PICTURES)
-    paths = {"html": write_page(comparison, folder / PAGE, pictures), "json": folder / DATA}
+    paths = {"html": write_page(comparison, folder / PAGE), "json": folder / DATA}
     with _explained(folder):
         write_file(folder / DATA, page_bytes(json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"))
-    drawn = write_pictures(pictures, folder / PICTURES)
-    return paths | ({"png": next(iter(drawn.values())), "pictures": folder / PICTURES} if drawn else {})
+    files = write_pictures(drawn, folder / PICTURES)
+    return paths | ({"png": next(iter(files.values())), "pictures": folder / PICTURES} if files else {})
 
 
-def write_page(comparison: Comparison, path: str | Path, pictures: Mapping[str, bytes]) -> Path:
-    """Write the page alone, with the pictures inside, and return its path.
+def write_page(comparison: Comparison, path: str | Path) -> Path:
+    """Write the page alone and return its path.
 
     Args:
-        comparison: what to write. path: the file; its folder is created. pictures: from `draw_pictures`.
+        comparison: what to write. path: the file; its folder is created.
 
     Raises:
         OutputError: it cannot be written.
     """
     with _explained(Path(path)):
-        write_file(Path(path), page_bytes(_comparison_page(comparison, pictures)))
+        write_file(Path(path), page_bytes(live_page(comparison_page(comparison))))
     return Path(path)
 
 
@@ -88,28 +88,49 @@ def draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[st
     Args:
         comparison: what to draw. most: number of pictures at most.
     """
+    from cosim.report.figures.comparison_figure import comparison_png  # noqa: PLC0415 - matplotlib only to draw
+
     drawable = [s for s in comparison.failed if s.curves is not None]
-    return {s.name: png(comparison_picture(s).figure) for s in drawable[:most]}
+    return {s.name: comparison_png(s) for s in drawable[:most]}
 
 
-def _comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
-    """The page as text."""
-    return render(
-        "comparison.html.j2",
-        f"{comparison.result} against {comparison.reference}",
-        comparison=comparison,
-        facts=_facts(comparison),
-        verdict=_verdict_text(comparison),
-        worst=_cut(
-            [f"{s.name}: {_in_words(s)}" for s in comparison.failed], FINDINGS_SHOWN, "... and {} more, listed below"
-        ),
-        found={s.name: _cut([_text(s, f) for f in s.findings] or [_in_words(s)]) for s in comparison.failed},
-        pictures=pictures,
-        not_drawn=sum(s.curves is not None for s in comparison.failed) - len(pictures),
-        differences=_cut([d.text for d in comparison.events.differences], EVENTS_SHOWN),
-        packet_differences=_cut([d.text for d in comparison.packets.differences], EVENTS_SHOWN),
-        table=_table(comparison),
+def comparison_page(comparison: Comparison) -> LivePage:
+    """What the page of a comparison shows.
+
+    Args:
+        comparison: what to show.
+    """
+    worst = [f"{s.name}: {_in_words(s)}" for s in comparison.failed]
+    found = [Folded(s.name, [[_text(s, f) for f in s.findings] or [_in_words(s)]]) for s in comparison.failed]
+    verdict = "Equal within tolerance" if comparison.equal else "Different"
+    return LivePage(
+        title=f"{comparison.result} against {comparison.reference}",
+        verdict=Verdict(f"{verdict}: {_verdict_text(comparison)}", _mood(comparison.equal)),
+        cards=_cards(comparison),
+        finding=next(iter([*comparison.causes, *worst]), ""),
+        recordings=comparison_recordings(comparison),
+        panels=comparison_panels(comparison),
+        marks=comparison_marks(comparison),
+        sections=[
+            Section("What was run differs", [[*comparison.causes]], mood="doubt"),
+            Section("The worst signals", [_cut(worst, FINDINGS_SHOWN, "... and {} more, listed below")], mood="bad"),
+            Section("Signals that differ", found),
+            _events("Balise telegrams", "telegrams", comparison.events),
+            _events("Packets of the network", "packets", comparison.packets),
+            Section("All signals", [Rows(_table(comparison), plots=False)]),
+            Section("Notes", [[note for note in comparison.notes if note not in comparison.causes]]),
+        ],
     )
+
+
+def _events(title: str, what: str, events: EventComparison) -> Section:
+    """What became of telegrams or packets."""
+    if not events.compared:
+        return Section(title, [f"Not compared: one side keeps no {what}."])
+    if not (events.matched or events.differences):
+        return Section(title, [])
+    shift = f", largest difference of two stamps {number(events.max_shift)} s" if events.max_shift > 0 else ""
+    return Section(title, [f"{events.matched} match{shift}.", _cut([d.text for d in events.differences], EVENTS_SHOWN)])
 
 
 def _cut(lines: list[str], most: int = FINDINGS_SHOWN, rest: str = "and {} more") -> list[str]:
@@ -117,12 +138,12 @@ def _cut(lines: list[str], most: int = FINDINGS_SHOWN, rest: str = "and {} more"
     return lines if len(lines) <= most else [*lines[:most], rest.format(len(lines) - most)]
 
 
-def _facts(comparison: Comparison) -> list[Statement]:
+def _cards(comparison: Comparison) -> list[Card]:
     """The numbers at the head of the page."""
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
     failed = comparison.failed
     used = max(map(_use_of_tolerance, comparison.signals), default=-1.0)
-    cards: list[Statement] = [
+    cards: list[Card] = [
         (
             "Verdict",
             "equal" if comparison.equal else "different",
@@ -140,7 +161,7 @@ def _facts(comparison: Comparison) -> list[Statement]:
     return cards
 
 
-def _mood(good: bool) -> str:
+def _mood(good: bool) -> Mood:
     return "good" if good else "bad"
 
 

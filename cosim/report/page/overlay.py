@@ -1,10 +1,11 @@
-"""The page of several runs laid over each other, and its figures as files. Touches only the folder or file it is
-given.
+"""The page of several runs laid over each other, and its figures as files where they are asked for. Touches only the
+folder or file it is given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -15,13 +16,15 @@ from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.roles import phases
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
-from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
+from cosim.report.live.live_page import Card, Folded, LivePage, Panel, Section, Verdict
+from cosim.report.live.render import live_page
+from cosim.report.overlay.changing_signals import changing_signals
 from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
 from cosim.report.overlay.overlay_measures import Measured, detailed, measured, numbers_table
 from cosim.report.page.page_files import explained, write_file, write_page
 from cosim.report.page.phases import COLUMNS
-from cosim.report.page.render import render
-from cosim.report.page.run_statements import Statement
+from cosim.report.page.run_curves import run_panels, run_recording
+from cosim.report.page.run_marks import run_marks
 from cosim.results.result import BaliseRecord, Result
 from fmus.tables.numbers import DASH, error_number, number
 from fmus.tables.table import Column, Table, name_column, text_column
@@ -154,7 +157,7 @@ def write_overlay(
     directory: str | Path,
     signals: Sequence[str] = (),
 ) -> Path:
-    """Lay several runs over each other: ``overlay.html`` with the figures inside, and these as files in ``figures/``.
+    """Lay several runs over each other: ``overlay.html``.
 
     Args:
         results: the runs; the first is what the others are compared with.
@@ -169,62 +172,114 @@ def write_overlay(
     Raises:
         ComparisonError: the runs cannot be laid over each other. OutputError: the folder cannot be written.
     """
-    folder = Path(directory)
-    runs = make_runs(results, specs, labels)
-    with explained(f"Figures cannot be written to {folder}", "Choose another folder."):
-        (folder / FIGURES).mkdir(parents=True, exist_ok=True)  # before much is drawn
-        pictures = _pictures(runs, signals)
-        for stale in (folder / FIGURES).glob("overlay_*.png"):
-            stale.unlink()
-        for drawn in pictures:
-            write_file(folder / FIGURES / f"{drawn.key}.png", drawn.png)
-    return write_overlay_page(runs, folder / PAGE, pictures)
+    return write_overlay_page(make_runs(results, specs, labels), Path(directory) / PAGE, signals)
 
 
 def write_overlay_page(
-    runs: Sequence[OverlayRun],
-    path: str | Path,
-    pictures: Sequence[OverlayPicture] | None = None,
-    signals: Sequence[str] = (),
+    runs: Sequence[OverlayRun], path: str | Path, signals: Sequence[str] = (), *, figures: bool = False
 ) -> Path:
-    """Write the page alone; it needs no other file.
+    """Write the page of runs laid over each other; it needs no other file.
 
     Args:
         runs: from `make_runs`.
         path: the file; its folder is created.
-        pictures: from `draw_overlays`, drawn where None.
         signals: as for `write_overlay`.
+        figures: whether figures are drawn as well, as PNG files in ``figures/`` beside the page.
 
     Returns:
         Path of the page.
 
     Raises:
-        OutputError: the file cannot be written.
+        OutputError: a file cannot be written.
     """
-    return write_page(path, _overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures))
+    page = write_page(path, live_page(overlay_page(runs, signals)))
+    if figures:
+        from cosim.report.figures.overlay_figures import draw_overlays  # noqa: PLC0415 - matplotlib only to draw
+
+        folder = page.parent / FIGURES
+        chosen = signals or changing_signals(runs, SIGNALS_SHOWN)
+        drawn = draw_overlays(runs, signals) or draw_overlays(runs, chosen)
+        with explained(f"Figures cannot be written to {folder}", "Choose another folder."):
+            for stale in folder.glob("overlay_*.png"):
+                stale.unlink()
+            for picture in drawn:
+                write_file(folder / f"{picture.key}.png", picture.png)
+    return page
 
 
-def _pictures(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[OverlayPicture]:
-    """Figures of the roles and of `signals`; where neither gives one, those of the signals that differ most."""
-    return draw_overlays(runs, signals) or draw_overlays(runs, changing_signals(runs, SIGNALS_SHOWN))
+def overlay_page(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> LivePage:
+    """What the page of runs laid over each other shows.
 
-
-def _overlay_page(runs: Sequence[OverlayRun], pictures: Sequence[OverlayPicture]) -> str:
-    """The page as text."""
+    Args:
+        runs: from `make_runs`. signals: as for `write_overlay`.
+    """
     errors, different = measured(runs), differences(runs)
-    return render(
-        "overlay.html.j2",
-        _title(runs),
-        runs=runs,
-        facts=_facts(runs, errors, len(different)),
-        ended=_runs_table(runs),
-        errors=numbers_table(runs, errors, MEASURED),
-        pictures=pictures,
-        details=numbers_table(runs, detailed(runs), COLUMNS),
-        different=[_differences_table(runs, rows) for rows in _cut(different)],
-        layout_note=layout_note(runs),
-        notes=_notes(runs),
+    changes = _largest_changes(runs, errors)
+    return LivePage(
+        title=_title(runs),
+        verdict=_verdict(runs, len(different), changes),
+        cards=changes,
+        recordings=[run_recording(run.result, run.spec, run.label) for run in runs],
+        panels=_panels(runs, signals),
+        marks=[mark for mark in run_marks(runs[0].result, runs[0].spec) if mark.kind != "worst"],
+        settled=runs[0].spec.evaluate_after,
+        sections=_sections(runs, errors, different),
     )
+
+
+def _panels(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[Panel]:
+    """Those of all runs by their titles, and the signals that were asked for; where neither the signals that differ
+    most.
+    """
+    found: dict[str, Panel] = {}
+    for panel in (panel for run in runs for panel in run_panels(run.result, run.spec)):
+        former = found.get(panel.title, panel)
+        names = list(dict.fromkeys([*former.curves, *panel.curves]))
+        found[panel.title] = replace(panel, curves=names)
+    has_roles = any(run.spec.true_speed or run.spec.observers for run in runs)
+    chosen = list(signals) or ([] if has_roles else changing_signals(runs, SIGNALS_SHOWN))
+    own = [Panel(name, [name]) for name in chosen]
+    others = found.values() if has_roles else [replace(panel, is_shown=not own) for panel in found.values()]
+    return [*own, *others]
+
+
+def _verdict(runs: Sequence[OverlayRun], different: int, changes: Sequence[Card]) -> Verdict:
+    """How many runs came to their end, what differs between them, and the largest change."""
+    failed = [run.label for run in runs if run.result.failure is not None]
+    if failed:
+        return Verdict(f"{', '.join(failed)} did not come to {'its' if len(failed) == 1 else 'their'} end.", "bad")
+    text = f"{len(runs)} complete {'run' if len(runs) == 1 else 'runs'}"
+    text += (
+        f"; {different} settings differ" if different else "; no setting that is known differs" if len(runs) > 1 else ""
+    )
+    rise = [f"{name.lower()}: {size} {where}" for name, size, where, _ in changes]
+    return Verdict(
+        f"{text}. {'; '.join(rise)}".rstrip() + ("." if rise else ""),
+        "doubt" if any(c[3] == "doubt" for c in changes) else "",
+    )
+
+
+def _sections(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: list[list[str]]) -> list[Section]:
+    below = f"Below each number: the difference to {runs[0].label}."
+    failed = [f"{run.label}: {run.result.failure}" for run in runs if run.result.failure is not None]
+    table, details = numbers_table(runs, errors, MEASURED), numbers_table(runs, detailed(runs), COLUMNS)
+    shown, rest = (_differences_table(runs, rows) for rows in _cut(different))
+    lead = f"{runs[0].label} is what the others are compared with: {', '.join(run.label for run in runs[1:])}."
+    none = (
+        ""
+        if shown
+        else "Nothing the summaries tell of differs: settings, parameters, FMUs, telegrams and versions are the same."
+    )
+    return [
+        Section("Not all runs came to their end", [failed], mood="bad"),
+        Section("Runs", [lead if len(runs) > 1 else "", _runs_table(runs)]),
+        Section("Errors, phase by phase", [f"Estimate minus true value. {below}", table] if table else []),
+        Section("Slip, forces, errors around telegrams, indicators", [below, details] if details else []),
+        Section(
+            "What differs between the runs", [none, layout_note(runs), shown, Folded(f"{len(rest.rows)} more", [rest])]
+        ),
+        Section("Notes", [_notes(runs)]),
+    ]
 
 
 def _title(runs: Sequence[OverlayRun]) -> str:
@@ -237,14 +292,7 @@ def _cut(rows: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
     return rows[:_DIFFERENCES_SHOWN], rows[_DIFFERENCES_SHOWN:]
 
 
-def _facts(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: int) -> list[Statement]:
-    ended = sum(run.result.failure is None for run in runs)
-    complete: Statement = ("Runs", f"{ended} of {len(runs)} complete", "", "good" if ended == len(runs) else "bad")
-    settings: Statement = ("Settings that differ", str(different), "see below" if different else "none is known", "")
-    return [complete, settings, *_largest_changes(runs, errors)]
-
-
-def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> list[Statement]:
+def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> list[Card]:
     """Where the rms speed error rose most and fell most, relative to the first run."""
     changes = []
     for row in errors:
@@ -253,7 +301,7 @@ def _largest_changes(runs: Sequence[OverlayRun], errors: Sequence[Measured]) -> 
             now = row.values.get(run.label, (None,) * len(MEASURED))[_RMS_SPEED]
             if first and now is not None and isfinite(first):
                 changes.append((now / first - 1, now, f"{row.observer}, {row.phase}, {run.label}"))
-    found: list[Statement] = []
+    found: list[Card] = []
     for name, mood, worst in (
         ("Largest rise of rms speed error", "doubt", max),
         ("Largest fall of rms speed error", "good", min),

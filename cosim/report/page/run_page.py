@@ -1,39 +1,35 @@
-"""The report of a run: one HTML page that needs nothing else, and its figures as files. Touches only the folder it is
-given.
+"""The page of a run: one HTML file that needs nothing else; and its figures as files, where they are asked for. Touches
+only the folder it is given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cosim.evaluation.balise_gaps import ENVELOPE
-from cosim.evaluation.cost import was_compiled
-from cosim.evaluation.error_table import error_table
-from cosim.evaluation.event_counts import count_events
-from cosim.evaluation.metrics import phase_metrics
-from cosim.evaluation.result_warnings import all_warnings
 from cosim.evaluation.spec import ReportSpec
-from cosim.evaluation.summary_entries import list_entry, mapping_entry, statement
+from cosim.evaluation.summary_entries import list_entry
 from cosim.expectations.judged import Judged
-from cosim.report.figures.panel import Panel
-from cosim.report.figures.panels import draw_all
-from cosim.report.figures.zooms import Zoom, draw_zooms
+from cosim.report.live.live_page import LivePage
+from cosim.report.live.render import live_page
+from cosim.report.page.derived_curves import derived_curves
 from cosim.report.page.page_files import explained, page_bytes, write_file, write_page
-from cosim.report.page.render import render
+from cosim.report.page.run_curves import run_panels, run_recording
+from cosim.report.page.run_marks import run_marks
+from cosim.report.page.run_sections import run_sections
 from cosim.report.page.run_statements import run_statements
-from cosim.report.page.run_tables import run_tables
+from cosim.report.page.run_verdict import largest_finding, observer_statuses, run_verdict
 from cosim.results.result import Result
 from cosim.results.results_folder import FIGURES, REPORT, remove_report
 
 
-def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Path:
-    """Write ``report.html``, with the figures inside, and the same figures as PNG files in ``figures/``.
+def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, figures: bool = False) -> Path:
+    """Write ``report.html``, and where they are asked for its figures as PNG files in ``figures/``.
 
     Args:
         result: the run; a failed one is reported as far as it came.
         spec: roles of the signals, phases, published numbers.
         directory: the folder; created where it does not exist.
+        figures: whether figures are drawn as well.
 
     Returns:
         Path of the page.
@@ -42,60 +38,66 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Pat
         OutputError: the folder cannot be written.
     """
     folder = Path(directory)
-    figures, zooms = draw_all(result, spec), draw_zooms(result, spec)
-    text = _report_page(result, spec, figures, zooms)
-    files = {panel.name: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
+    text = live_page(run_page(result, spec))
+    files = _drawn(result, spec) if figures else {}
     with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
-        (folder / FIGURES).mkdir(parents=True, exist_ok=True)
-        for key, data in files.items():
-            write_file(folder / FIGURES / f"{key}.png", data)
+        for name, data in files.items():
+            write_file(folder / FIGURES / f"{name}.png", data)
         remove_report(folder, keep=files)
         write_file(folder / REPORT, page_bytes(text))
     return folder / REPORT
 
 
-def write_report_page(result: Result, spec: ReportSpec, path: str | Path) -> Path:
+def _drawn(result: Result, spec: ReportSpec) -> dict[str, bytes]:
+    """All pictures of a run, PNG by name."""
+    from cosim.report.figures.run_pictures import run_pictures  # noqa: PLC0415 - matplotlib only for those who draw
+
+    return run_pictures(result, spec)
+
+
+def write_report_page(result: Result, spec: ReportSpec, path: str | Path, *, figures: bool = False) -> Path:
     """Write the page alone; it needs no other file.
 
     Args:
         result: the run.
         spec: roles of the signals, phases, published numbers.
         path: the file; its folder is created.
+        figures: whether figures are drawn as well, in ``figures/`` beside the page.
 
     Returns:
         Path of the page.
 
     Raises:
-        OutputError: the file cannot be written.
+        OutputError: a file cannot be written.
     """
-    return write_page(path, _report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec)))
+    page = write_page(path, live_page(run_page(result, spec)))
+    with explained(f"Figures cannot be written beside {page}", "Choose another place with --out."):
+        for name, data in (_drawn(result, spec) if figures else {}).items():
+            write_file(page.parent / FIGURES / f"{name}.png", data)
+    return page
 
 
-def _report_page(
-    result: Result, spec: ReportSpec, figures: Mapping[type[Panel], bytes], zooms: Sequence[Zoom] = ()
-) -> str:
-    """The page as text."""
-    metrics, counts = phase_metrics(result, spec), count_events(result.events)
-    shown = metrics if spec.true_speed or spec.true_position else []  # a turbine has no errors of speed
+def run_page(result: Result, spec: ReportSpec) -> LivePage:
+    """What the page of a run shows.
+
+    Args:
+        result: the run. spec: roles of the signals, phases, published numbers.
+    """
+    rows = len(result.time)
+    derived = derived_curves(result, spec) if rows else []
     judged = [Judged.from_data(data) for data in list_entry(result, "expectations")]
-    return render(
-        "report.html.j2",
-        spec.title,
-        result=result,
-        spec=spec,
-        description=result.summary.get("description"),
-        facts=run_statements(result, spec),
-        statement=statement(result),
-        judged=judged,
-        warnings=all_warnings(result, spec),
-        metrics=shown,
-        errors=error_table(shown, spec),
-        seed_count=len(mapping_entry(result, "seed_study").get("seeds", [])),
-        envelope=ENVELOPE,
-        compiled=was_compiled(result),
-        notes=list(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")]))),
-        zooms=zooms,
-        figures=figures,
-        counts=counts,
-        **run_tables(result, spec, judged),
+    statuses = observer_statuses(result, spec) if rows else []
+    marks = run_marks(result, spec) if rows else []
+    description = result.summary.get("description")
+    return LivePage(
+        title=spec.title,
+        verdict=run_verdict(result, spec, judged, statuses),
+        cards=run_statements(result, spec, statuses),
+        finding=largest_finding(result, spec, statuses, marks),
+        lead=description if isinstance(description, str) else "",
+        recordings=[run_recording(result, spec), *(r for found, _ in derived for r in found)] if rows else [],
+        panels=[*run_panels(result, spec), *(panel for _, panel in derived)],
+        marks=marks,
+        settled=spec.evaluate_after,
+        sections=run_sections(result, spec, judged),
     )

@@ -2,46 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from cosim.evaluation.event_counts import count_events
-from cosim.evaluation.metrics import judged_size
-from cosim.evaluation.result_warnings import all_warnings, result_warnings
-from cosim.evaluation.roles import Quantity, estimation_error, label
+from cosim.evaluation.result_warnings import all_warnings
+from cosim.evaluation.roles import Quantity, label
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
+from cosim.report.live.live_page import Card
+from cosim.report.page.run_verdict import ObserverStatus
 from cosim.results.result import Result
 from fmus.tables.numbers import DASH, error_number, number
 
-Statement = tuple[str, str, str, str]
-"""Name, value, remark, mood."""
 
-
-def run_statements(result: Result, spec: ReportSpec) -> list[Statement]:
-    """The facts at the head of a report, the most important first.
+def run_statements(result: Result, spec: ReportSpec, statuses: Sequence[ObserverStatus]) -> list[Card]:
+    """The numbers at the head of a report, the most important first.
 
     Args:
-        result: the run. spec: roles.
+        result: the run. spec: roles. statuses: how the observers did, the best first.
     """
-    facts: list[Statement | None] = [_ending(result, spec), _expectations(result)]
-    facts += [_error(result, spec, "speed", "m/s"), _error(result, spec, "position", "m")]
-    facts += [_telegrams(result), _certificates(result), _warnings(result, spec)]
-    return [fact for fact in facts if fact is not None]
+    cards: list[Card | None] = [_ending(result), _expectations(result)]
+    cards += [_error(spec, statuses, "speed", "m/s"), _error(spec, statuses, "position", "m")]
+    cards += [_telegrams(result), _certificates(result), _warnings(result, spec)]
+    return [card for card in cards if card is not None]
 
 
-def _ending(result: Result, spec: ReportSpec) -> Statement:
+def _ending(result: Result) -> Card:
     reached = number(float(result.time[-1])) if len(result.time) else "0"
     if result.failure:
         stop = number_entry(result.summary, "stop")
         return "Run", "ended early", f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else ""), "bad"
-    if result_warnings(result, spec):
-        return "Run", "complete", f"to {reached} s, but it shows little: see the warnings", "doubt"
     return "Run", "complete", f"to {reached} s", "good"
 
 
-def _expectations(result: Result) -> Statement | None:
+def _expectations(result: Result) -> Card | None:
     judged = [entry for entry in list_entry(result, "expectations") if isinstance(entry, Mapping)]
     if not judged:
         return None
@@ -49,24 +45,28 @@ def _expectations(result: Result) -> Statement | None:
     return "Expectations", f"{met} of {len(judged)} met", "", "good" if met == len(judged) else "bad"
 
 
-def _error(result: Result, spec: ReportSpec, quantity: Quantity, unit: str) -> Statement | None:
-    """The largest error of all observers, after the start-up."""
-    settled = result.time >= spec.evaluate_after
-    found = {o: e for o in spec.observers if (e := estimation_error(result, spec, o, quantity)) is not None}
-    sizes = {o: judged_size(result.time[settled], e[settled]).max_abs for o, e in found.items()}
-    if not sizes:
-        return None
+def _error(spec: ReportSpec, statuses: Sequence[ObserverStatus], quantity: Quantity, unit: str) -> Card | None:
+    """The largest error of the observers that follow the train, or of all where none does."""
+    sizes = {s.name: getattr(s, quantity) for s in statuses if not s.fails} or {
+        s.name: getattr(s, quantity) for s in statuses
+    }
+    sizes = {name: size for name, size in sizes.items() if not np.isnan(size)}
     name = f"Largest {quantity} error"
+    if not sizes:
+        return (name, DASH, "too few rows to judge", "doubt") if spec.observers and statuses else None
     worst = max(sizes, key=lambda o: sizes[o])
-    if np.isnan(sizes[worst]):  # the rows judged are those of all observers
-        return name, DASH, "too few rows to judge", "doubt"
+    failing = len(statuses) - len(sizes)
     among = f", the worst of {len(sizes)}" if len(sizes) > 1 else ""
-    if np.isinf(sizes[worst]):
-        return name, error_number(sizes[worst]), label(spec, worst) + among, "bad"
-    return name, f"{error_number(sizes[worst])} {unit}", label(spec, worst) + among, ""
+    among += f", {failing} failing left out" if failing else ""
+    value = error_number(sizes[worst])
+    return (
+        (name, value, label(spec, worst) + among, "bad")
+        if np.isinf(sizes[worst])
+        else (name, f"{value} {unit}", label(spec, worst) + among, "")
+    )
 
 
-def _telegrams(result: Result) -> Statement | None:
+def _telegrams(result: Result) -> Card | None:
     if not result.events:
         return None
     counts = count_events(result.events)
@@ -75,7 +75,7 @@ def _telegrams(result: Result) -> Statement | None:
     return "Balise telegrams", f"{counts.delivered} delivered", remark, "doubt" if wrong else ""
 
 
-def _certificates(result: Result) -> Statement | None:
+def _certificates(result: Result) -> Card | None:
     known = [
         entry.get("holds") for entry in mapping_entry(result, "certificates").values() if isinstance(entry, Mapping)
     ]
@@ -91,6 +91,6 @@ def _certificates(result: Result) -> Statement | None:
     )
 
 
-def _warnings(result: Result, spec: ReportSpec) -> Statement | None:
+def _warnings(result: Result, spec: ReportSpec) -> Card | None:
     count = len(all_warnings(result, spec))
     return ("Warnings", str(count), "see below", "doubt") if count else None

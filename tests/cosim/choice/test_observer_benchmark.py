@@ -343,31 +343,15 @@ class Texts(HTMLParser):
         self.found.append(data)
 
 
-def test_page_picture_and_data_say_the_same(benchmark: ObserverBenchmark, tmp_path: Path) -> None:
+def test_page_and_data_say_the_same(benchmark: ObserverBenchmark, tmp_path: Path) -> None:
     paths = benchmark.write(tmp_path / "out")
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["observers.html", "observers.json", "observers.png"]
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["observers.html", "observers.json"]
     data = json.loads(paths["data"].read_text(encoding="utf-8"))
     assert [entry["label"] for entry in data["observers"]] == ["observer", "UIO"]
     assert data["observers"][1]["whole"]["speed"]["rms"] == benchmark.scores[1].speed_rms
     page = paths["page"].read_text(encoding="utf-8")
-    assert {"Overview", "Errors by phase", "Speed error against time", "Certificates", "Telegrams"} <= set(
-        Texts(page).found
-    )
-    assert page.count("data:image/png;base64,") == 2
-    assert paths["picture"].read_bytes().startswith(b"\x89PNG")
-    assert "http" not in page
-
-
-def test_the_picture_has_units_and_a_point_for_each_observer(benchmark: ObserverBenchmark) -> None:
-    from cosim.report.page.observer_page import _cost_figure, _errors_figure
-
-    errors, cost = _errors_figure(benchmark.scores), _cost_figure(benchmark.scores)
-    assert errors.get_xlabel() == "Speed error [m/s]"
-    assert [label.get_text() for label in errors.get_yticklabels()] == ["observer", "UIO"]
-    points = [(line.get_xdata()[0], line.get_ydata()[0]) for line in cost.get_lines()]  # type: ignore[index]
-    assert points == [(score.speed_rms, score.cost) for score in benchmark.scores]
-    assert "[m/s]" in cost.get_xlabel()
-    assert "[µs]" in cost.get_ylabel()
+    assert {"Overview", "Errors by phase", "Certificates", "Telegrams"} <= set(Texts(page).found)
+    assert '"Speed error"' in page  # a panel of it
 
 
 # -- interrupted

@@ -26,7 +26,7 @@ def test_table_files_and_a_recording_that_is_played_back(
     table = capsys.readouterr().out
     assert "rms v [m/s]" in table
     assert "cost [us/step]" in table
-    assert sorted(path.name for path in out.iterdir()) == ["observers.html", "observers.json", "observers.png"]
+    assert sorted(path.name for path in out.iterdir()) == ["observers.html", "observers.json"]
     arguments = ["--observers", "observer", "--from", str(run), "--json", "--repeat", "2"]
     assert main(["benchmark-observers", scenario, *arguments]) == 0
     data = json.loads(capsys.readouterr().out)

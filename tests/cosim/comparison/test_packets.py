@@ -12,7 +12,8 @@ from cosim.comparison.compare import _keeps_packets
 from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.verdict import Comparison
 from cosim.provenance.rerun import _same_result
-from cosim.report.page.comparison import _comparison_page
+from cosim.report.live.render import live_page
+from cosim.report.page.comparison import comparison_page
 from cosim.results.result import PacketRecord, Result
 
 TIME = [0.0, 10.0]
@@ -54,7 +55,7 @@ def test_a_packet_that_is_not_as_in_the_reference_is_told(now: list[PacketRecord
     assert text in comparison.packets.differences[0].text
     assert comparison.packets.differences[0].text in comparison_text(comparison)
     assert comparison.to_dict()["packets"]["differences"][0]["kind"] == kinds[0]
-    assert "Packets of the network" in _comparison_page(comparison, {})
+    assert "Packets of the network" in live_page(comparison_page(comparison))
 
 
 def test_the_same_packets_agree_in_any_order_and_within_the_tolerance() -> None:

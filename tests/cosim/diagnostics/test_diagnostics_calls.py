@@ -27,7 +27,8 @@ from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_table
 from cosim.master.master import close
-from cosim.report.page.run_page import _report_page
+from cosim.report.live.render import live_page
+from cosim.report.page.run_page import run_page
 
 LINE = re.compile(
     r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, "
@@ -385,7 +386,7 @@ def test_the_closing_table_and_the_report_show_them() -> None:
     assert rows["locomotive"][4].startswith(f"{states} / ")
     text = cost_table(outcome.result).text()
     assert [line.split()[0] for line in text.splitlines()[2:]] == list(rows)
-    assert "<h2>Calls</h2>" in _report_page(outcome.result, outcome.spec, {})
+    assert "<h2>Calls</h2>" in live_page(run_page(outcome.result, outcome.spec))
 
 
 def test_seconds_of_a_component_are_those_of_its_calls() -> None:

@@ -17,7 +17,8 @@ from cosim import Scenario
 from cosim.components.loading import load_fmu
 from cosim.diagnostics.messages import OMITTED, Message, MessageLog, in_order, read_messages, write_messages
 from cosim.errors import CouplingError, ScenarioError
-from cosim.report.page.run_page import _report_page
+from cosim.report.live.render import live_page
+from cosim.report.page.run_page import run_page
 from cosim.results.results_folder import read_results
 from fmus.fmi.native_log import _listeners
 
@@ -145,7 +146,7 @@ def test_blocks_log_like_fmus(backend: str, tmp_path: Path, caplog: pytest.LogCa
     ] * rejected
     assert all("it is rejected" in m.text for m in outcome.result.messages)
     assert not [r for r in caplog.records if "rejected" in r.getMessage() and r.name != "cosim"]
-    page = _report_page(outcome.result, outcome.spec, {})
+    page = live_page(run_page(outcome.result, outcome.spec))
     assert "Messages of the components" in page
     paths = outcome.write(tmp_path, report=False)
     assert read_messages(paths["messages"]) == list(outcome.result.messages)

@@ -40,23 +40,22 @@ def differing(name: str = "train.speed", drawn: Curves | None = None, excess: fl
         "m/s",
         "differs",
         Tolerance(),
-        ALLOWED,
-        1e-6,
-        excess,
-        21.0,
-        0.0,
-        0.009,
-        0.03,
-        [(21.0, 2.1, 2.15, excess)],
-        [finding],
-        (),
-        curves(excess=excess) if drawn is None else drawn,
+        allowed=ALLOWED,
+        allowed_time=1e-6,
+        max_error=excess,
+        max_error_at=21.0,
+        rms_error=0.009,
+        share_outside=0.03,
+        worst=[(21.0, 2.1, 2.15, excess)],
+        findings=[finding],
+        curves=curves(excess=excess) if drawn is None else drawn,
     )
 
 
 def crossing(name: str = "train.position", share: float = 0.4) -> SignalComparison:
     """A signal that uses a share of its tolerance."""
-    return SignalComparison(name, "m", "within", Tolerance(), ALLOWED, 1e-6, share * ALLOWED, 3.0, 0.0, 0.001)
+    sizes = {"max_error": share * ALLOWED, "max_error_at": 3.0, "rms_error": 0.001}
+    return SignalComparison(name, "m", "within", Tolerance(), ALLOWED, 1e-6, **sizes)
 
 
 def missing(name: str = "train.slip") -> SignalComparison:

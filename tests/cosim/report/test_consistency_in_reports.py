@@ -12,7 +12,8 @@ from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.consistency_figure import NeesPanel, NisPanel
-from cosim.report.page.run_page import _report_page
+from cosim.report.live.render import live_page
+from cosim.report.page.run_page import run_page
 from cosim.results.result import Result
 from cosim.results.result_data import SignalInfo
 from cosim.run.outcome import Outcome
@@ -100,10 +101,10 @@ def test_a_held_nis_counts_once_a_sample_and_the_start_up_not_at_all() -> None:
 
 def test_the_report_shows_it() -> None:
     result = run(4.0)
-    page = _report_page(result, SPEC, {NisPanel: b""})
+    page = live_page(run_page(result, SPEC))
     assert "Consistency of the filters" in page
     assert "overconfident" in page
-    assert "Normalised innovations (NIS)" in page
+    assert "NIS and NEES" in page
     assert NisPanel.available(result, SPEC)
     assert not NisPanel.available(run(nis=False), SPEC)
     assert NeesPanel.available(run(nis=False, covariance=False), SPEC)

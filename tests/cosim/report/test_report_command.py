@@ -101,7 +101,7 @@ def test_an_older_folder_is_read_and_the_guess_is_told(
         (["{0}/one", "{0}/two", "--labels", "a"], "expected 2 texts"),
         (["{0}/one", "{0}/two", "--labels", "a,a"], "Two runs have the label 'a'"),
         (["{0}/one", "{0}/two", "--signals", "driver.efort"], "did you mean 'driver.effort'"),
-        (["{0}/one", "{0}/two", "--signals", "*"], "a page holds 16 figures"),
+        (["{0}/one", "{0}/two", "--signals", "*"], "a page opens with 16 of them"),
         (["{0}/one", "{0}/two", "--out", "{0}/one/table.csv/x.html"], "cannot be written"),
     ],
 )

@@ -25,12 +25,13 @@ from cosim.report.figures.overlay_figures import (
     _estimate_overlay,
     _signal_figure,
     _true_speed_figure,
-    changing_signals,
 )
+from cosim.report.live.render import live_page
+from cosim.report.overlay.changing_signals import changing_signals
 from cosim.report.overlay.overlaid_runs import MOST_RUNS, OverlayRun, make_runs
 from cosim.report.overlay.overlay_measures import Measured, difference, measured, numbers_table
 from cosim.report.page import overlay
-from cosim.report.page.overlay import _overlay_page, differences, layout_note, write_overlay
+from cosim.report.page.overlay import differences, layout_note, overlay_page, write_overlay, write_overlay_page
 from cosim.results.result import Result
 from fmus.tables.table import Column
 
@@ -56,7 +57,7 @@ def test_all_are_judged_by_the_phases_of_the_first() -> None:
     other = replace(SPEC, phases=[Phase("else", 0, 1)], evaluate_after=50.0)
     runs = make_runs([scaled(1.0), scaled(1.0)], [SPEC, other], ["a", "b"])
     assert (runs[1].spec.phases, runs[1].spec.evaluate_after) == (SPEC.phases, SPEC.evaluate_after)
-    assert "b named other phases; all are judged over those of a." in _overlay_page(runs, [])
+    assert "b named other phases; all are judged over those of a." in live_page(overlay_page(runs))
 
 
 def test_without_phases_one_phase_holds_all_runs() -> None:
@@ -137,7 +138,7 @@ def test_signals_that_differ_most_are_drawn_where_nothing_has_a_role(monkeypatch
     monkeypatch.setattr(overlay, "SIGNALS_SHOWN", 1)
     runs = make_runs([scaled(1.0), scaled(3.0)], [ReportSpec()] * 2, ["a", "b"])
     assert changing_signals(runs, 1) == ["differentiator_cdo.speed"]
-    assert [drawn.title for drawn in overlay._pictures(runs, ())] == ["differentiator_cdo.speed"]
+    assert [panel.title for panel in overlay_page(runs).panels if panel.is_shown] == ["differentiator_cdo.speed"]
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
@@ -177,7 +178,7 @@ def test_difference_in_words(value: float, first: float, text: str) -> None:
 
 
 def test_the_page_names_the_largest_change() -> None:
-    text = _overlay_page(two(), [])
+    text = live_page(overlay_page(two()))
     first, *others = (run.label for run in two())
     assert f"{first} is what the others are compared with: {', '.join(others)}." in text
     assert "Largest rise of rms speed error" in text
@@ -236,20 +237,21 @@ def test_layouts_are_compared_by_place_or_instant() -> None:
 
 def test_figures_of_an_earlier_overlay_do_not_stay(tmp_path: Path) -> None:
     results = [scaled(1.0), scaled(2.0)]
-    write_overlay(results, [ReportSpec()] * 2, ["a", "b"], tmp_path, ["driver.effort", "locomotive.speed"])
+    runs = make_runs(results, [ReportSpec()] * 2, ["a", "b"])
+    page = tmp_path / "overlay.html"
+    write_overlay_page(runs, page, ["driver.effort", "locomotive.speed"], figures=True)
     (tmp_path / "figures" / "of_mine.png").write_bytes(b"")
-    path = write_overlay(results, [ReportSpec()] * 2, ["a", "b"], tmp_path, ["driver.effort"])
+    path = write_overlay_page(runs, page, ["driver.effort"], figures=True)
     assert sorted(p.name for p in path.parent.rglob("*.png")) == ["of_mine.png", "overlay_signal_1.png"]
-    assert "https:" not in path.read_text("utf-8")
 
 
 def test_a_place_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="Choose another folder"):
+    with pytest.raises(OutputError, match="Choose another place"):
         write_overlay([scaled(1.0)], [ReportSpec()], ["a"], tmp_path / "file")
 
 
 def test_labels_are_escaped() -> None:
     evil = '<img src=x onerror="1">&\'"'
     runs = make_runs([scaled(1.0), scaled(2.0)], [SPEC, SPEC], [evil, "b"])
-    assert "<img src=x" not in _overlay_page(runs, [])
+    assert "<img src=x" not in live_page(overlay_page(runs))

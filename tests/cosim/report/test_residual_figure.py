@@ -6,7 +6,8 @@ import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.residual_figure import FLOOR, ResidualsPanel
-from cosim.report.page.run_page import _report_page
+from cosim.report.live.render import live_page
+from cosim.report.page.run_page import run_page
 from cosim.results.formats.format import bare
 from cosim.results.result import Result
 
@@ -36,5 +37,5 @@ def test_a_run_without_such_outputs_has_no_figure() -> None:
 
 
 def test_a_run_without_a_train_has_no_table_of_its_errors() -> None:
-    assert "speed error" not in _report_page(run(), ReportSpec(observers=["a"]), {})
-    assert "speed error" in _report_page(run(), ReportSpec(observers=["a"], true_speed="a.speed"), {})
+    assert "speed error" not in live_page(run_page(run(), ReportSpec(observers=["a"])))
+    assert "speed error" in live_page(run_page(run(), ReportSpec(observers=["a"], true_speed="a.speed")))

@@ -16,8 +16,8 @@ from cosim.evaluation.corrections import corrections, event_rows
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.zooms import _zoom_figure, draw_zooms
+from cosim.report.live.render import groups
 from cosim.report.page.phases import phases_table
-from cosim.report.page.render import groups
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
 from cosim.results.result import BaliseRecord, Result
 

@@ -1,0 +1,137 @@
+"""The curves, panels and marks of a live page as plain data and packed columns. Imports NumPy only.
+
+A page holds every row as long as all columns have room. The curves of its panels come first; what finds no room is
+reduced to its extremes, and the page says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from cosim.report.live.live_page import Curve, LivePage, Mark, Panel, Recording
+from cosim.report.live.packed_column import INSTANTS, PackedColumn, pack
+from fmus.tables.plain_data import jsonable
+
+ROOM = 2_300_000
+"""Characters that all columns of a page may take at least."""
+ROOM_A_ROW = 26
+MOST_ROOM = 34_000_000
+REDUCED = 2000
+"""Pieces of a curve that is reduced; of each its ends and extremes are kept."""
+
+
+@dataclass(frozen=True)
+class PageData:
+    """What the script of a page reads.
+
+    Args:
+        data: plain data. blocks: texts of packed columns by number. reduced: names of curves without all their rows.
+    """
+
+    data: Mapping[str, Any]
+    blocks: Sequence[str]
+    reduced: Sequence[str]
+
+
+def page_data(page: LivePage) -> PageData:
+    """The curves of a page, packed.
+
+    Args:
+        page: what it shows.
+    """
+    packer = _Packer(page)
+    recordings = [packer.recording(recording) for recording in page.recordings]
+    data = {
+        "recordings": recordings,
+        "panels": [_panel(panel) for panel in page.panels],
+        "settled": page.settled,
+        "marks": [_mark(mark) for mark in page.marks if isfinite(mark.start)],
+    }
+    return PageData(jsonable(data), packer.blocks, packer.reduced)
+
+
+class _Packer:
+    """Packs the columns of a page, those first that its panels show."""
+
+    def __init__(self, page: LivePage) -> None:
+        rows = max((len(r.x) for r in page.recordings), default=0)
+        self.room = min(max(ROOM, ROOM_A_ROW * rows), MOST_ROOM)
+        self.blocks: list[str] = []
+        self.reduced: list[str] = []
+        self.packed: dict[tuple[int, str], dict[str, Any]] = {}
+        self.abscissas = {id(r): self._column(pack(r.x, INSTANTS)) for r in page.recordings}
+        first = {name for panel in page.panels for name in (*panel.curves, *(n for pair in panel.bands for n in pair))}
+        curves = [(recording, curve) for recording in page.recordings for curve in recording.curves]
+        for recording, curve in sorted(curves, key=lambda pair: pair[1].name not in first):
+            self.packed[id(recording), curve.name] = self._curve(recording, curve)
+
+    def recording(self, recording: Recording) -> dict[str, Any]:
+        """A recording as plain data."""
+        return {
+            "label": recording.label,
+            "x": {"name": recording.x_name, "unit": recording.x_unit, **self.abscissas[id(recording)]},
+            "curves": [self.packed[id(recording), curve.name] for curve in recording.curves],
+        }
+
+    def _curve(self, recording: Recording, curve: Curve) -> dict[str, Any]:
+        told = {name: getattr(curve, name) for name in ("name", "unit", "held", "description", "look", "label")}
+        told |= {"ascends": _ascends(curve.values)}
+        packed = pack(curve.values)
+        if packed.size <= self.room:
+            return told | self._column(packed)
+        self.reduced.append(curve.name)
+        rows = extreme_rows(curve.values, REDUCED)
+        return (
+            told | self._column(pack(curve.values[rows])) | {"rows": self._column(pack(rows.astype(float), INSTANTS))}
+        )
+
+    def _column(self, packed: PackedColumn) -> dict[str, Any]:
+        self.room -= packed.size
+        self.blocks += [packed.text, packed.odd]
+        return packed.data() | {"block": len(self.blocks) - 2}
+
+
+def extreme_rows(values: np.ndarray, pieces: int) -> np.ndarray:
+    """Rows that keep the course of a curve: of each piece the first, the last, the smallest and the largest.
+
+    Args:
+        values: shape (rows,). pieces: how many.
+
+    Returns:
+        Numbers of rows, increasing.
+    """
+    edges = np.unique(np.linspace(0, len(values), pieces + 1).astype(int))
+    low, high = np.where(np.isnan(values), np.inf, values), np.where(np.isnan(values), -np.inf, values)
+    kept = [
+        row
+        for a, b in pairwise(edges)
+        for row in (a, a + int(np.argmin(low[a:b])), a + int(np.argmax(high[a:b])), b - 1)
+    ]
+    return np.unique(np.array(kept, dtype=int))
+
+
+def _ascends(values: np.ndarray) -> bool:
+    """Whether a curve can be an abscissa itself: it rises, never falls, and has no gap."""
+    return len(values) > 1 and bool(np.all(values[1:] >= values[:-1])) and -np.inf < values[0] < values[-1] < np.inf
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    return {
+        "title": panel.title,
+        "curves": list(panel.curves),
+        "log": panel.log,
+        "bands": [list(pair) for pair in panel.bands],
+        "shown": panel.is_shown,
+        "whole": panel.is_whole,
+    }
+
+
+def _mark(mark: Mark) -> dict[str, Any]:
+    names = ("kind", "start", "end", "text", "panel", "value")
+    return {name: getattr(mark, name) for name in names}

@@ -1,0 +1,220 @@
+"""The first sentence of the page of a run, and its largest finding with what happened there. Imports NumPy only.
+
+Every observer is judged by itself: one that fails makes no other worse, and is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, isnan, nan
+
+import numpy as np
+
+from cosim.evaluation.balise_gaps import GapErrors, gap_errors
+from cosim.evaluation.event_counts import accepted_stamps
+from cosim.evaluation.metrics import judged_size
+from cosim.evaluation.result_warnings import all_warnings, largest_tolerable
+from cosim.evaluation.roles import Quantity, estimation_error, label, recorded
+from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.summary_entries import mapping_entry, number_entry
+from cosim.expectations.judged import Judged
+from cosim.report.live.first_sentence import first_sentence
+from cosim.report.live.live_page import Mark, Verdict
+from cosim.report.page.run_curves import QUANTITIES
+from cosim.results.result import Result
+from fmus.tables.numbers import number
+
+_CAUSES = ("fault", "zone", "telegram problem", "failure", "message")
+"""Kinds of marks that may be why an error is large."""
+_BEFORE = 2.0  # of the usual gaps: as long before, what happened may be why
+_LONG_GAP = 1.5  # of the usual gaps: a longer one is named
+
+
+@dataclass(frozen=True, slots=True)
+class ObserverStatus:
+    """How an observer did.
+
+    Args:
+        name: of its component. speed, position: largest error after the start-up [m/s], [m]; NaN where it is not known,
+            infinite once diverged. fails: whether its speed says nothing of this train. within: share of the gaps
+            between balises at whose end the position error is inside SUBSET-041 [1]; NaN without gaps.
+    """
+
+    name: str
+    speed: float
+    position: float
+    fails: bool
+    within: float
+
+    @property
+    def order(self) -> tuple[bool, float, float]:
+        """The best observer has the smallest."""
+        size = self.position if not isnan(self.position) else self.speed
+        return self.fails, -self.within if not isnan(self.within) else 0.0, size
+
+    def sizes(self) -> str:
+        """Its largest errors in words."""
+        known = [(self.speed, "m/s"), (self.position, "m")]
+        return " and ".join(f"{number(v)} {unit}" for v, unit in known if isfinite(v))
+
+
+def observer_statuses(result: Result, spec: ReportSpec) -> list[ObserverStatus]:
+    """How each observer with an error of speed or position did, the best first.
+
+    Args:
+        result: the run. spec: roles, start of the evaluation.
+    """
+    settled = result.time >= spec.evaluate_after
+    tolerable, gaps = largest_tolerable(result, spec), gap_errors(result, spec)
+
+    def largest(observer: str, quantity: Quantity) -> float:
+        error = estimation_error(result, spec, observer, quantity)
+        return nan if error is None else judged_size(result.time[settled], error[settled]).max_abs
+
+    found = []
+    for observer in spec.observers:
+        speed, position = largest(observer, "speed"), largest(observer, "position")
+        fails = speed > tolerable or position == np.inf
+        if any(estimation_error(result, spec, observer, q) is not None for q in QUANTITIES):
+            found.append(ObserverStatus(observer, speed, position, fails, _within(gaps, observer)))
+    return sorted(found, key=lambda status: status.order)
+
+
+def _within(gaps: GapErrors, observer: str) -> float:
+    return gaps.within_envelope(observer) if observer in gaps.errors else nan
+
+
+def run_verdict(
+    result: Result, spec: ReportSpec, judged: Sequence[Judged], statuses: Sequence[ObserverStatus]
+) -> Verdict:
+    """What a run comes to, in a sentence or two.
+
+    Args:
+        result: the run. spec: roles. judged: expectations. statuses: from `observer_statuses`.
+    """
+    reached = number(float(result.time[-1])) if len(result.time) else "0"
+    if result.failure is not None:
+        stop = number_entry(result.summary, "stop")
+        end = f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else "")
+        return Verdict(f"The run ended early, {end}: {first_sentence(result.failure)[0]}", "bad")
+    unmet = [one for one in judged if not one.passed]
+    speed = recorded(result, spec.true_speed)
+    moves = speed is None or not len(speed) or bool(np.any(~(np.abs(speed) <= 0.01)))
+    if not moves:
+        text = f"The train never moves up to {reached} s: this run says nothing of its observers."
+        return Verdict(_with_unmet(unmet, judged, text), "bad" if unmet else "doubt")
+    text, good = _of_observers(spec, statuses) if statuses else (_without_observers(result, reached), True)
+    mood = "bad" if unmet or (statuses and all(s.fails for s in statuses)) else "good" if good else "doubt"
+    others = len(all_warnings(result, spec)) - sum(s.fails for s in statuses)
+    if others > 0 and mood == "good":
+        mood, text = "doubt", f"{text} {others} {'warning' if others == 1 else 'warnings'}: see below."
+    return Verdict(_with_unmet(unmet, judged, text), mood)  # type: ignore[arg-type]  # one of the moods
+
+
+def _with_unmet(unmet: Sequence[Judged], judged: Sequence[Judged], text: str) -> str:
+    if not unmet:
+        return f"{text} All {len(judged)} expectations are met." if judged else text
+    return f"{len(unmet)} of {len(judged)} expectations are not met, first: {unmet[0].name} ({unmet[0].text}). {text}"
+
+
+def _without_observers(result: Result, reached: str) -> str:
+    signals = len(result.table.dtype.names or ()) - 1
+    components = len({name.partition(".")[0] for name in (result.table.dtype.names or ())[1:]})
+    text = (
+        f"The run is complete to {reached} s: {signals} signals of {components} components; nothing is estimated in it."
+    )
+    missing = [name for name in (result.table.dtype.names or ())[1:] if not np.isfinite(result[name]).all()]
+    return f"{text} Not finite somewhere: {', '.join(missing[:3])}." if missing else text
+
+
+def _of_observers(spec: ReportSpec, statuses: Sequence[ObserverStatus]) -> tuple[str, bool]:
+    """What the observers came to, and whether all are good."""
+    work, fail = [s for s in statuses if not s.fails], [s for s in statuses if s.fails]
+    names = ", ".join(label(spec, s.name) for s in fail)
+    failing = (
+        f" {names} {'fails' if len(fail) == 1 else 'fail'}: off by more than the speed of the train." if fail else ""
+    )
+    if not work:
+        return f"No observer is of use here.{failing}", False
+    best, count = work[0], len(statuses)
+    if not best.sizes():
+        return f"Too few rows are judged to say anything of {label(spec, best.name)}.{failing}", False
+    inside = [s for s in statuses if s.within >= 1.0]
+    where = _where(best)
+    if count == 1:
+        return f"{label(spec, best.name)} is off by at most {best.sizes()}{where}.", not best.within < 1.0
+    if not isnan(best.within):
+        text = f"{len(inside)} of {count} observers are inside SUBSET-041 at every balise; the best, "
+        text += f"{label(spec, best.name)}, is off by at most {best.sizes()}{'' if inside else where}."
+    else:
+        text = f"The best of {count} observers, {label(spec, best.name)}, is off by at most {best.sizes()}"
+        text += (
+            f"; the worst{' of the others' if fail else ''}, {label(spec, work[-1].name)}, by {work[-1].sizes()}."
+            if len(work) > 1
+            else "."
+        )
+    return text + failing, not fail and all(not s.within < 1.0 for s in work)
+
+
+def _where(status: ObserverStatus) -> str:
+    if isnan(status.within):
+        return ""
+    share = number(100.0 * (1.0 - status.within), 2)
+    return (
+        ", inside SUBSET-041 at every balise"
+        if status.within >= 1.0
+        else f", outside SUBSET-041 at {share} % of the balises"
+    )
+
+
+def largest_finding(result: Result, spec: ReportSpec, statuses: Sequence[ObserverStatus], marks: Sequence[Mark]) -> str:
+    """The largest error of all observers, and what happened at that time; empty where there is none.
+
+    Args:
+        result: the run. spec: roles. statuses: from `observer_statuses`. marks: from `run_marks`.
+    """
+    if not statuses:
+        return ""
+    worst = statuses[-1]
+    if worst.fails:
+        error = estimation_error(result, spec, worst.name, "speed")
+        if error is None:
+            return ""
+        lost = (result.time >= spec.evaluate_after) & ~(np.abs(error) <= largest_tolerable(result, spec))
+        time = float(result.time[int(np.argmax(lost))])
+        what = f"{label(spec, worst.name)} is off by more than the speed of the train from {number(time, 4)} s on"
+        return _with_causes(what, time, worst.name, result, marks)
+    panel = "Position error" if any(not isnan(s.position) for s in statuses) else "Speed error"
+    largest = [m for m in marks if m.kind == "worst" and m.panel == panel and m.value is not None]
+    if not largest:
+        return ""
+    mark = max(largest, key=lambda m: abs(m.value or 0.0))
+    name = next(s.name for s in statuses if mark.text.startswith(f"largest {panel.lower()} of {label(spec, s.name)}:"))
+    text = f"{mark.text[0].upper()}{mark.text[1:]}, at {number(mark.start, 4)} s"
+    return _with_causes(text, mark.start, name, result, marks)
+
+
+def _with_causes(what: str, time: float, observer: str, result: Result, marks: Sequence[Mark]) -> str:
+    causes = list(_causes(time, observer, result, marks))
+    return f"{what}: {'; '.join(causes)}." if causes else f"{what}. No fault, zone or telegram lies near."
+
+
+def _causes(time: float, observer: str, result: Result, marks: Sequence[Mark]) -> Iterator[str]:
+    """What happened there or shortly before, and what was known before the run."""
+    stamps = np.array(accepted_stamps(result.events, observer))
+    usual = float(np.median(np.diff(stamps))) if len(stamps) > 2 else 0.0
+    near = [
+        m
+        for m in marks
+        if m.kind in _CAUSES and m.start <= time <= (m.end if m.end is not None else m.start + _BEFORE * usual)
+    ]
+    for mark in {m.kind: m for m in near}.values():  # the last of each kind
+        until = f" to {number(mark.end, 4)} s" if mark.end is not None else " s"
+        yield f"{mark.text} ({number(mark.start, 4)}{until})"
+    before = stamps[stamps < time]
+    if len(before) and usual and time - before[-1] > _LONG_GAP * usual:
+        yield f"the last telegram it used was {number(time - float(before[-1]))} s before, {number(usual)} s are usual"
+    entry = mapping_entry(result, "certificates").get(observer)
+    if isinstance(entry, Mapping) and str(entry.get("holds")) == "False" and entry.get("explanation"):
+        yield f"its certificate does not hold: {first_sentence(entry['explanation'])[0]}".rstrip(".")
