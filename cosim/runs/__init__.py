@@ -15,7 +15,7 @@ A study makes jobs and reduces what they leave; all else stands here::
   (``workers=2``) or on a cluster of `dask.distributed` (``scheduler="tcp://host:8786"``), and hands each over as it
   ends. What a job gives does not depend on where it is done, nor on the order. A failure is a value (`Failure`) and
   ends nothing else; ``apart=True`` keeps a single worker in a process of its own, which is replaced when it dies:
-  `Run.apart` says whether a scenario has native code of others that could take the process along.
+  `Run.apart` says whether a scenario has native code of others, or a limit of calls, that may take the process along.
 - The **journal** (`cosim.runs.journal.Journal`, ``runs.jsonl``) gets a line for each job as soon as it is done. With
   ``resume`` jobs whose key stands in it are not done again, except for those that failed for a reason outside of them:
   interrupted, ended from outside, no memory left. ``retry`` does all again that failed.

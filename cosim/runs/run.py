@@ -60,15 +60,29 @@ class Run(Job):
 
     @property
     def apart(self) -> bool:
-        """Whether it calls native code of others, which may take its process along, and can be done in another one:
-        a class that a script defines is not found there without the script, and not all that it holds can be sent.
+        """Whether it may take its process along, for it calls native code of others or has calls that are limited in
+        time, and can be done in another one: a class that a script defines is not found there without the script, and
+        not all that it holds can be sent.
         """
-        named = [*(str(file.path) for file in self.files()), *map(str, self.settings.values())]
-        if not any(name.endswith(".fmu") for name in named):
+        if not (self._calls_fmus or self._is_limited):
             return False
         try:
             return b"__main__" not in pickled(self)
         except RunError:
+            return False
+
+    @property
+    def _calls_fmus(self) -> bool:
+        """Whether FMUs of others are in it."""
+        named = [*(str(file.path) for file in self.files()), *map(str, self.settings.values())]
+        return any(name.endswith(".fmu") for name in named)
+
+    @property
+    def _is_limited(self) -> bool:
+        """Whether a call that takes too long is to be ended, for which its process must end."""
+        try:
+            return self._table.master.call_timeout is not None
+        except CosimError:  # the run says why it cannot be
             return False
 
     def do(self) -> Ended:

@@ -67,7 +67,8 @@ class Sweep:
 
         Args:
             workers: processes at a time; results do not depend on their number. A single one is this process, or where
-                the scenario calls FMUs of others a process of its own, so that a run that crashes fails alone.
+                the scenario calls FMUs of others or sets ``master.call_timeout`` a process of its own, so that a run
+                that crashes or hangs fails alone.
             progress: called with the number done and the number in all.
             scheduler: address of a scheduler of `dask.distributed` whose workers do the runs.
 

@@ -110,6 +110,44 @@ def test_only_scenarios_with_code_of_others_are_run_apart(fmu: Path) -> None:
     assert Run(three(fmu)).apart
     assert not Run(plant).apart
     assert Run(plant, {"train.fmu": str(fmu)}).apart
+    assert Run(plant, {"master.call_timeout": 1.0}).apart
+    assert not Run(plant, {"master.call_timeout": -1.0}).apart  # what it cannot be is said by the run
+
+
+HARMFUL = """
+import ctypes, os, re
+
+class Harmful:
+    inputs, outputs = (), ("y",)
+
+    def __init__(self, deed=0.0):
+        self.deed = deed
+
+    def step(self, t, inputs, dt):
+        if t > 0.245 and self.deed == 1.0:
+            os._exit(0)
+        if t > 0.245 and self.deed == 2.0:
+            ctypes.string_at(0)
+        if t > 0.245 and self.deed == 3.0:
+            re.fullmatch("(a+)+", 50 * "a" + "b")
+        return {"y": t}
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the crash is a signal")
+def test_a_python_model_that_ends_its_process_or_hangs_is_a_row_where_calls_are_limited(tmp_path: Path) -> None:
+    (tmp_path / "harmful.py").write_text(HARMFUL)
+    scenario = Scenario(folder=tmp_path, stop=0.5, step=0.01, master={"call_timeout": 1.0})
+    scenario.add("own", model="harmful.py:Harmful")
+    found = [run.failure for run in scenario.vary({"own.deed": [0.0, 1.0, 2.0, 3.0, 0.0]}).run().runs]
+    where = "component 'own' in doStep at t = 0.25 s"
+    assert found == [
+        None,
+        f"{where}: its process ended with exit code 0",
+        f"{where}: its process was ended by the signal SIGSEGV",
+        f"{where} has not returned for 1 s, the limit that call_timeout sets",
+        None,
+    ]
 
 
 @pytest.mark.compiler
