@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import sys
 import tempfile
+import threading
+import time
 from multiprocessing import connection, spawn
 from pathlib import Path
 from typing import Any
@@ -13,6 +16,9 @@ from typing import Any
 from cosim.process.last_call import LAST_CALL
 from cosim.runs import workers
 from cosim.runs.job import Ended, Failure, perform
+
+_PAUSE = 1.0
+"""How often is looked whether the process that asked is still there [s]."""
 
 
 def serve(handle: int, page: str, script: dict[str, str]) -> None:
@@ -25,6 +31,7 @@ def serve(handle: int, page: str, script: dict[str, str]) -> None:
     LAST_CALL.attach(Path(page))
     LAST_CALL.timed = True
     tempfile.tempdir = str(Path(page).parent)  # what a process that dies leaves behind is removed with it
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is interrupted, and ends this process
     pipe = _opened(handle)
     if script:
@@ -38,6 +45,13 @@ def serve(handle: int, page: str, script: dict[str, str]) -> None:
             pipe.send_bytes(_answer(data))
         except (BrokenPipeError, ConnectionResetError):
             return
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the one that asked is gone, whatever it does: nobody else would end a call that hangs."""
+    while os.getppid() == parent:
+        time.sleep(_PAUSE)
+    os._exit(1)
 
 
 def _run_script(script: dict[str, str]) -> None:

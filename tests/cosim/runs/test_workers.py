@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,37 @@ def test_a_call_that_lets_no_thread_run_is_ended_too() -> None:
 def look_for_ever(limit: float) -> bool:
     with limited_calls(limit), LAST_CALL.making("own", "doStep", 0.2):
         return re.fullmatch("(a+)+", 50 * "a" + "b") is not None
+
+
+ASKS = """
+import sys
+from cosim.runs.workers import Team
+from worker_tasks import Task, linger
+if __name__ == "__main__":
+    with Team(1) as team:
+        list(team.each([Task(linger, sys.argv[1])]))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="its processes have no parents that are looked for")
+def test_a_worker_that_hangs_ends_with_the_process_that_asked(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    with subprocess.Popen([sys.executable, "-c", ASKS, str(tmp_path)], env=environment) as asking:
+        while not (begun := list(tmp_path.iterdir())):
+            time.sleep(0.05)
+        asking.kill()
+    until = time.monotonic() + 30.0
+    while exists(int(begun[0].name)):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+
+
+def exists(number: int) -> bool:
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 SCRIPT = """
