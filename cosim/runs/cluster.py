@@ -3,6 +3,7 @@
 Jobs travel as bytes with the user's own classes and functions in them, files by their content: once to a worker, which
 keeps them as long as it lives. On a worker a job is done in a process of its own (`cosim.runs.workers`), so that an FMU
 that crashes takes neither the worker nor other jobs along. What a worker had begun that is gone is done by another one.
+Who stops asking (an interrupt) ends the processes of the jobs that nobody waits for any more.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from itertools import islice
 from pathlib import Path, PurePosixPath
 from tempfile import mkdtemp
 from typing import Any
+from uuid import uuid4
 
 from cosim.errors import OutputError, RunError
+from cosim.run.outcome import INTERRUPTED
 from cosim.run.results_manifest import sha256
 from cosim.runs.job import Ended, Failure, Job
 from cosim.runs.keys import digest, version_text
@@ -108,13 +111,13 @@ class Cluster(AbstractContextManager["Cluster"]):
         Args:
             jobs: to be done.
         """
-        waiting = iter(jobs)
+        waiting, round_ = iter(jobs), uuid4().hex
         known: dict[Any, Job] = {}
         running = distributed.as_completed(loop=self._client.loop)
 
         def hand_over(count: int) -> None:
             for job in islice(waiting, count):
-                future = self._submit(job)
+                future = self._submit(job, round_)
                 known[future] = job
                 running.add(future)
 
@@ -127,17 +130,24 @@ class Cluster(AbstractContextManager["Cluster"]):
                 hand_over(1)
                 yield job, ended
         finally:
-            self._client.cancel(list(known))
+            if known:
+                self._stop(list(known), round_)
+
+    def _stop(self, futures: list[Any], round_: str) -> None:
+        """End what is waited for no more, also where it is being done; a scheduler that is gone has ended it."""
+        with suppress(OSError, TimeoutError, RuntimeError):
+            self._client.cancel(futures)
+            self._client.run(_stop_round, round_, on_error="return")
 
     def __exit__(self, *_: object) -> None:
         self._contents.clear()
         self._client.close()
 
-    def _submit(self, job: Job) -> Any:
+    def _submit(self, job: Job, round_: str) -> Any:
         files = [self._file_set(file.key, file.path, file.parts) for file in job.files() if file.path.exists()]
         contents = [self._contents[file.content] for file in files]
         data = _pickled(job)
-        return self._client.submit(_on_worker, data, files, contents, version_text(), pure=False)
+        return self._client.submit(_on_worker, data, files, contents, version_text(), round_, pure=False)
 
     def _file_set(self, key: str, path: Path, parts: Sequence[Path]) -> _FileSet:
         """A file, which is handed over where it has not been; workers fetch it from there when they need it."""
@@ -200,6 +210,8 @@ def _ended(future: Any) -> Ended:
 # -- on a worker ------------------------------------------------------------------------------------------------------
 
 _of_thread = threading.local()
+_stopped: set[str] = set()
+"""Rounds whose jobs nobody waits for."""
 
 
 def _itself(data: list[bytes]) -> list[bytes]:
@@ -207,7 +219,12 @@ def _itself(data: list[bytes]) -> list[bytes]:
     return data
 
 
-def _on_worker(job: bytes, files: list[_FileSet], contents: list[list[bytes]], versions: str) -> Ended:
+def _stop_round(round_: str) -> None:
+    """End the processes of the jobs of a round, and begin no more of them."""
+    _stopped.add(round_)
+
+
+def _on_worker(job: bytes, files: list[_FileSet], contents: list[list[bytes]], versions: str, round_: str) -> Ended:
     """Do a job in the process that belongs to this thread of the worker."""
     if version_text() != versions:
         address = distributed.get_worker().address
@@ -216,9 +233,8 @@ def _on_worker(job: bytes, files: list[_FileSet], contents: list[list[bytes]], v
     places = {file.key: _unpacked(root, file, data) for file, data in zip(files, contents, strict=True)}
     if not hasattr(_of_thread, "team"):
         _of_thread.team = Team(1)
-    ((_, ended),) = _of_thread.team.each([_Shipped(job, places)])
-    found: Ended = ended
-    return found
+    found = [ended for _, ended in _of_thread.team.each([_Shipped(job, places)], lambda: round_ in _stopped)]
+    return found[0] if found else Ended(failure=Failure(INTERRUPTED, outside=True))
 
 
 def _unpacked(root: Path, file: _FileSet, data: list[bytes]) -> str:

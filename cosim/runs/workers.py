@@ -14,7 +14,7 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing import spawn
 from multiprocessing.connection import Pipe, wait
@@ -54,11 +54,11 @@ class Team:
         self.workers = workers
         self._idle: list[_Worker] = []
 
-    def each(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Ended]]:
+    def each(self, jobs: Iterable[Job], stopped: Callable[[], bool] = lambda: False) -> Iterator[tuple[Job, Ended]]:
         """One round.
 
         Args:
-            jobs: to be done.
+            jobs: to be done. stopped: asked now and then, whether nobody waits for them any more.
 
         Yields:
             Jobs with what they left, as they end.
@@ -75,7 +75,7 @@ class Team:
 
         try:
             occupy()
-            while busy:
+            while busy and not stopped():
                 for worker in _ready(busy):
                     job, ended = worker.job, worker.answer()
                     busy.remove(worker)

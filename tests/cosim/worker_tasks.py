@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from cosim.runs.job import Job
@@ -41,3 +43,9 @@ def square(argument: Any) -> Any:
 def process_id(_: Any) -> int:
     """Where this runs."""
     return os.getpid()
+
+
+def linger(folder: str) -> None:
+    """Leaves a file with the number of its process, and stays for two minutes."""
+    Path(folder, str(os.getpid())).touch()
+    time.sleep(120.0)

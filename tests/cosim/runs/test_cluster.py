@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -15,7 +17,7 @@ import numpy as np
 import pytest
 from small_scenarios import small
 from test_fmus.events import DEEDS, hostile_fmu
-from worker_tasks import Task, square
+from worker_tasks import Task, linger, square
 
 from cosim import Scenario
 from cosim.cli import main
@@ -23,6 +25,7 @@ from cosim.errors import RunError
 from cosim.runs import cluster, keys
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import make_executor
+from cosim.runs.job import Failure
 from cosim.runs.journal import JOURNAL, Journal, read_lines
 from cosim.studies.seed_runs import seed_study
 from cosim.tuning.tune import tune
@@ -158,6 +161,10 @@ def test_other_versions_and_nobody_are_refused_in_words(
     monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
     with pytest.raises(RunError, match=r"scheduler tcp://127\.0\.0\.1:9 cannot be reached"):
         make_executor(scheduler="tcp://127.0.0.1:9")
+    with make_executor(scheduler=address) as there, monkeypatch.context() as patched:
+        patched.setattr(cluster, "version_text", lambda: "others")  # as to a worker that came later
+        with pytest.raises(RunError, match=r"Worker tcp://.* has the versions {.*}, the study others"):
+            list(there.each([Task(square, 2)]))
     monkeypatch.setattr(keys, "versions", lambda: {"numpy": "1.0"})
     keys.version_text.cache_clear()
     try:
@@ -169,6 +176,53 @@ def test_other_versions_and_nobody_are_refused_in_words(
         worker.kill()
     with pytest.raises(RunError, match="has no workers"):
         make_executor(scheduler=address)
+
+
+class Lost:
+    """A job of which a cluster reports no result."""
+
+    def __init__(self, status: str, error: Exception | None) -> None:
+        self.status, self._error = status, error
+
+    def exception(self) -> Exception | None:
+        return self._error
+
+
+def test_a_job_that_no_worker_survives_may_be_done_another_time() -> None:
+    distributed = pytest.importorskip("distributed")
+    killed = distributed.KilledWorker("job", None, 3)
+    for lost in (Lost("error", killed), Lost("lost", None), Lost("cancelled", None)):
+        failure = cluster._ended(lost).failure
+        assert failure == Failure("the workers that did it were lost, again and again", outside=True)
+    assert cluster._ended(Lost("error", MemoryError("all of it"))).failure == Failure(
+        "MemoryError: all of it", outside=True
+    )
+
+
+def test_who_interrupts_a_study_ends_its_jobs_on_the_cluster(
+    workers: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    """Those that are being done, and those that wait; the workers do what they are asked for next."""
+    begun = tmp_path / "begun"
+    begun.mkdir()
+
+    def interrupt() -> None:
+        while len(list(begun.iterdir())) < 2:
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with make_executor(scheduler=workers[0]) as there:
+        threading.Thread(target=interrupt, daemon=True).start()
+        with pytest.raises(KeyboardInterrupt):
+            list(there.each([Task(linger, str(begun)) for _ in range(8)]))
+        since = time.monotonic()
+        assert [ended.row for _, ended in there.each([Task(square, 2), Task(square, 3)])] in ([4, 9], [9, 4])
+        assert time.monotonic() - since < 60.0  # of the 120 s that a job lasts
+    processes = [int(path.name) for path in begun.iterdir()]
+    assert len(processes) == 2
+    for number in processes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(number, 0)
 
 
 def test_a_tuning_finds_on_a_cluster_what_it_finds_here(
