@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -121,8 +123,25 @@ def spacings(path: Path) -> None:
     small_picture.save_small(figure, path)
 
 
+def page(path: Path) -> None:
+    """The first screen of the page of the first run, as a browser shows it.
+
+    Raises:
+        RuntimeError: there is no Chromium, or it left no picture.
+    """
+    browser = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    report = ran("freight_profile_d").write("results")["report"]
+    if browser is None:
+        raise RuntimeError("install Chromium, or name a browser by $CHROMIUM")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=8000"]
+    size, target = "--window-size=1000,1000", f"--screenshot={path}"
+    subprocess.run([browser, *options, size, target, report.resolve().as_uri()], check=True, capture_output=True)
+    small_picture.shrink(path)
+
+
 DRAWN: dict[str, tuple[str, Callable[[Path], None]]] = {
     "structure": ("first_run", structure),
+    "page": ("first_run", page),
     "exact_and_stale": ("scenarios", exact_and_stale),
     "jam": ("scenarios", jam),
     "spacings": ("studies", spacings),
