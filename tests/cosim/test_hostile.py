@@ -89,7 +89,9 @@ DEATHS = [
 
 
 @pytest.mark.parametrize(("deed", "stepper", "words"), DEATHS)
-def test_a_death_is_told_and_every_row_is_kept(fmu: Path, tmp_path: Path, deed: str, stepper: str, words: str) -> None:
+def test_a_death_is_reported_and_every_row_is_kept(
+    fmu: Path, tmp_path: Path, deed: str, stepper: str, words: str
+) -> None:
     error = told(start(fmu, tmp_path, deed, stepper=stepper))
     assert f"component 'bad' {words}" in error
     result = load_result(tmp_path / "out")
@@ -230,7 +232,7 @@ def test_pytest_is_not_green(fmu: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("deed", "words"), [("exits", ": its process ended with exit code 0"), ("hangs", " has not returned for 0.3 s")]
 )
-def test_a_worker_tells_who_took_it_along(fmu: Path, deed: str, words: str) -> None:
+def test_a_worker_reports_who_took_it_along(fmu: Path, deed: str, words: str) -> None:
     with Team(1) as team:
         ((_, ended),) = team.each([Run(hostile(fmu, deed, call_timeout=0.3))])
     assert ended.failure is not None
@@ -263,7 +265,7 @@ def test_words_run_out_without_harm(tmp_path: Path) -> None:
     ("deed", "what"), [("moves", "the working directory"), ("rounds", "the rounding of floating-point numbers")]
 )
 @pytest.mark.parametrize("stepper", ["python", "compiled"])
-def test_what_an_fmu_changes_for_all_is_put_back_and_told(
+def test_what_an_fmu_changes_for_all_is_put_back_and_reported(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, deed: str, what: str, stepper: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -192,7 +192,7 @@ def test_constants_of_theorem_4_1() -> None:
     )
 
 
-def test_bad_input_is_told_in_words() -> None:
+def test_bad_input_is_reported_in_words() -> None:
     with pytest.raises(ValueError, match="Unknown state-affine model 'no_such'; known are: time_varying_oscillator"):
         AdaptivePredictor("no_such")
     with pytest.raises(ValueError, match="unknown sensitivity 'often'; choose one of: continuous, sampled"):

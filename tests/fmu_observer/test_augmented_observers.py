@@ -337,7 +337,7 @@ def test_speed_error_with_white_noise(uphill: Journey, noise: float, theta: floa
     assert error.mean() == pytest.approx(published, rel=0.2)
 
 
-def test_drift_costs_less_speed_than_white_noise_of_the_same_size(uphill: Journey) -> None:
+def test_drift_costs_less_speed_than_white_noise_of_equal_size(uphill: Journey) -> None:
     """Half a metre that wanders over ten minutes gives a third of the speed error of half a metre of white noise, or
     less.
     """

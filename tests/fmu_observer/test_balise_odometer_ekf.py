@@ -122,7 +122,7 @@ def test_a_train_that_stands_is_not_believed_to_run_backwards() -> None:
     assert runner.state("estimated_speed") == 0.0
 
 
-def test_the_gate_of_telegrams_is_told_three_standard_deviations() -> None:
+def test_the_gate_of_telegrams_gets_three_standard_deviations() -> None:
     runner = running()
     x = np.zeros(runner.runtime.system.state_count)
     x[4] = 7.0**2

@@ -169,7 +169,7 @@ def test_outputs_can_be_read_in_every_mode_after_instantiation(version: int, mod
 
 
 @BOTH
-def test_a_freed_block_answers_nothing_until_it_is_instantiated_again(version: int) -> None:
+def test_a_freed_block_refuses_every_call_until_it_is_instantiated_again(version: int) -> None:
     driven = _in_mode(version, "freed")
     with pytest.raises(BlockCallError, match=r"has been freed; begin anew with instantiate\(\)"):
         driven.get("energy")
@@ -218,7 +218,7 @@ def test_a_step_that_does_not_continue_is_refused_and_changes_nothing(
     driven.step(H)
 
 
-def test_times_that_differ_by_rounding_are_the_same() -> None:
+def test_times_that_differ_by_rounding_are_equal() -> None:
     driven = Driven(SWING, 3).start()
     t = 0.0
     for _ in range(1000):

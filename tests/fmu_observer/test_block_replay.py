@@ -85,7 +85,7 @@ ON_TIME, LATE = Driven(SWING, 3), Driven(SWING, 3)
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(HAPPENINGS, min_size=1, max_size=6).filter(_distinguishable))
-def test_any_events_told_late_in_any_order_give_what_telling_in_time_gives(happenings: list[Happening]) -> None:
+def test_any_events_notified_late_in_any_order_give_what_notifying_in_time_gives(happenings: list[Happening]) -> None:
     expected = _run(ON_TIME, happenings, weather, in_time=True)
     found = _run(LATE, happenings, weather, in_time=False)
     np.testing.assert_array_equal(found, expected)
@@ -202,7 +202,7 @@ def test_the_past_is_bounded_and_always_reaches_as_far_as_the_horizon() -> None:
         assert records[0].t <= max(0.0, (k + 1) * H - 1.0)
 
 
-def test_an_event_told_twice_happens_twice_late_or_not() -> None:
+def test_an_event_notified_twice_happens_twice_late_or_not() -> None:
     late, on_time = Driven(SWING, 3).start(), Driven(SWING, 3).start()
     for _ in range(2):
         on_time.event("kick", 0.03, kick(1.5))
@@ -213,7 +213,7 @@ def test_an_event_told_twice_happens_twice_late_or_not() -> None:
     np.testing.assert_array_equal(late.everything(), on_time.everything())
 
 
-def test_of_equal_stamps_the_one_told_first_comes_first_late_or_not() -> None:
+def test_of_equal_stamps_the_one_notified_first_comes_first_late_or_not() -> None:
     runs = []
     for names in (("kick", "mark"), ("mark", "kick")):
         late, on_time = Driven(SWING, 3).start(), Driven(SWING, 3).start()

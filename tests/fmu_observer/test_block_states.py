@@ -235,7 +235,7 @@ def test_a_saved_past_is_not_touched_by_a_replay_after_it() -> None:
     assert driven.block.serializeFMUState(saved) == before
 
 
-def test_the_spelling_of_fmi2_does_the_same() -> None:
+def test_the_spelling_of_fmi2_has_an_equal_effect() -> None:
     driven = Driven(SWING, 2)
     _to_step(driven)
     block = driven.block
@@ -249,7 +249,7 @@ def test_the_spelling_of_fmi2_does_the_same() -> None:
         np.testing.assert_array_equal(found, expected)
 
 
-def test_serialised_again_the_bytes_are_the_same() -> None:
+def test_serialised_again_the_bytes_are_equal() -> None:
     driven = Driven(SWING, 3)
     _to_event(driven)
     block = driven.block
@@ -389,7 +389,7 @@ def test_a_state_brings_its_policy_and_its_horizon_with_it(version: int) -> None
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_after_a_reset_the_same_run_comes_out_again(version: int) -> None:
+def test_after_a_reset_an_equal_run_comes_out(version: int) -> None:
     driven = Driven(SWING, version)
     _to_step(driven)
     first = _from_step(driven)

@@ -31,7 +31,7 @@ PLANS = st.lists(
 
 @settings(max_examples=80, deadline=None)
 @given(plan=PLANS, start_time=st.sampled_from([0.0, 3.0, 1234.5]))
-def test_both_faces_and_the_runtime_give_the_same_bits(plan: list[Any], start_time: float) -> None:
+def test_both_faces_and_the_runtime_give_equal_bits(plan: list[Any], start_time: float) -> None:
     for driven in (FMI2, FMI3):
         driven.start(start_time, angle=0.6)
     BARE.start(start_time, angle=0.6)
@@ -59,7 +59,7 @@ def test_both_faces_and_the_runtime_give_the_same_bits(plan: list[Any], start_ti
 
 
 @pytest.mark.parametrize("name", ["differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio"])
-def test_shipped_observers_are_the_same_through_both_faces_and_bare(name: str) -> None:
+def test_shipped_observers_are_equal_through_both_interfaces_and_bare(name: str) -> None:
     system = OBSERVERS[name]()
     driven, bare = [Driven(system, version).start() for version in (2, 3)], Reference(system).start()
     outputs = [s.name for s in system.outputs]

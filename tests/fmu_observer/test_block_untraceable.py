@@ -53,7 +53,7 @@ def test_late_events_and_saved_states_work_without_tracing(version: int) -> None
     assert late.get("doors") == [0.0]
 
 
-def test_traced_or_not_the_block_does_the_same() -> None:
+def test_traced_or_not_the_block_runs_equally() -> None:
     runs = []
     for system in (Swing(), PlainSwing()):
         driven = Driven(system, 3).start()
@@ -67,7 +67,7 @@ def test_traced_or_not_the_block_does_the_same() -> None:
 
 
 @BOTH
-def test_every_output_depends_on_every_input_where_nobody_can_tell(version: int) -> None:
+def test_every_output_depends_on_every_input_where_nobody_can_know(version: int) -> None:
     description = Driven(Doorman(), version).block.model_description
     for unknown in (*description.outputs, *description.derivatives):
         assert [v.name for v in unknown.dependencies] == ["time", "speed", "stop_length", "travelled"]

@@ -54,7 +54,7 @@ def test_vectors_can_be_replaced_whole_or_by_element() -> None:
     assert whole.numbers[GROWTH] != next(observer.findings(0.3)).numbers[GROWTH]
 
 
-def test_the_sentences_tell_the_three_cases_apart() -> None:
+def test_the_sentences_distinguish_the_three_cases() -> None:
     observer = DifferentiatorCdo()
     assert "stable for every sequence of balise gaps up to 0.4 s" in next(observer.findings(0.4)).explain()
     assert "NOT CERTIFIED for mixed balise gaps up to 0.55 s" in next(observer.findings(0.55)).explain()

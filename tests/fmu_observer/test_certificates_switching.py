@@ -156,7 +156,7 @@ def test_slopes_within_gaps_are_noted_for_observers_of_models() -> None:
     )
 
 
-def test_what_cannot_be_judged_is_refused() -> None:
+def test_what_cannot_be_evaluated_is_refused() -> None:
     one, other = np.diag([1.0, 0.0]), np.diag([0.5, 0.0])
     flow = np.array([[0.0, -1.0], [0.0, -2.0]])
     with pytest.raises(ValueError, match="share one reset"):

@@ -68,7 +68,7 @@ def test_nothing_is_certified_without_slopes(observer: Any, known: dict[str, Any
         next(observer(chain(phi=steep, **known)).findings(0.1))
 
 
-def test_slopes_give_the_lipschitz_constant_where_none_is_given() -> None:
+def test_slopes_give_the_lipschitz_constant_where_none_is_stated() -> None:
     model = chain(phi=steep, slopes=STEEP)
     assert model.lipschitz == pytest.approx(np.hypot(50.0, 30.0))
     # Lyapunov size 1.707: 2 sqrt(2) 1.707 58.3 = 281, slopes less
@@ -90,7 +90,7 @@ def test_a_part_that_cannot_be_traced_has_an_unknown_slope() -> None:
     assert chain(phi=lambda x, _u: vector(0.0 * x[0], x[0] if x[0] > 0.0 else 0.0)).lipschitz == np.inf
 
 
-def test_a_long_steep_chain_is_judged_though_its_bound_leaves_the_range_of_numbers() -> None:
+def test_a_long_steep_chain_is_evaluated_though_its_bound_leaves_the_range_of_numbers() -> None:
     steepest = np.zeros((5, 5))
     steepest[4] = 1e3
     model = chain(5, phi=lambda x, _u: vector(*(0.0 * x[0],) * 4, 1e3 * np.sin(sum(x))), slopes=(-steepest, steepest))

@@ -98,7 +98,7 @@ def test_a_double_integrator_has_the_limit_of_the_closed_form(
     assert error.spectral_radius(0.999 * limit) < 1.0 < error.spectral_radius(1.001 * limit)
 
 
-def test_a_decay_that_is_too_slow_to_judge_is_refused_in_words() -> None:
+def test_a_decay_that_is_too_slow_to_evaluate_is_refused_in_words() -> None:
     with pytest.raises(ValueError, match=r"lasts 20 times the fastest time of the model.*Raise the decay rate"):
         decaying_error(-10.0 * np.eye(2), np.ones((2, 1)), C, 1.0, 0.5, (0, 1))
 
@@ -155,7 +155,7 @@ def test_slopes_that_change_within_a_gap_do_not_break_what_is_certified_for_them
         assert after @ found.P @ after < e @ found.P @ e
 
 
-def test_changes_within_a_gap_add_what_they_add_to_an_exponential_that_is_nearly_the_same() -> None:
+def test_changes_within_a_gap_add_what_they_add_to_an_exponential_that_is_nearly_equal() -> None:
     """``(1 - s/50)^50`` against ``exp(-s)``: another code, the same growth to what the two differ by."""
     gaps = np.linspace(0.0, 0.5, 6)
     gain, growth = np.array([[10.0], [25.0]]), []

@@ -97,7 +97,7 @@ def test_slips_are_compared_on_one_denominator() -> None:
 
 
 @pytest.mark.parametrize("preset", ["polach", "as_published"])
-def test_a_wheel_at_either_optimum_is_told_apart(preset: str) -> None:
+def test_a_wheel_at_either_optimum_is_distinguished(preset: str) -> None:
     for speed in PRINTED:
         out = at_once(speed * KMH, 0.0, preset)
         for key, level in (("nominal_optimum", 1.0), ("degraded_optimum", 2.0)):

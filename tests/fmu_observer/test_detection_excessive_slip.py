@@ -66,7 +66,7 @@ def test_braking_slip_and_wheel_lock_count_too() -> None:
     assert runner.outputs()["slip_indicator"] == 2.0
 
 
-def test_standstill_is_not_judged() -> None:
+def test_standstill_is_not_evaluated() -> None:
     runner = SystemRunner(ExcessiveSlip())
     runner.set("u", {"odometer": 0.4, "speed": 0.0})
     runner.runtime.start(0.0)

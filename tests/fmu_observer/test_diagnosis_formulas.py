@@ -65,7 +65,7 @@ def test_an_alarm_waits_for_samples_in_a_row() -> None:
     assert judge(Alarm(0.0, 0.0, 0.0), 7.0, 1.0) == (1.0, 0.0, 7.0)  # without persistence at once
 
 
-def test_sensors_that_disagree_are_told_apart_by_the_model() -> None:
+def test_sensors_that_disagree_are_distinguished_by_the_model() -> None:
     assert larger(1.0, 9.0, 2.0) == (1.0, 0.0, 0.0, 0.0)
     assert larger(1.0, 0.5, 0.7) == (0.0, 0.0, 1.0, 0.0)
     assert larger(0.0, 9.0, 2.0) == (0.0, 0.0, 0.0, 1.0)
@@ -83,7 +83,7 @@ def test_a_grid_that_brackets_finds_a_linear_response(true: float) -> None:
     assert found.crossings == 1.0
 
 
-def test_a_grid_that_does_not_bracket_is_told() -> None:
+def test_a_grid_that_does_not_bracket_is_reported() -> None:
     grid = grid_around(1.0, 3, most=1.5)
     assert grid == pytest.approx([0.7, 1.1, 1.5])
     assert invert(grid, [v - 1.9 for v in grid], 1.0) == (1.5, 0.0)

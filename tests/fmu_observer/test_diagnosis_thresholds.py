@@ -93,7 +93,7 @@ def test_a_window_gives_the_state_exactly(samples: int, at: str) -> None:
     assert observer.rank == 2
 
 
-def test_what_a_window_does_not_show_is_told() -> None:
+def test_what_a_window_does_not_show_is_reported() -> None:
     observer = finite_window_observer(A, B, np.array([[1.0, 0.0]]), 1)
     assert observer.rank == 1
     np.testing.assert_allclose(np.abs(observer.unobservable.ravel()), [0.0, 1.0], atol=1e-12)

@@ -123,7 +123,7 @@ def test_bad_cycles_are_refused_in_words(wrong: dict[str, object], said: str) ->
         FaultCycle(**{**good, **wrong})  # type: ignore[arg-type]
 
 
-def test_questions_without_an_answer_are_refused_in_words() -> None:
+def test_questions_without_a_result_are_refused_in_words() -> None:
     with pytest.raises(ValueError, match=r"expected a time from 0\.2 s on"):
         CYCLE.error(0.1, START)
     with pytest.raises(ValueError, match="the error at t_k is zero"):

@@ -271,7 +271,7 @@ def test_the_observer_takes_the_effort_as_zero_while_a_jam_is_detected() -> None
 
 
 @pytest.mark.parametrize(("held_for", "held"), [(1, 0.0), (2, 1.0), (3, 1.0), (200, 1.0)])
-def test_held_data_are_told(held_for: int, held: float) -> None:
+def test_held_data_are_reported(held_for: int, held: float) -> None:
     """Beside the working point, from two samples on: the brake of 2.6 m/s2 makes a jump of 5.2 mm/s of them."""
     runtime = observer(estimated_speed=20.0, disturbance_estimate=0.0, disturbance_rate=0.0)
     runtime.u[:2] = -26.223, 20.0

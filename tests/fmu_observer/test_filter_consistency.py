@@ -93,7 +93,7 @@ def test_bands_are_those_of_scipy() -> None:
         np.testing.assert_allclose([band.low, band.high], expected, rtol=1e-10)
 
 
-def test_squares_use_what_is_told_and_leave_out_what_is_singular() -> None:
+def test_squares_use_what_is_measured_and_leave_out_what_is_singular() -> None:
     P = np.array([[[4.0, 1.0], [1.0, 9.0]], [[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 1.0]]])
     errors = np.array([[1.0, -2.0]] * 3)
     found = normalised_squares(errors, P)
@@ -102,7 +102,7 @@ def test_squares_use_what_is_told_and_leave_out_what_is_singular() -> None:
     assert normalised_squares(errors, np.full((3, 2), 4.0)) == pytest.approx(np.full(3, 1.25))
 
 
-def test_too_little_and_infinite_are_told() -> None:
+def test_too_little_and_infinite_are_reported() -> None:
     assert judge(np.ones(4), 1.0, white=True).verdict == "too few samples"
     none = judge(np.zeros(0), 1.0, white=True)
     assert (none.verdict, none.samples, none.independent) == ("too few samples", 0, 0.0)

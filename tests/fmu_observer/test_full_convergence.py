@@ -76,7 +76,7 @@ def test_of_any_model_it_is_many_passes(options):
     assert _told(runtime, "bounds_active") == [1.0 if options else 0.0]
 
 
-def test_a_deadline_that_is_missed_is_told_and_bounds_are_kept():
+def test_a_deadline_that_is_missed_is_reported_and_bounds_are_kept():
     full = _followed(FullBaliseMovingHorizon(window=5, deadline=0.0), speed_limit=10.0)
     converged, missed, feasible, speed = _told(full, "converged", "deadline_missed", "feasible", "speed")
     assert (converged, missed, feasible) == (0.0, 1.0, 1.0)
@@ -105,12 +105,12 @@ def test_a_deadline_before_the_first_row_gives_the_prediction():
     }
 
 
-def test_a_search_that_ends_before_its_tolerance_is_told():
+def test_a_search_that_ends_before_its_tolerance_is_reported():
     full = _followed(FullBaliseMovingHorizon(window=4, tolerance=1e-300, max_iterations=1))
     assert _told(full, "converged", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0]
 
 
-def test_a_restored_block_does_the_same_again():
+def test_a_restored_block_repeats_its_steps():
     block = make_block(FullBaliseMovingHorizon(window=3), fmi_version=2)
     block.instantiate()
     block.setupExperiment(startTime=0.0)

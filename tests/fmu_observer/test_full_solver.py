@@ -167,7 +167,7 @@ def test_a_false_balise_does_not_pull_where_squares_are_pulled_by_metres():
     assert robust.converged
 
 
-def test_many_passes_of_the_real_time_iteration_come_to_the_same():
+def test_many_passes_of_the_real_time_iteration_come_to_an_equal_result():
     rows, problem = _rows(8, seed=8, step=0.1), _problem(_swinging, (1,), ([-0.5], [0.5]))
     found = _solve(problem, rows)
     points = np.tile(START, (len(rows), 1))
@@ -192,7 +192,7 @@ def test_what_cannot_be_is_refused_in_words():
         _solve(low, rows, np.full((4, 2), [5.0, 0.0]), arrival=known)
 
 
-def test_a_search_that_is_cut_short_keeps_the_last_feasible_answer():
+def test_a_search_that_is_cut_short_keeps_the_last_feasible_point():
     rows, problem = _rows(20, seed=11, step=0.1), _problem(_swinging, (1,), ([-0.5], [0.5]))
     arrival = arrival_cost_at(np.array([1.5, 0.0]), SPREAD)
     whole = _solve(problem, rows, arrival=arrival)
@@ -209,7 +209,7 @@ def test_a_search_that_is_cut_short_keeps_the_last_feasible_answer():
 
 
 @pytest.mark.foreign
-def test_a_factor_graph_of_others_comes_to_the_same():
+def test_a_factor_graph_of_others_comes_to_an_equal_result():
     gtsam = pytest.importorskip("gtsam", reason="there are wheels for Linux on x86-64 only")
     rows, problem = _rows(25, seed=12), _problem(moved=_shaken)
     graph = gtsam.GaussianFactorGraph()

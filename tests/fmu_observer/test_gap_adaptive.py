@@ -318,7 +318,7 @@ def test_the_observer_says_what_it_assumes() -> None:
     assert not next(AdaptiveGainCdo().findings(10.0, {"assumed_acceleration": 1.5})).holds
 
 
-def test_a_sampled_first_stage_is_judged_too() -> None:
+def test_a_sampled_first_stage_is_evaluated_too() -> None:
     observer = AdaptiveGainCdo(first_stage="multirate")
     assert next(observer.findings(5.0)).holds
     assert "wheel stage" in next(observer.findings(5.0)).explain()

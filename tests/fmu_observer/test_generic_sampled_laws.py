@@ -138,7 +138,7 @@ def test_the_traced_kernel_and_plain_numpy_agree(make: Make) -> None:
 
 
 @every_observer
-def test_every_observer_answers_for_its_gaps(make: Make) -> None:
+def test_every_observer_states_its_gaps(make: Make) -> None:
     observer = make()
     certificate = next(observer.findings(0.1))
     assert isinstance(certificate, Finding)

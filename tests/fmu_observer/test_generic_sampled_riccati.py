@@ -92,7 +92,7 @@ def test_slopes_that_differ_from_the_believed_one_have_a_longest_period() -> Non
     assert far.numbers[GROWTH] > 1.0
 
 
-def test_the_period_is_judged_by_the_condition() -> None:
+def test_the_period_is_evaluated_by_the_condition() -> None:
     observer = RiccatiHighGain()
     assert own_condition(observer).holds
     assert own_condition(observer, {"sample_period": 0.2}).numbers["gap"] == 0.2

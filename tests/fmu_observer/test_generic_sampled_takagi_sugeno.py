@@ -96,7 +96,7 @@ def test_beyond_the_constant_limit_the_error_grows() -> None:
     assert not beyond.holds
 
 
-def test_the_gains_place_the_same_poles_at_every_vertex() -> None:
+def test_the_gains_place_equal_poles_at_every_vertex() -> None:
     observer = TakagiSugenoPeriodic()
     for A, L in zip(
         observer.model.A, observer.gains(observer.unpack_parameters(observer.start_parameters())), strict=True
@@ -104,7 +104,7 @@ def test_the_gains_place_the_same_poles_at_every_vertex() -> None:
         np.testing.assert_allclose(sorted(np.linalg.eigvals(A - L @ observer.model.C).real), [-2.5, -2.0], atol=1e-9)
 
 
-def test_the_condition_tells_the_slope_it_tolerates() -> None:
+def test_the_condition_states_the_slope_it_tolerates() -> None:
     condition = own_condition(TakagiSugenoPeriodic())
     assert condition.holds
     # no less than the slowest pole can bear, no more than it could
@@ -114,7 +114,7 @@ def test_the_condition_tells_the_slope_it_tolerates() -> None:
     assert wrong.numbers["tolerated_slope"] == 0.0
 
 
-def test_the_train_is_told_of_balises() -> None:
+def test_the_train_is_notified_of_balises() -> None:
     observer = TakagiSugenoAperiodic("takagi_sugeno_train")
     assert [e.name for e in observer.triggered_events] == ["balise"]
     assert next(observer.findings(0.5)).holds

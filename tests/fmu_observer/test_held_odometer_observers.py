@@ -219,7 +219,7 @@ def test_a_prediction_goes_on_by_a_disturbance_whose_rate_decays(make: Any) -> N
 
 
 @BOTH
-def test_a_fault_told_for_long_loses_neither_speed_nor_bound(make: Any) -> None:
+def test_a_fault_reported_for_long_loses_neither_speed_nor_bound(make: Any) -> None:
     """A reading that lies is used once; then the detector says for 35 s that the odometer lies."""
     runner, true = SystemRunner(make()), lambda t: 22.0 + 0.05 * t
     runner.runtime.x[1] = 22.0

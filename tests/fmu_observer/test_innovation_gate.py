@@ -306,7 +306,7 @@ def test_false_telegrams_that_do_not_agree_are_never_believed(make: Callable[[],
 
 
 @every
-def test_a_false_telegram_told_twice_is_one(make: Callable[[], GatedObserver]) -> None:
+def test_a_false_telegram_delivered_twice_is_one(make: Callable[[], GatedObserver]) -> None:
     runner = bench_of(make)
     run(runner, 1, {0: 40.0})
     assert [runner.runtime.trigger("balise") for _ in range(5)] == [IGNORED] * 5
@@ -335,7 +335,7 @@ def test_the_location_accuracy_widens_the_gate() -> None:
         assert run(runner, 1, {0: 8.0}) == [expected]
 
 
-def test_a_balise_that_does_not_act_is_not_judged() -> None:
+def test_a_balise_that_does_not_act_is_not_evaluated() -> None:
     """Satellite fixes alone correct this one: what balises say neither restarts it nor counts."""
     system = OBSERVERS["augmented_high_gain_cdo"]()
     runner = SystemRunner(system, preset="gps", gate=REJECT)
@@ -349,7 +349,7 @@ def test_a_balise_that_does_not_act_is_not_judged() -> None:
 
 
 @every
-def test_python_and_traced_code_judge_alike(make: Callable[[], GatedObserver]) -> None:
+def test_python_and_traced_code_evaluate_alike(make: Callable[[], GatedObserver]) -> None:
     offsets = {1: 3.0, 3: -200.0, 5: 60.0, 6: 60.0, 7: 60.0, 9: 0.3}
     traced, python = (bench_of(make, internal_step=0.03) for _ in range(2))  # few steps: NumPy is slow
     python.runtime = _in_python(python)

@@ -164,14 +164,14 @@ def test_an_odometer_is_proven_by_rolling_by_its_start_and_by_balises_and_not_fo
     assert repaired(ARMED, 0.0, 9.0).memory.proven_time == 20.0  # a wheel that locks
 
 
-def test_before_faults_are_judged_an_odometer_that_is_not_proven_is_followed_where_it_jumps() -> None:
+def test_before_faults_are_evaluated_an_odometer_that_is_not_proven_is_followed_where_it_jumps() -> None:
     young = ARMED._replace(proven_time=3.0, faults=1000.0, settled=0.0)
     assert repaired(young, 25.0, 20.0).restart == 1.0
     assert repaired(young._replace(proven_time=20.0), 25.0, 20.0).restart == 0.0
     assert repaired(young._replace(last_odometer=25.0), 25.0, 20.0).restart == 0.0
 
 
-def test_nothing_is_judged_before_it_is_armed_or_near_standstill() -> None:
+def test_nothing_is_evaluated_before_it_is_armed_or_near_standstill() -> None:
     for before in (ARMED._replace(faults=1000.0, settled=0.0), ARMED._replace(faults=3.0, settled=0.0)):
         assert repaired(before, 15.0, 20.0).memory.odometer_mode == TRUSTED
     late = SimpleNamespace(**{**vars(P), "arming_delay": 60.0})
@@ -260,7 +260,7 @@ DESIGNS = {"as_published": SECTION_3_3_4, "as_published_5_3_1": SECTION_5_3_1}
 
 @pytest.mark.parametrize("preset", DESIGNS)
 @pytest.mark.parametrize("deviation", [0.05, 0.1])
-def test_noise_that_is_told_is_not_taken_for_faults(preset: str, deviation: float) -> None:
+def test_noise_that_is_stated_is_not_taken_for_faults(preset: str, deviation: float) -> None:
     """Wheels that roll, with the noise that is told: at most what is beyond four deviations, 1.1 an hour of samples.
 
     2.2 hours: the chance of more than 9 is 4e-4 at that rate (Poisson). The thresholds of the print alone have 40 and
@@ -279,7 +279,7 @@ def test_noise_that_is_told_is_not_taken_for_faults(preset: str, deviation: floa
     assert (run.rule("faults") == 0.0).all()  # all were armed
 
 
-def test_noise_that_is_told_does_not_keep_an_odometer_from_being_proven() -> None:
+def test_noise_that_is_stated_does_not_keep_an_odometer_from_being_proven() -> None:
     """20 s without a residual that noise does not explain; below eps / 2, 1.6 deviations, there are none such."""
     members, rng, deviation = 100, np.random.default_rng(3), 0.05
     run = Members(members, -0.68, "as_published_5_3_1", **{**NO_DRAG, "odometer_noise": 4.0 * deviation})
@@ -540,7 +540,7 @@ def test_the_presets_of_the_detector_are_the_published_designs() -> None:
 
 
 @pytest.mark.parametrize("rules", RULES)
-def test_the_block_tells_a_jam(rules: Any) -> None:
+def test_the_block_reports_a_jam(rules: Any) -> None:
     """An estimate that is exact; a wheel that jams from 10 s to 12 s and rolls again."""
     runtime = Runtime(JamDetector(rules))
     runtime.start(0.0)

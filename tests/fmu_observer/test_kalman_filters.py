@@ -209,7 +209,7 @@ def test_a_plant_is_a_model_by_its_own_flow() -> None:
     assert [s.name for s in model.parameters] == ["stiffness", "damping"]
 
 
-def test_a_filter_of_a_plant_is_that_of_the_same_observer_model() -> None:
+def test_a_filter_of_a_plant_is_that_of_the_equal_observer_model() -> None:
     values = {"sample_period": T, "measurement_covariance[1]": 1e-4}
     values |= {f"process_covariance[{i}]": 1e-3 * (i in (1, 4)) for i in range(1, 5)}
     plant = system_model(PLANTS["pendulum"](), ["angle"], preset="rest", steps=Steps(substeps=4))
@@ -473,7 +473,7 @@ def test_other_filters_refuse_it_too(system: HybridSystem) -> None:
 
 
 @pytest.mark.parametrize(("P", "told"), [([1.0, 1.0, 1.0, 1.0], 0.0), ([1.0, 2.0, 2.0, 1.0], 1.0)])
-def test_a_covariance_that_becomes_none_later_is_told(P: list[float], told: float) -> None:
+def test_a_covariance_that_becomes_none_later_is_reported(P: list[float], told: float) -> None:
     runtime = Runtime(ExtendedKalmanFilter("pendulum"))
     place = scalar_names(runtime.system.states).index("estimate_covariance[1]")
     runtime.start(0.0)
@@ -492,7 +492,7 @@ def test_the_square_root_form_needs_positive_weights() -> None:
         started(system, kappa=-2.0).start(0.0)
 
 
-def test_what_is_not_seen_is_told_by_the_condition() -> None:
+def test_what_is_not_seen_is_reported_by_the_condition() -> None:
     """The angle of the motor: rank 3 of 4, Allaoui 2024, section IV.2.3.7."""
     motor = ExtendedKalmanFilter("synchronous_motor", outputs=["current_d", "current_q"])
     condition = own_condition(motor)

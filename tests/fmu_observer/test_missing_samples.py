@@ -184,7 +184,7 @@ def test_the_filters_are_that_of_another_package_with_updates_left_out(name: str
 
 
 @pytest.mark.parametrize("name", ["ensemble_kalman_filter", "particle_filter"])
-def test_members_that_are_told_nothing_only_move(name: str) -> None:
+def test_members_that_measure_nothing_only_move(name: str) -> None:
     """Bit by bit: the state after a missing sample is that of the model over the period, with its noise."""
     system: MemberFilter = OBSERVERS[name](model(), 10)
     random = np.random.default_rng(5)
@@ -225,7 +225,7 @@ def test_members_take_the_measurements_that_are_there(name: str) -> None:
         np.testing.assert_allclose(x[:37], z[:37], rtol=1e-12, atol=1e-12)
 
 
-def test_counts_and_degrees_are_told() -> None:
+def test_counts_and_degrees_are_reported() -> None:
     system = KalmanFilter(model())
     runtime = Runtime(system)
     runtime.u[:] = [0.0, 1.0, np.nan]
@@ -242,7 +242,7 @@ def test_counts_and_degrees_are_told() -> None:
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("name", SAMPLED)
-def test_compiled_it_leaves_out_the_same(name: str) -> None:
+def test_compiled_it_leaves_out_equal_samples(name: str) -> None:
     """C and Python to the last digits, through samples and events any of which bring NaN."""
     system, random = OBSERVERS[name](), np.random.default_rng(11)
     batch, runtime = Batch(system, members=2), Runtime(system)

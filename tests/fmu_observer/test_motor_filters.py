@@ -71,7 +71,7 @@ def test_it_is_the_filter_of_filterpy(observer: MotorFilter) -> None:
         assert ours[k, nis] == pytest.approx(innovation @ np.linalg.solve(theirs.S, innovation), rel=1e-6)
 
 
-def test_the_generic_filter_of_the_euler_motor_is_the_same() -> None:
+def test_the_generic_filter_of_the_euler_motor_is_equal() -> None:
     """Its model remembers held currents and whether it has been sampled: known exactly, they take no part."""
     observer, generic = MotorEkf(), ExtendedKalmanFilter("synchronous_motor_euler", outputs=["current_d", "current_q"])
     p, inputs = parameters(observer), drawn_inputs(observer)

@@ -358,7 +358,7 @@ def test_a_false_balise_pulls_least_squares_by_metres_and_the_robust_loss_not() 
 
 @pytest.mark.parametrize("twice", [False, True])
 @pytest.mark.parametrize("wrong", [40.0, -40.0])
-def test_a_false_balise_that_comes_first_is_given_up_once_two_contradict_it(wrong: float, twice: bool) -> None:
+def test_a_false_balise_that_comes_first_is_dropped_once_two_contradict_it(wrong: float, twice: bool) -> None:
     """From 24 s on, the third balise; one that is told twice is one, and does not vouch for itself."""
     restarts: list[float] = []
     errors = run_train(BaliseMovingHorizon(3), wrong, 26.0, at=8.0, twice=twice, restarts=restarts)
@@ -407,7 +407,7 @@ def test_illegal_options_are_refused_in_words(options: dict[str, Any], said: str
         MovingHorizonObserver("linear_pendulum", **options)
 
 
-def test_a_window_that_does_not_tell_a_state_says_which() -> None:
+def test_a_window_that_does_not_show_a_state_says_which() -> None:
     short, long = (own_condition(MovingHorizonObserver("linear_pendulum", window=w)) for w in (1, 2))
     assert short.numbers["window_rank"] == 1
     assert "A window of 1 full row shows 1 without the arrival cost; it does not show rate," in short.statement
@@ -488,7 +488,7 @@ def test_a_traced_loop_is_the_loop(count: int, backwards: bool) -> None:
 
 
 @pytest.mark.parametrize("loss", robust_loss.LOSSES)
-def test_bounds_that_most_measurements_contradict_are_told(loss: Any) -> None:
+def test_bounds_that_most_measurements_contradict_are_reported(loss: Any) -> None:
     """A speed of 1 is held at 0.5 while all say 10: what a robust loss lets go is counted all the same."""
     counted = {}
     for measured in (0.0, 10.0):
@@ -501,7 +501,7 @@ def test_bounds_that_most_measurements_contradict_are_told(loss: Any) -> None:
 
 
 @pytest.mark.parametrize("loss", ["squares", "huber"])
-def test_a_bound_against_which_disturbances_bend_the_course_is_told(loss: Any) -> None:
+def test_a_bound_against_which_disturbances_bend_the_course_is_reported(loss: Any) -> None:
     """The place, measured well, goes on at 10 m/s while the speed is held at 0.5: disturbances explain every reading,
     each far outside of its own deviation, and no residual is far. (`geman_mcclure` doubts the readings.)"""
     told = {}
@@ -527,7 +527,7 @@ def _shaken(x: Any, row: WindowRow, _shared: Any) -> Moved:
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**20), size=st.floats(1.0, 1e3))
-def test_bounds_that_no_course_keeps_are_told(seed: int, size: float) -> None:
+def test_bounds_that_no_course_keeps_are_reported(seed: int, size: float) -> None:
     """A known start outside of its bound, and no noise that could bring it in; and the same start within."""
     rows = np.array([row for row in rows_of(seed, 8) if row[1] < 3.0])
     rows[:, 3:] = 0.0
@@ -633,7 +633,7 @@ def rao(passes: int) -> tuple[float, np.ndarray]:
     return float(np.sqrt(np.mean(np.square(errors)))), np.array(told)
 
 
-def test_passes_that_are_too_few_are_told() -> None:
+def test_passes_that_are_too_few_are_reported() -> None:
     """Two passes end half as far off again as convergence and more, and say so in most rows; ten in none."""
     (few, told), (many, none) = rao(2), rao(10)
     assert few > 1.5 * many
@@ -641,7 +641,7 @@ def test_passes_that_are_too_few_are_told() -> None:
     assert not none.any()
 
 
-def test_under_a_robust_loss_no_nis_is_told() -> None:
+def test_under_a_robust_loss_no_nis_is_reported() -> None:
     for make in (
         lambda loss: MovingHorizonObserver("linear_pendulum", loss=loss),
         lambda loss: BaliseMovingHorizon(loss=loss),

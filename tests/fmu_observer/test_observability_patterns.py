@@ -119,7 +119,7 @@ def test_samples_in_step_with_an_oscillation_miss_half_of_it() -> None:
     observability(system, SamplePattern(0.9 * np.pi * np.arange(1, 6))).require()
 
 
-def test_one_balise_does_not_tell_the_speed() -> None:
+def test_one_balise_does_not_show_the_speed() -> None:
     train = measured_model(freight_train(), x0=[0.0, 13.9])
     one = observability(train, SamplePattern.of_balises([100.0], 13.9))
     assert (one.rank, one.smallest_singular_value == pytest.approx(0.0, abs=1e-12)) == (1, True)

@@ -61,7 +61,7 @@ def test_the_bias_of_the_takagi_sugeno_observer_grows_with_the_wheels_it_neglect
 
 @pytest.mark.parametrize("make", TRAIN_OBSERVERS.values(), ids=TRAIN_OBSERVERS)
 @pytest.mark.parametrize("slip_speed", [0.6, -0.6])
-def test_slip_is_told_from_speed(make: Callable[[], TrainObserver], slip_speed: float) -> None:
+def test_slip_is_distinguished_from_speed(make: Callable[[], TrainObserver], slip_speed: float) -> None:
     motion = SteadyMotion(speed=15.0, slip_speed=slip_speed)
     runner = started(make(), motion)
     runner.follow(motion, random_gaps(8, 0.5, 130))

@@ -150,7 +150,7 @@ def test_bad_periods_are_refused_in_words(given_to: dict[str, Any], said: str) -
         KalmanFilter(Fast(), outputs=["y"], **given_to)
 
 
-def test_many_steps_are_a_loop_with_the_same_numbers_and_slopes() -> None:
+def test_many_steps_are_a_loop_with_equal_numbers_and_slopes() -> None:
     rolled, written = (
         system_model(PLANTS["pendulum"](), ["angle"], steps=Steps(substeps=n)) for n in (UNROLLED + 4, 6)
     )

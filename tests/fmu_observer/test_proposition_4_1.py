@@ -95,7 +95,7 @@ def test_infeasible_cells_of_table_4_1(m: float, alpha: float) -> None:
         design_proposition_4_1(train_vertices([W1]), C, m, 0.99 * near_alpha)
 
 
-def test_a_decay_that_given_gains_do_not_have() -> None:
+def test_a_decay_that_stated_gains_do_not_have() -> None:
     with pytest.raises(InfeasibleBounds, match=r"cannot decay so fast, \(4\.41\)\. Feasible: m = 0\.9921") as told:
         design_proposition_4_1(train_vertices([W1]), C, 1.5, gains=(2.94, -5.5, -3.5))
     assert (told.value.constraint, told.value.nearest_alpha) == ("(4.41)", None)

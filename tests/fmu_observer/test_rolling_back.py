@@ -34,7 +34,7 @@ def roll_back(name: str) -> tuple[Any, list[str]]:
 
 
 @pytest.mark.parametrize("name", TRAIN_OBSERVERS)
-def test_a_train_that_rolls_back_is_followed_or_told(name: str) -> None:
+def test_a_train_that_rolls_back_is_followed_or_reported(name: str) -> None:
     outcome, warned = roll_back(name)
     t, v, place = outcome.result.time, outcome["train.speed"], outcome["train.position"]
     assert 2.0 < place.max() - place[-1] < 10.0

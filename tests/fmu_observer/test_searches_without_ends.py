@@ -85,7 +85,7 @@ def in_units(model: ObserverModel, unit: float) -> ObserverModel:
 
 @pytest.mark.parametrize("unit", [1e-4, 1e-2, 1.0, 1e2, 1e4])
 @pytest.mark.parametrize("name", WITH_SLOPES)
-def test_coordinates_are_looked_for_in_any_unit_of_the_states(name: str, unit: float) -> None:
+def test_coordinates_are_sought_in_any_unit_of_the_states(name: str, unit: float) -> None:
     """The condition is one of the error, not of its units; a step of the grid of scales is 6 % wide."""
     model = find_model(name)
     other, sizes = in_units(model, unit), unit ** np.arange(model.order)[:, None]
@@ -99,7 +99,7 @@ def test_coordinates_are_looked_for_in_any_unit_of_the_states(name: str, unit: f
     assert far.bound / far.lipschitz == pytest.approx(near.bound / near.lipschitz, rel=0.05)
 
 
-def test_the_best_scale_is_looked_for_beyond_the_grid() -> None:
+def test_the_best_scale_is_sought_beyond_the_grid() -> None:
     grid = np.geomspace(0.1, 100.0, 31)
     for top in (1e-4, 3.0, 2e4):
         assert best_scale(lambda s: 1.0 / (1.0 + abs(np.log(s / top))), A, grid) == pytest.approx(top, rel=0.13)  # noqa: B023

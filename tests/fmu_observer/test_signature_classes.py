@@ -63,7 +63,7 @@ def test_clouds_on_one_line_are_not_held_apart_by_its_thinness():
     assert separation(extent(line[:, :12]), extent(line[:, 8:])).margin == pytest.approx(-3.0 / 19.0, abs=1e-9)
 
 
-def test_classes_are_told_apart_on_held_out_records():
+def test_classes_are_distinguished_on_held_out_records():
     records, labels = classes(1)
     classifier = train_classifier(records, labels, SPACE)
     others, truth = classes(2)
@@ -76,7 +76,7 @@ def test_classes_are_told_apart_on_held_out_records():
     assert (cautious.score >= 0.0).all()
 
 
-def test_what_is_not_held_apart_is_told():
+def test_what_is_not_held_apart_is_reported():
     records, labels = classes(1)
     mixed = ["a", "b"] * (len(labels) // 2)
     with pytest.raises(SeparationError, match=r"classes a, b apart .* best strip is -"):
@@ -191,7 +191,7 @@ def test_the_track_is_not_ready_where_nothing_oscillates():
         ({"reading": "printed"}, "choose one of: repaired, as_published"),
     ],
 )
-def test_options_that_are_wrong_are_told(options, said):
+def test_options_that_are_wrong_are_reported(options, said):
     with pytest.raises(ValueError, match=said):
         SignatureTrack(**options)
 
@@ -209,7 +209,7 @@ def wheel(readings: list[float]) -> list[float]:
     return kinds
 
 
-def test_a_jam_and_a_skid_are_told_from_their_begin_to_their_end():
+def test_a_jam_and_a_skid_are_reported_from_their_begin_to_their_end():
     rolling = [20.0 - 0.2 * k for k in range(30)]
     jam = [v * (0.5 if 10 <= k < 14 else 0.8 if k == 14 else 1.0) for k, v in enumerate(rolling)]
     assert wheel(jam) == [0.0] * 10 + [-1.0] * 4 + [0.0] * 16  # its end in two readings counts once

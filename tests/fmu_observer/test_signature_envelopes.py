@@ -129,6 +129,6 @@ def test_points_within_have_no_distance():
         (np.full((2, 5), np.nan), 2, "not finite"),
     ],
 )
-def test_what_has_no_envelope_is_told(points, slabs, said):
+def test_what_has_no_envelope_is_reported(points, slabs, said):
     with pytest.raises(ValueError, match=said):
         envelope(points, slabs)

@@ -144,7 +144,7 @@ def test_the_first_property_of_the_reaction_and_the_search_for_its_rate(reaction
         np.testing.assert_allclose(found.values[:, np.argmin(costs)], state, atol=1e-4)  # six corrections
 
 
-def test_a_rate_beyond_the_candidates_is_told(reaction: ReactionSignature) -> None:
+def test_a_rate_beyond_the_candidates_is_reported(reaction: ReactionSignature) -> None:
     p = parameters(reaction)
     x = reaction.unpack_states(reaction.start_state())
     for rate, outside in ((0.2, False), (0.5, True)):
@@ -164,7 +164,7 @@ def test_the_median_of_the_cascade_has_the_sign_of_the_second_state() -> None:
     assert np.abs(told[:2] - grid[:2, 5, 1, 4]).max() < 0.5  # half of a cell, at a node of the table
 
 
-def test_the_culture_is_told_by_literal_scaling_only() -> None:
+def test_the_culture_is_identified_by_literal_scaling_only() -> None:
     sines = []
     for scaling in ("literal", "norm"):
         observer = CultureSignature(3, scaling)  # type: ignore[arg-type]
@@ -212,7 +212,7 @@ def test_weights_take_the_mean_of_all_nodes_or_the_nearest() -> None:
     np.testing.assert_allclose(made, 2.0 - fine + 3.0 * fine**2, atol=ROUNDING)
 
 
-def test_a_table_follows_its_parameters_and_tells_a_node_from_its_window() -> None:
+def test_a_table_follows_its_parameters_and_finds_a_node_from_its_window() -> None:
     observer = OscillatorSignature(7)
     grid = observer.tabulated({"braking": 0.3})["table"]
     assert np.abs(grid - observer.tabulated()["table"]).max() > 1e-6
@@ -222,7 +222,7 @@ def test_a_table_follows_its_parameters_and_tells_a_node_from_its_window() -> No
     np.testing.assert_allclose(observer.inverted([window], observer.start_state(), p).state, node, atol=1e-6)
 
 
-def test_a_third_state_beyond_the_tables_of_the_cascade_is_told() -> None:
+def test_a_third_state_beyond_the_tables_of_the_cascade_is_reported() -> None:
     """Windows without noise of states in the set and of such whose x3 is 4 to 7: most of these are outside, and few of
     those, for the look-up of x3 is off by 0.4 in the median and ends at the border at times."""
     observer, rng = CascadeSignature(), np.random.default_rng(3)
@@ -247,7 +247,7 @@ def test_a_third_state_beyond_the_tables_of_the_cascade_is_told() -> None:
 
 
 @pytest.mark.parametrize(("preset", "period", "told"), [("as_published", 0.01, 1.0), ("wide_samples", 0.1, 0.0)])
-def test_a_rate_that_goes_astray_after_long_is_told(preset: str, period: float, told: float) -> None:
+def test_a_rate_that_goes_astray_after_long_is_reported(preset: str, period: float, told: float) -> None:
     """By the exact solution, without noise; at 8 s less than a third of the windows lay beyond the table."""
     observer = ReactionSignature()
     p = observer.unpack_parameters(observer.start_parameters(preset))
@@ -263,7 +263,7 @@ def test_a_rate_that_goes_astray_after_long_is_told(preset: str, period: float, 
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.001, 0.02])
-def test_the_noise_of_a_signal_is_told(deviation: float) -> None:
+def test_the_noise_of_a_signal_is_stated(deviation: float) -> None:
     """Of a sine of 0.5 Hz at 100 Hz; 97 differences tell the deviation to 30 %."""
     system = OBSERVERS["signature_track"]()
     p, x = system.unpack_parameters(system.start_parameters()), system.unpack_states(system.start_state())

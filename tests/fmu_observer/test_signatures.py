@@ -112,11 +112,11 @@ def test_a_point_traces():
         ([0.0, 1.0, np.nan, 2.0], 2, "sample 2 of the record is not finite"),
     ],
 )
-def test_what_has_no_signature_is_told(record, order, said):
+def test_what_has_no_signature_is_reported(record, order, said):
     with pytest.raises(ValueError, match=said):
         dynamic_signature(record, order)
 
 
-def test_an_unknown_scaling_is_told():
+def test_an_unknown_scaling_is_reported():
     with pytest.raises(ValueError, match="'norm' or 'literal'"):
         pencil_point(np.ones(3), 1.0, 0.1, "Norm")

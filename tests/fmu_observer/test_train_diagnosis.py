@@ -62,7 +62,7 @@ def test_a_table_names_residuals_that_there_are() -> None:
         IsolationTable(("a", "b"), {"f": ("a", "c")}, {})
 
 
-def test_fewer_sensors_tell_less() -> None:
+def test_fewer_sensors_show_less() -> None:
     assert all(others == () for others in isolability(SENSORS).values())
     few = isolability(("odometer_1", "radar", "balise"))
     assert few["odometer_1"] == ("adhesion",)
@@ -111,7 +111,7 @@ def test_an_odometer_that_is_off_without_an_effort_is_a_sensor() -> None:
     assert rows[-1]["confidence"] > 0.3
 
 
-def test_under_the_brake_the_same_reading_is_a_wheel() -> None:
+def test_under_the_brake_such_a_reading_is_a_wheel() -> None:
     low = cruise(odometer_1=lambda t: 9.0 if t > 5.0 else 10.0, effort=lambda t: -40e3 if t < 14.0 else 0.0)
     rows = told(20.0, low)
     assert {row["odometer_1_fault"] for row in rows[90:140]} == {WHEEL}
@@ -130,7 +130,7 @@ def test_a_sensor_that_stands_still_is_stuck() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_is_detected_is_told_although_it_is_not_isolated(seed: int) -> None:
+def test_what_is_detected_is_reported_although_it_is_not_isolated(seed: int) -> None:
     """A law: while a residual is above its threshold for as long as it takes to raise an alarm `fault` is 1. Sensors
     are off by random gains and offsets from a random instant on, one to all of them at once; without any it stays 0."""
     rng = np.random.default_rng(seed)
@@ -165,7 +165,7 @@ WAYS = [*[(a,) for a in OF_MOTION], *itertools.combinations(OF_MOTION, 2)]
 
 
 @pytest.mark.parametrize("faults", WAYS, ids="_and_".join)
-def test_two_faults_of_motion_are_told_and_one_is_not_told_as_several(faults: tuple[str, ...]) -> None:
+def test_two_faults_of_motion_are_reported_and_one_is_not_reported_as_several(faults: tuple[str, ...]) -> None:
     """A law: of sensors of the motion two that are at fault while no effort slips a wheel are told: as several, or one
     after the other, both signs of each; nothing else is isolated. One alone is isolated, and never told as several."""
     for signs in itertools.product((-1.0, 1.0), repeat=len(faults)):
@@ -235,7 +235,7 @@ def test_the_share_of_a_constant_force_is_found(share: float) -> None:
 
 
 @pytest.mark.parametrize("missing", ["odometer_2", "radar", "cylinder_pressure"])
-def test_each_missing_sensor_that_isolation_needs_is_told(missing: str) -> None:
+def test_each_missing_sensor_that_isolation_needs_is_reported(missing: str) -> None:
     signals = cruise()
     del signals[missing]
     assert told(0.5, signals)[-1]["isolation_limited"] == 1.0
@@ -266,7 +266,7 @@ def test_a_share_outside_of_the_grid_is_unknown() -> None:
 
 
 @pytest.mark.parametrize("case", ["radar_gain", "false_balise", "pressure_low"])
-def test_a_case_of_the_scenario_is_told_in_time_and_alone(case: str) -> None:
+def test_a_case_of_the_scenario_is_isolated_in_time_and_alone(case: str) -> None:
     outcome = cosim.Scenario.load("train_diagnosis").set("case", case).run().check()
     assert len(outcome.expectations) == 5  # quiet before, in time, code from both sides, nothing else
     assert not any("not checked against the balise gaps" in warning for warning in outcome.warnings)
@@ -276,7 +276,7 @@ def test_a_case_of_the_scenario_is_told_in_time_and_alone(case: str) -> None:
     assert told.within(outcome.spec.delay_limit)
 
 
-def test_each_case_of_the_scenario_is_judged_by_the_output_of_its_own_fault() -> None:
+def test_each_case_of_the_scenario_is_evaluated_by_the_output_of_its_own_fault() -> None:
     tables = tomllib.loads(Path(cosim.__file__).with_name("scenarios").joinpath("train_diagnosis.toml").read_text())
     seen = set()
     for case, values in tables["cases"].items():

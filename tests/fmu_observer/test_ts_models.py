@@ -53,7 +53,7 @@ def test_the_pendulum_is_exact_at_every_angle(angle: float, rate: float, torque:
     )
 
 
-def test_the_chain_of_the_first_example_is_the_same_plant() -> None:
+def test_the_chain_of_the_first_example_is_an_equal_plant() -> None:
     generator = np.random.default_rng(4)
     for _ in range(20):
         x, u = generator.normal(size=4), generator.normal(size=1)

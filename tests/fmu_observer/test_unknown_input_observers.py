@@ -104,7 +104,7 @@ def test_the_error_does_not_feel_the_unknown_input(model: str) -> None:
     assert np.abs(plant[-1] - start).max() > 1.0  # the plant did feel it
 
 
-def test_the_printed_form_is_the_same_observer() -> None:
+def test_the_printed_form_is_an_equal_observer() -> None:
     """``dz = N z + G u + L y`` of (2.12), with random numbers."""
     observer, generator = DecouplingUio(), np.random.default_rng(3)
     x, u, y = generator.normal(size=3), generator.normal(size=1), generator.normal(size=2)

@@ -119,7 +119,7 @@ PAIRS = {
 
 
 @pytest.mark.parametrize("first", [0, 5])
-def test_a_sensor_that_is_off_by_more_than_its_limit_is_told_although_it_is_not_isolated(
+def test_a_sensor_that_is_off_by_more_than_its_limit_is_reported_although_it_is_not_isolated(
     batch: fmus.Batch, first: int
 ) -> None:
     """Detected is told: offsets of 1.2 to 12 times the limit, both signs, of each sensor that has a second one, without
@@ -144,7 +144,7 @@ def test_a_sensor_that_is_off_by_more_than_its_limit_is_told_although_it_is_not_
 
 
 @pytest.mark.parametrize("speed", ["rotor_speed", "generator_speed"])
-def test_sensors_that_agree_and_are_both_off_are_told_although_they_are_not_isolated(
+def test_sensors_that_agree_and_are_both_off_are_reported_although_they_are_not_isolated(
     batch: fmus.Batch, speed: str
 ) -> None:
     """Detected is told: both sensors of a speed read 0.5 to 10 % too much or too little, in noise: five seconds of it

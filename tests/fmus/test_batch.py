@@ -112,7 +112,7 @@ def test_a_member_that_fails_leaves_the_rest_as_it_was(reference: Callable[[str]
     assert np.isnan(batch.get("position")[1])
 
 
-def test_parameters_that_are_refused_are_told_and_the_others_start(reference: Callable[[str], Any]) -> None:
+def test_parameters_that_are_refused_are_reported_and_the_others_start(reference: Callable[[str], Any]) -> None:
     batch = Batch(reference("booster").system, 3)
     batch.set("stretch", [[0.25, 0.6], [0.6, 0.25], [0.1, 0.2]])
     batch.start()

@@ -195,7 +195,7 @@ def test_observers_beside_each_other_are_what_each_is_alone(
         assert np.abs(together["first.speed"] - together["second.speed"]).max() > 1e-3
 
 
-def test_a_thread_each_gives_the_same_bytes(loop: Path, model: Callable[..., Unpacked], tmp_path: Path) -> None:
+def test_a_thread_each_gives_equal_bytes(loop: Path, model: Callable[..., Unpacked], tmp_path: Path) -> None:
     interfaces = ("fmi2", "fmi3-clocks", "fmi2")
     files = [
         wire(model, interface, S2).write(tmp_path / f"{i}.txt", 0.0, STEP, 3000)

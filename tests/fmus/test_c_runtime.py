@@ -69,7 +69,7 @@ def _philox(library: Any, counter: tuple[int, ...], key: tuple[int, int]) -> tup
 
 
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN_ANSWERS)
-def test_philox_known_answers(
+def test_philox_known_values(
     noise: Any, counter: tuple[int, ...], key: tuple[int, int], answer: tuple[int, ...]
 ) -> None:
     assert _philox(noise, counter, key) == answer

@@ -116,13 +116,13 @@ def test_a_file_that_is_not_what_it_declares(tmp_path: Path) -> None:
     refused(path, "is a corrupt archive")
 
 
-def test_a_library_that_cannot_be_loaded_here_is_not_judged(tmp_path: Path) -> None:
+def test_a_library_that_cannot_be_loaded_here_is_not_evaluated(tmp_path: Path) -> None:
     path = zipped(tmp_path, {"modelDescription.xml": description(), LIBRARY: b"no library"})
     refused(path, "cannot be run on this machine .*: loading the library failed")
 
 
 @pytest.mark.parametrize("compression", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
-def test_damage_inside_is_told_whatever_the_compression(
+def test_damage_inside_is_reported_whatever_the_compression(
     compression: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "damaged.fmu"

@@ -61,7 +61,7 @@ def test_an_fmu_that_forks_in_each_step_is_stopped_and_nothing_is_left(lie: str,
 
 
 @linux
-def test_what_it_leaves_running_is_told_and_ended(marked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_it_leaves_running_is_reported_and_ended(marked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Forked twice, in a session of its own: nothing a process group could reach."""
     monkeypatch.setattr(isolated, "PROCESSES", 1000)
     report = check_fmu(build(marked, "DAEMON"), timeout=20.0)
@@ -84,7 +84,7 @@ def made(name: str, run: Callable[[Context], CheckOutcome], failing: Verdict, co
 
 
 @pytest.mark.parametrize("error", [KeyError("x"), TypeError("x"), ValueError("x"), AssertionError("x")])
-def test_an_error_of_the_check_is_not_told_of_the_fmu(error: Exception) -> None:
+def test_an_error_of_the_check_is_not_reported_of_the_fmu(error: Exception) -> None:
     def broken(_context: Context) -> CheckOutcome:
         raise error
 

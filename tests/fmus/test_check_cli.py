@@ -50,7 +50,7 @@ def test_the_exit_code_is_what_a_pipeline_needs(
     assert json.loads(target.read_text(encoding="utf-8"))["verdict"] == verdict
 
 
-def test_limits_are_told_with_what_to_do(tmp_path: Path, capsys: Output) -> None:
+def test_limits_are_reported_with_what_to_do(tmp_path: Path, capsys: Output) -> None:
     target = tmp_path / "report.json"
     main(["check", str(build(tmp_path, "RESET_KEEPS")), "-o", str(target)])
     shown = capsys.readouterr().out

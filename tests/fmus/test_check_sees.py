@@ -76,14 +76,14 @@ def test_elements_of_arrays_are_outputs_and_inputs(tmp_path: Path) -> None:
             slave.free()
 
 
-def test_local_variables_are_looked_at_where_there_is_no_output(tmp_path: Path) -> None:
+def test_local_variables_are_read_where_there_is_no_output(tmp_path: Path) -> None:
     xml = description().replace('causality="output"', 'causality="local"').replace(OUTPUTS, "")
     report = check_fmu(build(tmp_path, "UNSHORTENED", xml=xml))
     assert "position" in report.finding("divided steps").detail
     assert report.verdict is Class.LIMITS
 
 
-def test_an_fmu_that_ends_by_itself_is_judged_by_what_it_does_before(tmp_path: Path) -> None:
+def test_an_fmu_that_ends_by_itself_is_evaluated_by_what_it_does_before(tmp_path: Path) -> None:
     report = check_fmu(build(tmp_path, "ENDS"))
     stepping = report.finding("stepping")
     assert (stepping.verdict, stepping.detail) == (Verdict.LIMIT, "30 steps of 0.01 s, then it asks for the end")
@@ -91,7 +91,7 @@ def test_an_fmu_that_ends_by_itself_is_judged_by_what_it_does_before(tmp_path: P
     assert [f.check for f in report.limits] == ["stepping"]
 
 
-def test_a_longer_look_where_asked(tmp_path: Path) -> None:
+def test_a_longer_check_where_asked(tmp_path: Path) -> None:
     path = build(tmp_path, "NAN_MUCH_LATER")
     assert check_fmu(path).finding("stepping").detail.startswith("50 steps of 0.01 s")
     report = check_fmu(path, until=1.0)

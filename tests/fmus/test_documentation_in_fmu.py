@@ -100,7 +100,7 @@ def test_certificates_are_those_of_the_observer(name: str) -> None:
         assert f"{certificate.what} certified up to" in tables.text_content()
 
 
-def test_events_are_told_as_the_version_of_fmi_does() -> None:
+def test_events_are_notified_as_the_version_of_fmi_does() -> None:
     counted, clocked = (
         text_of(documentation(recipe("takagi_sugeno_cdo"), version)["index.html"]) for version in (2, 3)
     )
@@ -188,7 +188,7 @@ def test_a_docstring_becomes_paragraphs_lists_and_formulae() -> None:
     assert blocks("") == []
 
 
-def test_a_formula_is_told_from_other_code() -> None:
+def test_a_formula_is_distinguished_from_other_code() -> None:
     tree = html.document_fromstring(documentation(recipe("locomotive"), 2)["index.html"])
     formulae = {code.text_content() for code in tree.xpath("//code[@class='formula']")}
     others = {code.text_content() for code in tree.xpath("//code[not(@class)]")}

@@ -194,7 +194,7 @@ def test_model_exchange(version: int, policy: str, exchange: Callable[..., Excha
     assert now() == last
 
 
-def test_a_model_without_told_events_has_no_counts(version: int, component: Callable[..., Any]) -> None:
+def test_a_model_without_notified_events_has_no_counts(version: int, component: Callable[..., Any]) -> None:
     assert not OUTCOME_VARIABLES.keys() & component("oscillator", version).by_name.keys()
 
 

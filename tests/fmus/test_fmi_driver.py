@@ -57,7 +57,7 @@ def lag(folder: Path, version: Any) -> Path:
     ],
     ids=["lag-2", "lag-3", "periodic", "timed"],
 )
-def test_both_step_to_the_same_numbers(build: Callable[[Path], Path], outputs: list[str], tmp_path: Path) -> None:
+def test_both_step_to_equal_numbers(build: Callable[[Path], Path], outputs: list[str], tmp_path: Path) -> None:
     fmu = build(tmp_path)
     folder = Path(fmpy.extract(str(fmu), str(tmp_path / "unpacked")))
     rows = []

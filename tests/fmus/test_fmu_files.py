@@ -67,7 +67,7 @@ def test_sources_in_the_fmu_give_its_library(tracker: HybridSystem, version: int
 
 
 @pytest.mark.compiler
-def test_same_bytes_each_time(
+def test_equal_bytes_each_time(
     version: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: Callable[[str], Any]
 ) -> None:
     first = build_fmu(reference("sampler").system, tmp_path / "a.fmu", version)  # type: ignore[arg-type]
@@ -77,7 +77,7 @@ def test_same_bytes_each_time(
 
 
 @pytest.mark.compiler
-def test_cache_returns_the_same_file(tracker: HybridSystem, version: int, reference: Callable[[str], Any]) -> None:
+def test_cache_returns_one_file(tracker: HybridSystem, version: int, reference: Callable[[str], Any]) -> None:
     first = cached_fmu(tracker, version)  # type: ignore[arg-type]
     modified = first.stat().st_mtime_ns
     assert cached_fmu(tracker, version) == first  # type: ignore[arg-type]
@@ -87,7 +87,7 @@ def test_cache_returns_the_same_file(tracker: HybridSystem, version: int, refere
 
 
 @pytest.mark.compiler
-def test_cache_tells_systems_apart(tracker: HybridSystem, reference: Callable[[str], Any]) -> None:
+def test_cache_distinguishes_systems(tracker: HybridSystem, reference: Callable[[str], Any]) -> None:
     changed = type("Tracker", (type(tracker),), {"jump": lambda _s, _e, _t, x, _u, _p: {"speed": 2.0 * x.speed}})()
     changed_start = type("Tracker", (type(tracker),), {"internal_step": 0.02})()
     paths = {cached_fmu(one) for one in (tracker, changed, changed_start, reference("slider").system)} | {

@@ -101,7 +101,7 @@ def _as_block(made: Any, system: Any, **arguments: Any) -> Any:
 
 @settings(max_examples=60, deadline=None, suppress_health_check=FIXTURES_LIVE_ON)
 @given(happenings=HAPPENINGS.filter(_tellable))
-def test_events_told_late_in_any_order_have_the_effect_of_events_told_in_time(
+def test_events_notified_late_in_any_order_have_the_effect_of_events_notified_in_time(
     happenings: list[Told], hoppers: dict[str, Any]
 ) -> None:
     in_time = _run(hoppers["block"], sorted(happenings, key=lambda h: h.stamp), in_time=True)

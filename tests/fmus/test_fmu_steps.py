@@ -124,7 +124,7 @@ def test_a_discarded_step_leaves_no_trace_in_a_full_past(component: Callable[...
     assert one.get("marks") == [4.0]
 
 
-def test_fmi2_tells_how_far_it_came(component: Callable[..., Any], reference: Callable[[str], Any]) -> None:
+def test_fmi2_reports_how_far_it_came(component: Callable[..., Any], reference: Callable[[str], Any]) -> None:
     one = component("hopper", 2)
     one.initialize()
     for slave in (one.slave, make_block(reference("hopper").system, 2)):
@@ -144,7 +144,7 @@ def test_fmi2_tells_how_far_it_came(component: Callable[..., Any], reference: Ca
     assert "state position is not a finite number" in one.log[0]
 
 
-def test_fmi3_tells_how_far_it_came(component: Callable[..., Any]) -> None:
+def test_fmi3_reports_how_far_it_came(component: Callable[..., Any]) -> None:
     one = component("hopper", 3)
     one.initialize()
     one.step(0.0, H)

@@ -127,7 +127,7 @@ def test_wrong_usage_ends_with_two(arguments: list[str], capsys: Output) -> None
 
 
 @pytest.mark.compiler
-def test_info_tells_capabilities_of_each_interface_and_items_by_name(capsys: Output) -> None:
+def test_info_lists_capabilities_of_each_interface_and_items_by_name(capsys: Output) -> None:
     common = "canHandleVariableCommunicationStepSize, "
     for version, tail in (
         (2, "canGetAndSetFMUstate, canSerializeFMUstate, providesDirectionalDerivative"),

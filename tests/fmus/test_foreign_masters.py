@@ -95,7 +95,7 @@ def test_the_wrong_input_instant_shifts_the_train_by_a_step(master: str, ran: Ca
     assert np.median(error) - np.median(ours) == pytest.approx(-shift * 50.0 / 3.6, rel=0.01)
 
 
-def test_two_masters_of_the_same_order_agree(ran: Callable[[str, int], np.ndarray]) -> None:
+def test_two_masters_of_equal_order_agree(ran: Callable[[str, int], np.ndarray]) -> None:
     ours, theirs = ran("container-parallel", 0), ran("libcosim-parallel", 0)
     for name in ("train.position", "reader.balise_time", "observer.position", "observer.speed"):
         # Two ways to add up 4000 times of 10 ms differ by up to 1e-11 s.

@@ -61,7 +61,7 @@ def drive(one: Any, told: list[tuple[int, float, float]], first: int = 0, last: 
             one.step(k * H + part * H / parts, H / parts)
 
 
-def test_block_and_fmu_judge_alike(pair: list[Any]) -> None:
+def test_block_and_fmu_evaluate_alike(pair: list[Any]) -> None:
     """Three false ones ignored; of three that agree, the second is believed."""
     for one in pair:
         begin(one)
@@ -91,7 +91,7 @@ def test_it_survives_splitting_saving_and_bytes(pair: list[Any]) -> None:
             one.free(state)
 
 
-def test_late_telegrams_are_judged_as_those_in_time(pair: list[Any]) -> None:
+def test_late_telegrams_are_evaluated_as_those_in_time(pair: list[Any]) -> None:
     """What replay makes of them is what they would have made in time, those after them judged anew."""
     for one in pair:
         begin(one)

@@ -47,7 +47,7 @@ def recipe_of(fmu: Path) -> dict[str, object]:
 # -------------------------------------------------------------------------------------------------------
 
 
-def test_the_same_model_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_equal_models_give_equal_bytes(tmp_path: Path) -> None:
     one = build_hosted_fmu(Gatekeeper(), tmp_path / "one.fmu")
     two = build_hosted_fmu(f"{MODELS}:Gatekeeper", tmp_path / "two")
     assert one.read_bytes() == two.read_bytes()
@@ -105,7 +105,7 @@ def test_options_go_in(tmp_path: Path) -> None:
     assert recipe_of(build_hosted_fmu(f"{MODELS}:Needy", tmp_path, options={"gain": 2.0}))["options"] == {"gain": 2.0}
 
 
-def test_two_fmus_that_bring_a_file_of_the_same_name(tmp_path: Path) -> None:
+def test_two_fmus_that_bring_a_file_of_one_name(tmp_path: Path) -> None:
     values = []
     for folder, limit in (("a", 0.25), ("b", 0.5)):
         (tmp_path / folder).mkdir()
@@ -266,7 +266,7 @@ def test_a_plain_c_program_gets_the_block_s_values(program: Path, unpacked: Path
     assert [float(line) for line in done.stdout.splitlines()] == [expected, expected]
 
 
-def test_a_plain_c_program_without_python_is_told_what_to_set(program: Path, unpacked: Path) -> None:
+def test_a_plain_c_program_without_python_reports_what_to_set(program: Path, unpacked: Path) -> None:
     done = run_program(program, unpacked, FMU_OBSERVER_LIBPYTHON="nowhere/libpython.so")
     assert done.returncode == 2
     assert done.stdout.startswith(

@@ -213,7 +213,7 @@ def test_jump_may_turn_the_motion_round(version: int, exchange: Callable[..., Ex
     assert importer.run.state_events == pytest.approx([0.25 + 2.0 * MASS / GRIP], abs=AGREEMENT)
 
 
-def test_fmpy_finds_the_same_events(version: int) -> None:
+def test_fmpy_finds_equal_events(version: int) -> None:
     amplitude, pulsation = 4.0, 2.0
     breakaway, stop, speed = _sine_cycle(amplitude, pulsation)
     result = simulate_fmu(

@@ -129,7 +129,7 @@ def test_a_logger_of_calls_sees_them_also_when_it_comes_later(slave: Any) -> Non
     assert "fmi2DoStep" in lines[0]
 
 
-def test_who_answers_in_place_of_the_library_is_asked(slave: Any) -> None:
+def test_who_responds_in_place_of_the_library_is_asked(slave: Any) -> None:
     values, real = np.zeros(1), slave._functions["fmi2GetReal"]
     call = prepared_call(slave, "fmi2GetReal", slave.component, references(SPEED), 1, pointer(values))
 

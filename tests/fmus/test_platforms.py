@@ -45,7 +45,7 @@ def test_names() -> None:
 
 
 @given(st.lists(st.sampled_from(["host", "all", "linux64", "win64", "darwin64", *FIVE]), min_size=1, max_size=6))
-def test_names_are_the_same_however_they_are_written(words: list[str]) -> None:
+def test_names_are_equal_however_they_are_written(words: list[str]) -> None:
     names = platform_names(words)
     assert names == platform_names(",".join(words)) == platform_names(names)
     assert len(names) == len(set(names))
@@ -107,7 +107,7 @@ def test_folders_of_fmi_2() -> None:
 
 
 @pytest.mark.parametrize("name", ["aarch64-linux", "aarch64-darwin"])
-def test_fmi_2_importers_on_aarch64_look_into_the_old_folder(name: str) -> None:
+def test_fmi_2_importers_on_aarch64_search_the_old_folder(name: str) -> None:
     platform = PLATFORMS[name]
     files = binary_files(2, "m", {platform: AARCH64})
     folders = (platform.fmi2_folder, platform.name)
@@ -155,5 +155,5 @@ def test_whose_library_it_is(content: bytes, platforms: tuple[str, ...]) -> None
 
 
 @given(st.binary(max_size=200), st.sampled_from([b"", b"MZ", b"\x7fELF", b"\xca\xfe\xba\xbe", b"\xcf\xfa\xed\xfe"]))
-def test_any_bytes_have_an_answer(content: bytes, head: bytes) -> None:
+def test_any_bytes_have_a_response(content: bytes, head: bytes) -> None:
     assert platforms_of_library(head + content)

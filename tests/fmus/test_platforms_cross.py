@@ -172,7 +172,7 @@ build_fmu(recipe("odometer"), sys.argv[1] + "/all.fmu", 2, platforms="all")
 """
 
 
-def test_same_bytes_on_any_day_and_in_any_place(tmp_path: Path) -> None:
+def test_equal_bytes_on_any_day_and_in_any_place(tmp_path: Path) -> None:
     """Two processes: other folder, temporary folder, time zone, language, mask, order of hashes, and a later time."""
     contents = []
     root = str(Path(__file__).parents[2])
@@ -190,7 +190,7 @@ def test_same_bytes_on_any_day_and_in_any_place(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("model", ["locomotive", "takagi_sugeno_cdo"])
-def test_the_system_compiler_and_zig_give_the_same_numbers(model: str, version: int, tmp_path: Path) -> None:
+def test_the_system_compiler_and_zig_give_equal_numbers(model: str, version: int, tmp_path: Path) -> None:
     """Every output and state, bit for bit: no contraction, no other order of operations, the same mathematical
     library.
     """

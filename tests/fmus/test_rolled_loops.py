@@ -39,7 +39,7 @@ def unrolled(source: str) -> list[str]:
 
 
 @pytest.mark.parametrize("size", [60, 300])
-def test_loops_are_the_same_statements_in_the_same_order(size: int) -> None:
+def test_loops_are_equal_statements_in_equal_order(size: int) -> None:
     source = written(size)
     rolled = rolled_loops(source)
     assert unrolled(rolled) == unrolled(source)

@@ -81,7 +81,7 @@ def test_what_does_not_fit_follows_below_the_names_again() -> None:
     assert "diverged" in text
 
 
-def test_long_names_are_broken_behind_what_parts_them_and_can_be_told_apart() -> None:
+def test_long_names_are_broken_behind_what_parts_them_and_can_be_distinguished() -> None:
     rows = [[f"locomotive.bogie_with_a_long_name.axle[{i}].wheel.speed_of_rotation", i] for i in (1, 2)]
     lines = Table("t", [name_column("signal"), Column("n")], rows).text(40).split("\n")
     assert [line for line in lines if "axle[1]" in line] != [line for line in lines if "axle[2]" in line]

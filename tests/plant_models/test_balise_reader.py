@@ -263,7 +263,7 @@ def test_steps_may_vary() -> None:
         np.testing.assert_allclose(stamps(heard), expected, rtol=0.0, atol=ROUNDING)
 
 
-def test_inputs_of_the_start_of_a_step_give_the_same_stamps_one_step_later() -> None:
+def test_inputs_of_the_start_of_a_step_give_equal_stamps_one_step_later() -> None:
     values = {"first_balise": 0.3, "balise_spacing": 15.0, "balise_total": 9.0}
     motion, times = accelerated(0.0, 5.0, 0.8), grid(0.1, 150)
     sequential = ride(reader(**values), motion, times)

@@ -99,7 +99,7 @@ class Listener(HybridSystem):
         return {"heard": u.word, "heard_at": t, "times": x.times + 1.0}
 
 
-def test_communication_events_happen_at_the_start_and_when_told() -> None:
+def test_communication_events_happen_at_the_start_and_when_notified() -> None:
     runtime = Runtime(Listener())
     runtime.u[0] = 3.0
     runtime.start(2.0)

@@ -39,7 +39,7 @@ def never() -> Any:
 # -- entries ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_value_is_computed_once_and_comes_back_the_same() -> None:
+def test_a_value_is_computed_once_and_comes_back_equal() -> None:
     value = {"limit": 0.1 + 0.2, "none": None, "open": float("inf"), "rows": ((1, 2.5), ("a",))}
     first = remembered("trial", KEY, lambda: value)
     assert first == {**value, "rows": [[1, 2.5], ["a"]]}
@@ -66,7 +66,7 @@ def test_nothing_is_kept_without_a_key_or_of_what_fails() -> None:
         (lambda text: text.replace(b"cache 1", b"cache 2"), "entry of something else"),
     ],
 )
-def test_a_damaged_or_foreign_entry_is_told_and_made_again(
+def test_a_damaged_or_foreign_entry_is_reported_and_made_again(
     damage: Any, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     remembered("trial", KEY, lambda: {"gap": 0.5})

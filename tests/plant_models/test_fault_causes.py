@@ -196,7 +196,7 @@ def test_an_unknown_cause_a_class_that_is_none_and_losses_of_another_are_refused
         PLANTS["signal_fault"](cause="given", losses=True)
 
 
-def test_faults_of_an_own_name_are_used_where_the_system_has_the_same() -> None:
+def test_faults_of_an_own_name_are_used_where_the_system_has_them_too() -> None:
     made = PLANTS["wheel_fault"](cause="adhesion")
     names = [s.name for s in (*made.inputs, *made.parameters)]
     assert names == [

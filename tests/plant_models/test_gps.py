@@ -75,7 +75,7 @@ def test_the_reading_is_position_plus_drift_plus_white_noise() -> None:
     assert rows[:, 1].std() > 0.1
 
 
-def test_fixes_are_the_same_after_a_restore() -> None:
+def test_fixes_are_equal_after_a_restore() -> None:
     runtime = started(GPS, u0=[100.0, 0.0, 0.0], seed=3.0)
     runtime.advance(0.35)
     snapshot = runtime.snapshot()

@@ -65,7 +65,7 @@ def test_no_signal_can_take_the_name_of_the_count_or_the_stamp_of_an_event(attri
         {"events": (TriggeredEvent("a"), TriggeredEvent("a_b", (_payload("a_b_c"),)))},
     ],
 )
-def test_nothing_else_may_look_like_payload(attributes: dict[str, Any]) -> None:
+def test_nothing_else_may_be_taken_for_payload(attributes: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="would be taken for payload of event"):
         _system(**attributes)
     # Parameters, states and outputs are not told with an event, so they may begin so.

@@ -62,7 +62,7 @@ def run(system: HybridSystem, until: float, u0: float = 0.0) -> tuple[np.ndarray
 
 @settings(max_examples=20)
 @given(st.integers(0, 10**6), st.integers(1, 4), st.integers(1, 2), st.integers(1, 3))
-def test_state_space_there_and_back_is_the_same_system(seed: int, n: int, m: int, q: int) -> None:
+def test_state_space_there_and_back_is_an_equal_system(seed: int, n: int, m: int, q: int) -> None:
     draw = np.random.default_rng(seed)
     A, B, C, D = (draw.normal(size=shape) for shape in ((n, n), (n, m), (q, n), (q, m)))
     back = to_state_space(from_state_space(control.StateSpace(A, B, C, D, 0)))
@@ -78,7 +78,7 @@ def test_state_space_there_and_back_is_the_same_system(seed: int, n: int, m: int
     ],
     ids=["hyperbola", "locomotive"],
 )
-def test_a_hybrid_system_there_and_back_runs_the_same(
+def test_a_hybrid_system_there_and_back_runs_equally(
     system: HybridSystem, x0: list[float], changes: dict[str, float], arguments: Any
 ) -> None:
     back = from_nonlinear_io(to_nonlinear_io(system, parameters=changes), x0, **arguments)
@@ -197,7 +197,7 @@ def test_a_discrete_system_steps_as_python_control_does(nonlinear: bool) -> None
     assert runtime.update_outputs()[0] == found[-1]  # held until the next instant
 
 
-def test_an_unspecified_period_must_be_given() -> None:
+def test_an_unspecified_period_must_be_stated() -> None:
     system = control.ss([[0.5]], [[1.0]], [[1.0]], 0, True, name="some")
     with pytest.raises(ValueError, match=r"some: its time base is discrete but unspecified .*give sample_period"):
         from_state_space(system)

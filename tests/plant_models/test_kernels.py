@@ -81,7 +81,7 @@ def test_a_batch_is_its_members(system: HybridSystem) -> None:
         np.testing.assert_allclose(together, alone, rtol=1e-13, atol=1e-13, err_msg=name)
 
 
-def test_a_runtime_takes_either_kernel_and_runs_the_same() -> None:
+def test_a_runtime_takes_either_kernel_and_runs_equally() -> None:
     system = Clockwork()
     runs = []
     for kernel in (TracedKernel(system), NumpyKernel(system)):

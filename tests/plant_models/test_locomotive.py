@@ -225,7 +225,7 @@ def test_a_wheel_that_spins_from_standstill_stays_finite_and_the_rail_gives_no_m
     gradient=st.floats(-0.03, 0.03),
     brake=st.floats(0.0, 5e4),
 )
-def test_the_train_is_the_same_in_the_mirror(name: str, speed: float, gradient: float, brake: float) -> None:
+def test_the_train_is_equal_in_the_mirror(name: str, speed: float, gradient: float, brake: float) -> None:
     runs = []
     for sign in (1.0, -1.0):
         runtime = started(

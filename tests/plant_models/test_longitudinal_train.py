@@ -205,7 +205,7 @@ def test_the_discrete_form_comes_to_the_continuous_one_with_order_1(preset: str)
     np.testing.assert_allclose(ratios, 2.0, rtol=0.02)
 
 
-def test_the_discrete_train_stops_stays_and_shows_the_same_outputs() -> None:
+def test_the_discrete_train_stops_stays_and_shows_equal_outputs() -> None:
     runtime = started(EULER, "set_d", [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0])
     runtime.advance(5.0)
     assert outputs(runtime)["speed"] == 0.0

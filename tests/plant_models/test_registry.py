@@ -90,7 +90,7 @@ def test_an_installed_package_brings_a_member(plugins: Registry[Any]) -> None:
         ("wrong", "'wrong' of the package odd 1.0 .* is no subclass of plant_models.hybrid.system.HybridSystem"),
     ],
 )
-def test_what_a_package_announces_wrongly_is_told(plugins: Registry[Any], name: str, words: str) -> None:
+def test_what_a_package_announces_wrongly_is_reported(plugins: Registry[Any], name: str, words: str) -> None:
     with pytest.raises(RegistryError, match=words):
         plugins[name]
     with pytest.raises(Exception, match=f"components.observer: .*{words}"):
@@ -135,7 +135,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_users_file_that_is_wrong_is_told_without_traceback(
+def test_a_users_file_that_is_wrong_is_reported_without_traceback(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from cosim.cli import main
@@ -217,7 +217,7 @@ def test_an_expectation_may_be_registered_at_any_time(monkeypatch: pytest.Monkey
         scenario.set("expect", [given | {"within": "x"}]).table()
 
 
-def test_a_member_that_is_left_out_is_told_once(plugins: Registry[Any], caplog: pytest.LogCaptureFixture) -> None:
+def test_a_member_that_is_left_out_is_reported_once(plugins: Registry[Any], caplog: pytest.LogCaptureFixture) -> None:
     registry.log_left_out.cache_clear()
     for _ in range(2):
         assert "mine" in plugins.usable()
@@ -304,7 +304,7 @@ def test_a_member_whose_base_is_misspelt_is_listed_and_its_look_up_says_so(
         own_room["new"]
 
 
-def test_a_member_that_is_not_complete_is_told_with_what_it_lacks(own_room: Registry[Any]) -> None:
+def test_a_member_that_is_not_complete_is_reported_with_what_it_lacks(own_room: Registry[Any]) -> None:
     words = r"the thing 'unfinished' of this package .* is not complete: Unfinished has no run\(\); write it"
     with pytest.raises(RegistryError, match=words):
         own_room["unfinished"]

@@ -102,7 +102,7 @@ def test_a_snapshot_is_a_value_and_moves_to_another_instance() -> None:
     np.testing.assert_array_equal(other.x, one.x)
 
 
-def test_noise_is_redrawn_the_same_after_a_restore_and_differs_by_seed() -> None:
+def test_noise_is_redrawn_equally_after_a_restore_and_differs_by_seed() -> None:
     def drawn(seed: float) -> list[float]:
         runtime = started(CLOCKWORK, seed=seed)
         values = []

@@ -35,7 +35,7 @@ def layouts(draw: st.DrawFn) -> SignalLayout:
 
 
 @given(layouts(), st.sampled_from([(), (1,), (3,)]), st.integers(0, 2**32 - 1))
-def test_what_is_named_and_flattened_again_is_the_same(layout: SignalLayout, members: Any, seed: int) -> None:
+def test_what_is_named_and_flattened_again_is_equal(layout: SignalLayout, members: Any, seed: int) -> None:
     flat = np.random.default_rng(seed).standard_normal((layout.width, *members))
     named = layout.named(flat)
     for signal, value in zip(layout.signals, named, strict=True):
@@ -71,7 +71,7 @@ def test_of_no_states_nothing_is_left(members: tuple[int, ...]) -> None:
     assert SignalLayout(()).flat({}, "flow()", members).shape == (0, *members)
 
 
-def test_a_constant_is_the_same_for_all_members() -> None:
+def test_a_constant_is_equal_for_all_members() -> None:
     layout = SignalLayout([state("a", "1"), state("b", "1", size=2), state("c", "1")])
     flat = layout.flat({"a": np.array([1.0, 2.0]), "b": np.array([[3.0, 3.0], [4.0, 4.0]]), "c": 5.0}, "it", (2,))
     np.testing.assert_array_equal(flat, [[1.0, 2.0], [3.0, 3.0], [4.0, 4.0], [5.0, 5.0]])

@@ -151,7 +151,7 @@ def test_a_train_at_standstill_is_held_until_it_is_let_go() -> None:
 
 
 @pytest.mark.parametrize(("speed", "told"), [(0.0, 0.0), (-0.09, 0.0), (-0.11, 1.0), (-0.5, 1.0)])
-def test_a_train_that_rolls_back_is_told(speed: float, told: float) -> None:
+def test_a_train_that_rolls_back_is_reported(speed: float, told: float) -> None:
     """Ten times the speed of standstill: what is faster does not stand, in either direction."""
     controlled = Controlled()
     controlled.start(estimated_speed=0.0, estimated_position=100.0)
@@ -180,7 +180,7 @@ def test_batches_are_their_members() -> None:
 
 
 @pytest.mark.parametrize(("short", "told"), [(0.81, 1.0), (0.2, 0.0), (-0.5, 0.0)])
-def test_a_stop_short_of_the_mark_is_told(short: float, told: float) -> None:
+def test_a_stop_short_of_the_mark_is_reported(short: float, told: float) -> None:
     """Nothing pulls with a traction limit of zero; within the tolerance, or beyond the mark, it is no such stop."""
     c = Controlled(stop_position=100.0)
     c.start(estimated_position=50.0, estimated_speed=10.0)

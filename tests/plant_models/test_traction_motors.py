@@ -87,7 +87,7 @@ def test_a_steady_state_is_the_closed_form() -> None:
 
 
 @pytest.mark.parametrize("frame", ["rotor", "stator"])
-def test_three_phases_are_the_same_motor(frame: str) -> None:
+def test_three_phases_are_an_equal_motor(frame: str) -> None:
     """Under voltages that turn with the rotor, and under those that stand still."""
     motor, phases = SynchronousMotor(frame=frame), ThreePhaseMotor()  # type: ignore[arg-type]
     one, other = Runtime(motor), Runtime(phases)
@@ -136,7 +136,7 @@ def _quiet() -> dict[str, float]:
     return {f"process_variance[{i}]": 0.0 for i in range(1, 5)} | {f"measurement_variance[{i}]": 0.0 for i in (1, 2)}
 
 
-def test_noise_has_the_variances_that_are_told() -> None:
+def test_noise_has_the_variances_that_are_stated() -> None:
     system = SynchronousMotorEuler()
     motor = told(system, {})
     readings = []

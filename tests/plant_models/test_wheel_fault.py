@@ -185,7 +185,7 @@ def test_a_drawn_jam_ends_with_its_effort() -> None:
     assert outputs(runtime)["depth"] == 0.0
 
 
-def test_the_same_seed_gives_the_same_faults_and_a_restored_run_goes_on_with_them() -> None:
+def test_equal_seeds_give_equal_faults_and_a_restored_run_goes_on_with_them() -> None:
     def run(seed: float, restore: bool = False) -> float:
         runtime = _driven(DRAWN, [10.0, -1.0, 1e9, 0.0], jam_rate=1.0, seed=seed)
         runtime.advance(7.03)

@@ -265,7 +265,7 @@ def test_no_receiver_is_asked_for_a_step_of_less_than_a_nanosecond(off: float) -
     assert np.count_nonzero(np.abs(seen.time - 0.5) < 1e-6) == 2 + (off > 0.0)
 
 
-def test_a_receiver_that_can_neither_be_stopped_nor_stamped_is_told_late_never_early() -> None:
+def test_a_receiver_that_can_neither_be_stopped_nor_stamped_is_notified_late_never_early() -> None:
     class Rigid(Logging):
         capabilities: ClassVar[dict[str, Any]] = Logging.capabilities | {
             "canHandleVariableCommunicationStepSize": False
@@ -280,7 +280,7 @@ def test_a_receiver_that_can_neither_be_stopped_nor_stamped_is_told_late_never_e
     assert [e.delivered_at for e in seen.events] == pytest.approx([0.4, 0.5], abs=1e-12)
 
 
-def test_a_receiver_that_cannot_be_stopped_is_told_the_stamp_beforehand() -> None:
+def test_a_receiver_that_cannot_be_stopped_gets_the_stamp_beforehand() -> None:
     class Rigid(StampedLogging):
         capabilities: ClassVar[dict[str, Any]] = Logging.capabilities | {
             "canHandleVariableCommunicationStepSize": False
@@ -321,7 +321,7 @@ class Counting(FMI2, Mock):
 
 
 @pytest.mark.parametrize("abilities", [(), ("canHandleVariableCommunicationStepSize",)])
-def test_a_plain_fmi2_receiver_is_told_by_count_time_and_payload(abilities: tuple[str, ...]) -> None:
+def test_a_plain_fmi2_receiver_is_notified_by_count_time_and_payload(abilities: tuple[str, ...]) -> None:
     slave = Counting()
     receiver = without(component(slave, "observer"), *abilities)
     run([block(Motion(), "plant"), receiver], [], H, 10, Balises(positions(5.0, 9.0), receivers=["observer"]))
@@ -331,7 +331,7 @@ def test_a_plain_fmi2_receiver_is_told_by_count_time_and_payload(abilities: tupl
     assert [entry[0] for entry in slave.log] == pytest.approx(ends, abs=1e-9)
 
 
-def test_stale_never_tells_before_the_crossing() -> None:
+def test_stale_never_notifies_before_the_crossing() -> None:
     """Also where the receiver cannot be stopped: it is told at the end of the step, stamped with that instant."""
     slave = StampedLogging()
     made = without(component(slave, "observer"), "canHandleVariableCommunicationStepSize")

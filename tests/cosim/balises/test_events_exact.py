@@ -135,7 +135,7 @@ def test_native_observer_agrees_with_itself_and_with_the_block(version: Any) -> 
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("version", [3, 2])
-def test_native_plant_is_the_same_with_and_without_balises(version: Any) -> None:
+def test_native_plant_is_equal_with_and_without_balises(version: Any) -> None:
     import plant_models
 
     path = fmus.cached_fmu(plant_models.PLANTS["locomotive"](), fmi_version=version)

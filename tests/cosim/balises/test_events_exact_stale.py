@@ -85,7 +85,7 @@ def test_exact_use_loses_nothing(theta: float, h: float) -> None:
 
 
 @pytest.mark.parametrize("h", [0.05, 0.1])
-def test_fmi2_receivers_are_stale_in_the_same_way(h: float) -> None:
+def test_fmi2_receivers_are_stale_likewise(h: float) -> None:
     """FMI 2 acts at the start of the step that follows, which is the same instant: equal speeds at all communication
     points.
     """

@@ -107,7 +107,7 @@ def test_a_list_is_read(tmp_path: Path, encoding: str) -> None:
     assert from_csv(path, 0.5).balises == (Balise("Nord", 10.5, 3.0), Balise("B2", 20.0, 0.5))
 
 
-def test_lines_that_tell_the_source_are_left_out(tmp_path: Path) -> None:
+def test_lines_that_name_the_source_are_left_out(tmp_path: Path) -> None:
     path = written(tmp_path, "# surveyed in spring\nposition,section\n10.5,1\n# a gap\n20,2\n")
     assert from_csv(path).balises == (Balise("B1", 10.5), Balise("B2", 20.0))
     with pytest.raises(ScenarioError, match="line 5: could not convert"):

@@ -223,7 +223,7 @@ def test_trajectory_is_bit_identical_with_and_without_balises(method: str) -> No
         assert with_balises.master.balises.localiser.watch.redo_differences == 0
 
 
-def test_an_input_fed_by_the_plants_own_output_is_the_same_when_a_step_is_redone() -> None:
+def test_an_input_fed_by_the_plants_own_output_is_equal_when_a_step_is_redone() -> None:
     """The connected value belongs to the start of the step; after looking ahead it must be put back."""
 
     class Runaway(Train):
@@ -340,7 +340,7 @@ def test_methods_that_a_plant_cannot_serve_are_refused() -> None:
         prepare([component(Train(), "plant")], [], H, 1, Balises(positions(1.0), method="guess"))  # type: ignore[arg-type]
 
 
-def test_a_plant_that_fails_while_it_is_looked_ahead_frees_its_saved_state() -> None:
+def test_a_plant_that_fails_while_it_is_stepped_ahead_frees_its_saved_state() -> None:
     class Breaking(Train):
         def move(self, t: float, h: float) -> None:
             if t >= 0.45:

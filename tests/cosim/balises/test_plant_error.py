@@ -48,7 +48,7 @@ def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
-def test_a_plant_with_a_solver_is_off_by_less_than_told(fmu: Path, tolerance: float, method: str) -> None:
+def test_a_plant_with_a_solver_is_off_by_less_than_stated(fmu: Path, tolerance: float, method: str) -> None:
     outcome = ran(fmu, method, tolerance=tolerance)
     off, told = off_and_told(outcome)
     assert np.all(off <= told)
@@ -61,7 +61,7 @@ def test_a_plant_with_a_solver_is_off_by_less_than_told(fmu: Path, tolerance: fl
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_a_forced_method_that_the_probe_knows_to_be_wrong_tells_unknown(tmp_path: Path, version: Any) -> None:
+def test_a_forced_method_that_the_probe_knows_to_be_wrong_reports_unknown(tmp_path: Path, version: Any) -> None:
     outcome = ran(adaptive_fmu(tmp_path, version=version, forgets=True), "rollback")
     assert outcome.result.summary["probe"]["restores"] == "no"
     assert all(math.isnan(e.time_bound) for e in outcome.result.events)

@@ -31,14 +31,14 @@ def test_the_mailbox_delivers_in_order_and_loses_nothing(letters: list[tuple[flo
     assert box.waiting == []
 
 
-def test_telegrams_of_one_instant_are_told_in_the_order_of_their_stamps() -> None:
+def test_telegrams_of_one_instant_are_delivered_in_the_order_of_their_stamps() -> None:
     box = Mailbox()
     for stamp in (3.0, 1.0, 2.0):
         box.post(BaliseRecord(stamp, 5.0, f"B{stamp:g}", 0.0, 0.0))
     assert [e.identity for e in box.due(5.0)] == ["B1", "B2", "B3"]
 
 
-def test_missed_ones_are_logged_at_once_and_told_to_nobody() -> None:
+def test_missed_ones_are_logged_at_once_and_delivered_to_nobody() -> None:
     box = Mailbox()
     box.post(Channel(missed=frozenset({"B1"})).transmit(crossing(1.0), 0, 5.0))
     assert box.due(np.inf) == []

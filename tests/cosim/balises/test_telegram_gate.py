@@ -41,7 +41,7 @@ def scenario(**parameters: float) -> Scenario:
 
 
 @pytest.mark.parametrize(("gate", "outcome"), [(2.0, "ignored"), (1.0, "doubted"), (0.0, "accepted")])
-def test_a_false_telegram_is_told_by_its_outcome(gate: float, outcome: str) -> None:
+def test_a_false_telegram_is_recognised_by_its_outcome(gate: float, outcome: str) -> None:
     run, clean = (
         s.run(warn=lambda _text: None)
         for s in (scenario(gate=gate), scenario(gate=gate).set("balises.false_telegrams", []))
@@ -60,7 +60,7 @@ def test_a_false_telegram_is_told_by_its_outcome(gate: float, outcome: str) -> N
     assert counts["ignored"] == (outcome == "ignored")
 
 
-def test_what_was_doubted_is_told_once_with_what_became_of_it() -> None:
+def test_what_was_doubted_is_reported_once_with_what_became_of_it() -> None:
     outcomes = ["doubted", "accepted", "ignored", "doubted", "doubted", "doubted"]
     telegrams: Any = [SimpleNamespace(stamp=float(i), outcomes={"obs": o}) for i, o in enumerate(outcomes)]
     assert list(_doubted("obs", telegrams)) == [

@@ -53,7 +53,7 @@ def test_stamp_and_position_are_enough(tmp_path: Path) -> None:
     assert isnan(first.true_position)
 
 
-def test_what_is_given_is_taken(tmp_path: Path) -> None:
+def test_what_is_stated_is_taken(tmp_path: Path) -> None:
     text = (
         "stamp,delivered_at [ms],identity,position,kind,odometer_reading "
         "[km/h]\n0.5,700,B1,5,false,36\n0.6,,B2,6,missed,\n"
@@ -96,7 +96,7 @@ def test_an_observer_listens_to_a_log_without_a_true_position(tmp_path: Path) ->
         ),
     ],
 )
-def test_a_table_that_cannot_be_told_is_refused_in_words(text: str, words: str, tmp_path: Path) -> None:
+def test_a_table_that_cannot_be_delivered_is_refused_in_words(text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=words):
         without_position(tmp_path, text).run(warn=quietly)
 
@@ -137,7 +137,7 @@ RECEIVERS = [name for name in train_observers() if name != "delayed_train_observ
 
 @pytest.mark.parametrize("way", ["block2", "block3"])
 @pytest.mark.parametrize("name", RECEIVERS)
-def test_a_telegram_that_is_told_twice_counts_once(tmp_path: Path, name: str, way: str) -> None:
+def test_a_telegram_that_is_delivered_twice_counts_once(tmp_path: Path, name: str, way: str) -> None:
     """LAW: no receiver changes by a bit; another telegram of this stamp, and this balise later, are told."""
     ends = []
     for again in ("", "B1,0.5,0.5,5,20\nB1,0.5,0.75,5,20\nB2,1.0,1.3,7,0\n"):

@@ -65,7 +65,7 @@ def test_the_wiring_that_other_masters_need_runs_here() -> None:
         np.testing.assert_allclose(theirs[f"observer.{name}"], ours[f"observer.{name}"][rows], rtol=0.0, atol=1e-9)
 
 
-def test_the_master_does_not_tell_a_second_time_what_is_wired() -> None:
+def test_the_master_does_not_notify_a_second_time_what_is_wired() -> None:
     alone, both = run(wired()), run(wired(**LAYOUT, method="interpolate"))
     assert len(both.result.events) == 3
     assert not any("observer" in event.outcomes for event in both.result.events)

@@ -30,7 +30,7 @@ def test_one_digit_less_would_be_too_coarse(value: float, allowed: float) -> Non
 
 
 @given(VALUES, ALLOWED)
-def test_what_was_read_is_written_the_same(value: float, allowed: float) -> None:
+def test_what_was_read_is_written_equally(value: float, allowed: float) -> None:
     decimals = _decimals_for(allowed)
     text = number_text(value, decimals)
     assert number_text(float(text), decimals) == text

@@ -49,7 +49,7 @@ def test_within_tolerance_the_baseline_does_not_creep(tmp_path: Path) -> None:
     assert "changed" in changes[4:]  # 1e-4 and 1.2e-4 m/s are not
 
 
-def test_a_new_delivery_with_the_same_outputs_changes_the_header_only(tmp_path: Path) -> None:
+def test_a_new_delivery_with_equal_outputs_changes_the_header_only(tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     updated(hand_made(components=[component()]), path)
     rows = path.with_suffix(".csv").read_bytes()
@@ -59,7 +59,7 @@ def test_a_new_delivery_with_the_same_outputs_changes_the_header_only(tmp_path: 
     assert not read_baseline(path).notes
 
 
-def test_tolerances_stay_unless_new_ones_are_given(tmp_path: Path) -> None:
+def test_tolerances_stay_unless_new_ones_are_stated(tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     wide = Tolerances(Tolerance(), {"train.speed": Tolerance(absolute=0.1)})
     updated(hand_made(), path, wide)

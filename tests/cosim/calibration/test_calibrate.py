@@ -114,7 +114,7 @@ def test_scenarios_are_calibrated_too() -> None:
     assert low < TRUE["davis_a"] < high
 
 
-def test_workers_and_a_resumed_calibration_find_the_same(tmp_path: Path) -> None:
+def test_workers_and_a_resumed_calibration_find_equal_values(tmp_path: Path) -> None:
     """To the bit; what stands in the journal is not run again."""
     found = []
     for workers, resume in ((1, False), (2, False), (1, True)):
@@ -169,7 +169,7 @@ def test_command(path: Path, table: Path, tmp_path: Path, capsys: pytest.Capture
         (["--parameters", "mass", "--level", "2"], "between 0 and 1"),
     ],
 )
-def test_mistakes_are_told(
+def test_mistakes_are_reported(
     path: Path, table: Path, more: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(words(path, table, *more)) == 2

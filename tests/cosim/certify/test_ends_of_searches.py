@@ -123,7 +123,7 @@ def test_a_finding_says_how_far_it_searched(horizon: float, said: str) -> None:
     assert found.to_dict()["value"] == (None if horizon == inf else horizon)
 
 
-def test_an_end_without_limit_and_a_limit_of_zero_are_told_apart() -> None:
+def test_an_end_without_limit_and_a_limit_of_zero_are_distinguished() -> None:
     assert limit_found("gap", inf, 9.0, "test").kind == "not found up to"
     assert limit_found("gap", inf, inf, "test").value == inf
     zero = limit_found("gap", 0.0, 9.0, "test", shortest=0.02)

@@ -229,7 +229,7 @@ def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
     assert "estimated_position" not in find_parts(scenario.set("plain.estimated_position", 0.0)).shared_parameters
 
 
-def test_no_limit_is_told_as_any_gap() -> None:
+def test_no_limit_is_reported_as_any_gap() -> None:
     gaps = [gap_certified(np.inf, 22.5, 31.9), gap_certified(0.5, None, None)]
     rows = observer_table([ObserverScore("o", "o", "m", "defaults", certificate=gap) for gap in gaps]).data()
     assert [(row["certified"], row["holds"]) for row in rows] == [("any", "yes/yes"), (0.5, "?/?")]

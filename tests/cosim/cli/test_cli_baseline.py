@@ -63,7 +63,7 @@ def test_a_baseline_from_making_to_accepting(capsys: pytest.CaptureFixture[str])
     assert main(["baseline", "check", "kept/run.json", "--quiet"]) == 0
 
 
-def test_a_given_result_is_checked_without_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stated_result_is_checked_without_a_run(capsys: pytest.CaptureFixture[str]) -> None:
     main(["baseline", "make", "run.toml", "run.json", "--quiet"])
     for name, speed in (("same", "10.0"), ("other", "10.2")):
         assert (
@@ -113,7 +113,7 @@ def test_a_new_delivery_of_an_fmu(capsys: pytest.CaptureFixture[str]) -> None:
         (["make", "run.toml", "a.json", "--rtol", "-1"], "expected a number that is zero or positive"),
     ],
 )
-def test_mistakes_are_told_in_words(arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_are_reported_in_words(arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["baseline", *arguments]) == 2
     captured = capsys.readouterr()
     assert says in captured.err

@@ -124,7 +124,7 @@ def test_mistakes_are_explained_without_a_traceback(
 
 
 @pytest.mark.parametrize("former", ["bound", "limits"])
-def test_former_names_answer_with_the_new_one(former: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_former_names_lead_to_the_new_one(former: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as usage:
         main([former, DMO])
     assert usage.value.code == 2

@@ -161,7 +161,7 @@ def test_a_table_may_stand_for_a_folder(run: Call) -> None:
     assert run("a", "b/table.csv")[0] == 1
 
 
-def test_telegrams_count_unless_told_otherwise(run: Call) -> None:
+def test_telegrams_count_unless_stated_otherwise(run: Call) -> None:
     write_results(result(events=(replace(TELEGRAM, stamp=2.75, delivered_at=2.75),)), "late", ("csv",))
     code, out, _ = run("a", "late")
     assert code == 1

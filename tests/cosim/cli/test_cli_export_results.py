@@ -53,7 +53,7 @@ def test_numpy_says_that_it_drops_the_units(tmp_path: Path, capsys: pytest.Captu
         ("a.h5", "a.csv", ["--signals", "trian.*"], "No signal 'trian.*' in the result"),
     ],
 )
-def test_mistakes_are_told_in_a_line(
+def test_mistakes_are_reported_in_a_line(
     source: str, target: str, more: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     some_result().save(tmp_path / "a.h5")

@@ -27,7 +27,7 @@ def journey(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
     return time, position, speed, odometer, stamps
 
 
-def test_errors_are_of_the_size_it_tells_and_the_wheel_is_found() -> None:
+def test_errors_are_of_the_size_it_reports_and_the_wheel_is_found() -> None:
     time, position, speed, odometer, stamps = journey()
     places = np.interp(stamps, time, position) + np.random.default_rng(3).normal(0.0, 0.3, len(stamps))
     found = reference_trajectory(time, odometer, stamps, places, odometer_std=STD, balise_std=0.3)
@@ -63,7 +63,7 @@ def test_the_command_writes_what_a_scenario_plays_back(
     assert json.loads(capsys.readouterr().out)["readings"] == len(time)
 
 
-def test_what_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_missing_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "log.csv").write_text("time,odometer [m/s]\n0.0,1.0\n0.1,1.0\n0.2,1.0\n")
     log = str(tmp_path / "log.csv")
     for words, text in (

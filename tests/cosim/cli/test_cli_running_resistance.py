@@ -126,7 +126,7 @@ def test_a_table_without_rows_is_refused_in_words(tmp_path: Path, capsys: pytest
     assert "fewer than two samples in the part to use; there are 0 in all" in capsys.readouterr().err
 
 
-def test_the_former_command_answers_with_the_new_words(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_former_command_leads_to_the_new_words(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(["identify", "davis", "run.csv", "--effort", "60e3", "--mass", "50e3"])
     assert end.value.code == 2

@@ -182,7 +182,7 @@ def test_the_help_lists_commands_of_a_group_in_order_of_use(program: str) -> Non
 
 
 @pytest.mark.parametrize("program", LINES)
-def test_an_old_spelling_is_answered_by_the_new_one(program: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_old_spelling_is_replaced_by_the_new_one(program: str, capsys: pytest.CaptureFixture[str]) -> None:
     for command in find_commands(f"{program}.cli"):
         for old, now in command.former.items():
             with pytest.raises(SystemExit) as stopped:

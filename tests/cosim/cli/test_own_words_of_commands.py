@@ -71,7 +71,7 @@ def told(line: str, files: dict[str, Path], capsys: pytest.CaptureFixture[str], 
     return shown.out + shown.err
 
 
-def test_every_command_is_looked_at() -> None:
+def test_every_command_is_examined() -> None:
     names = {command.name for command in find_commands("cosim.cli")}
     assert names == READING | {name.split()[0] for name in STEPPING | ASKING}
 

@@ -25,7 +25,7 @@ def with_(values: np.ndarray, rows: slice, value: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_no_number_is_equal_to_the_same_and_to_nothing_else(value: float) -> None:
+def test_no_number_is_equal_to_no_number_and_to_nothing_else(value: float) -> None:
     holed = with_(LINE, slice(40, 50), value)
     assert signal(TIME, holed, holed + 1e-4).status == "within"
     for one, two in [
@@ -52,14 +52,14 @@ def test_signals_without_any_number() -> None:
     assert np.isnan(signal(TIME, LINE, nothing).max_error)
 
 
-def test_half_a_step_beside_a_hole_is_not_judged() -> None:
+def test_half_a_step_beside_a_hole_is_not_evaluated() -> None:
     """Between a number and NaN nobody knows the value; beyond them they are compared."""
     fine = made(np.arange(21) * 0.05, y=[0.0] * 10 + [np.nan] + [100.0] * 10)
     coarse = made(np.arange(9) * 0.1 + 0.075, y=[0.0] * 5 + [100.0] * 4)
     assert {"value", "nan"}.isdisjoint(kinds(compared(fine, coarse)["y"]))
 
 
-def test_values_after_a_hole_are_judged() -> None:
+def test_values_after_a_hole_are_evaluated() -> None:
     one = with_(LINE, slice(40, 50), np.nan)
     two = one + np.where(TIME > 0.7, 0.5, 0.0)
     assert signal(TIME, one, two).max_error == pytest.approx(0.5, abs=3e-6)  # less the slope in the allowed time

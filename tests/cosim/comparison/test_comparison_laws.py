@@ -86,7 +86,7 @@ def test_scaling_a_signal_scales_error_and_tolerance(one: np.ndarray, two: np.nd
 
 @settings(max_examples=40)
 @given(ANY_VALUES, st.sets(st.integers(0, ROWS - 2), max_size=10))
-def test_more_rows_on_the_same_line_change_nothing(values: np.ndarray, where: set[int]) -> None:
+def test_more_rows_on_a_line_change_nothing(values: np.ndarray, where: set[int]) -> None:
     after = sorted(where)
     middle = 0.5 * (TIME[after] + TIME[[k + 1 for k in after]])
     time = np.sort(np.append(TIME, middle))

@@ -25,7 +25,7 @@ def with_values(result: Result, **changed: Any) -> Result:
     return replace(result, table=table)
 
 
-def test_the_same_run_again_is_equal(outcome: Outcome) -> None:
+def test_a_run_done_again_is_equal(outcome: Outcome) -> None:
     comparison = compare(outcome, small().run())
     assert comparison.equal
     assert {signal.status for signal in comparison.signals} == {"equal"}

@@ -49,14 +49,14 @@ def test_text_shows_what_differs_and_verbose_all() -> None:
     assert max(map(len, text.splitlines())) <= 130
 
 
-def test_what_all_signals_share_is_told_once() -> None:
+def test_what_all_signals_share_is_reported_once() -> None:
     reference = made(TIME, a=TIME, b=TIME, c=TIME)
     text = comparison_text(compared(reference, made(TIME[:-1], a=TIME[:-1], b=TIME[:-1], c=TIME[:-1])))
     assert text.count("ends at 0.99 s instead of 1 s") == 1
     assert "all 3 signals" in text
 
 
-def test_noise_is_told_in_few_lines() -> None:
+def test_noise_is_stated_in_few_lines() -> None:
     noise = 0.01 * np.random.default_rng(0).standard_normal(1001)
     time = np.arange(1001) * 0.01
     comparison = compared(made(time, y=time), made(time, y=time + noise))
@@ -88,7 +88,7 @@ def test_json_data_is_plain() -> None:
     assert json.loads(json.dumps(data))["equal"] is False
 
 
-def test_notes_tell_versions_parameters_and_misspelt_tolerances() -> None:
+def test_notes_name_versions_parameters_and_misspelt_tolerances() -> None:
     def run(**changes: object) -> dict[str, object]:
         entry = {"name": "plant", "guid": "{1}", "parameters": {"mass": 1.0, "drag": 2.0}}
         return {"versions": {"numpy": "2.0", "python": "3.11"}, "components": [entry | changes], "step": 0.1}

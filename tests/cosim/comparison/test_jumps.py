@@ -153,7 +153,7 @@ def test_late_jump_is_one_finding_or_passes(rows: int, discrete: list[str]) -> N
     assert loose.max_shift == pytest.approx(abs(0.01 * rows), abs=1e-9)
 
 
-def test_event_row_late_and_values_after_it_are_judged() -> None:
+def test_event_row_late_and_values_after_it_are_evaluated() -> None:
     """A jump from 0 to 1 at 0.503 s and one at 0.506 s, then both rise; the second case is 0.01 too high after it."""
 
     def run(at: float, more: float) -> tuple[np.ndarray, np.ndarray]:
@@ -189,7 +189,7 @@ def test_missing_pulse_of_one_sample_is_found(discrete: list[str]) -> None:
     assert signal(TIME, np.zeros(201), pulse, discrete=discrete).status == "differs"
 
 
-def test_a_reset_seen_only_in_one_event_row_is_judged() -> None:
+def test_a_reset_seen_only_in_one_event_row_is_evaluated() -> None:
     """An innovation: it jumps at the event and decays; half as large is a value error although the time is right."""
     time = np.sort(np.append(TIME, TIME[100]))
     decay = np.where(np.arange(202) > 100, np.exp(-(time - 1.0) / 0.002), 0.0)

@@ -88,7 +88,7 @@ def test_rows_that_do_not_nest_are_the_known_exception(judge: Any) -> None:
     assert row.found in PAGE.read_text(encoding="utf-8")
 
 
-def test_the_page_tells_of_twenty_repetitions_and_of_every_change(study: Any) -> None:
+def test_the_page_shows_twenty_repetitions_and_every_change(study: Any) -> None:
     assert sum(r.times for r in study.repetitions.repetitions()) == study.repetitions.REPETITIONS == 20
     for mutation in study.mutants.all_mutations():
         assert len(cells(mutation.change)) > 1

@@ -48,7 +48,9 @@ LOST = replace(PACKETS[2], kind="lost", delivered_at=nan, outcomes={})
         ([LOST], ["time", "payload"], "delivered never"),
     ],
 )
-def test_a_packet_that_is_not_as_in_the_reference_is_told(now: list[PacketRecord], kinds: list[str], text: str) -> None:
+def test_a_packet_that_is_not_as_in_the_reference_is_reported(
+    now: list[PacketRecord], kinds: list[str], text: str
+) -> None:
     comparison = verdict(*now)
     assert [d.kind for d in comparison.packets.differences] == kinds
     assert not comparison.equal
@@ -58,7 +60,7 @@ def test_a_packet_that_is_not_as_in_the_reference_is_told(now: list[PacketRecord
     assert "Packets of the network" in live_page(comparison_page(comparison))
 
 
-def test_the_same_packets_agree_in_any_order_and_within_the_tolerance() -> None:
+def test_equal_packets_agree_in_any_order_and_within_the_tolerance() -> None:
     near = replace(PACKETS[2], values={"train.speed": 20.0005}, delivered_at=3.1 + 5e-7)
     comparison = compared(result(PACKETS), result([near, *PACKETS[3:], *PACKETS[:2]]))
     assert comparison.equal

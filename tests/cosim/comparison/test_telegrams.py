@@ -90,7 +90,7 @@ def test_content_within_tolerance_and_receivers_of_one_side_pass() -> None:
     assert not verdict(RECORDS, changed(4, outcomes={"observer": "accepted", "new": "late"})).differences
 
 
-def test_never_delivered_is_told() -> None:
+def test_never_delivered_is_reported() -> None:
     (found,) = verdict(RECORDS, changed(4, delivered_at=float("nan"))).differences
     assert "delivered never" in found.text
 

@@ -57,7 +57,7 @@ def test_pieces_are_bands_of_their_own(line: tuple[np.ndarray, np.ndarray], tole
     assert np.all(band.low[n:] >= 9.0)
 
 
-def test_beyond_the_ends_nothing_is_judged() -> None:
+def test_beyond_the_ends_nothing_is_evaluated() -> None:
     band = band_of(Curve(np.array([0.0, 1.0]), np.array([0.0, 1.0])), np.array([-0.2, -0.05, 1.05, 1.2]), 0.1)
     assert band.judged.tolist() == [False, True, True, False]
     assert np.allclose(band.high, [0.0, 0.05, 1.0, 1.0], atol=ROUNDING)

@@ -104,7 +104,7 @@ def scenario(latency: float) -> Scenario:
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.013, 0.007])
-def test_the_same_calls_in_the_same_order(
+def test_equal_calls_in_equal_order(
     spied: Callable[[Wrap], None], latency: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From the begin of the run on: what builds and probes an FMU before it depends on the caches. With a latency of
@@ -156,7 +156,7 @@ def test_any_call_may_fail(spied: Callable[[Wrap], None]) -> None:
     assert failures > 10
 
 
-def test_what_an_update_asks_for_is_given(spied: Callable[[Wrap], None]) -> None:
+def test_what_an_update_asks_for_is_done(spied: Callable[[Wrap], None]) -> None:
     """It asks for another update, or for the end of the run, or names a next event: Python goes on from there."""
     for place in (1, 2, 5):  # of the flags and the time among the arguments
 

@@ -144,7 +144,7 @@ def test_none_of_the_default_scenario_is_left_to_python() -> None:
 OBSERVERS = ("differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio")
 
 
-def test_what_is_not_told_at_once_stays_with_python(plants: dict[str, Path]) -> None:
+def test_what_is_not_delivered_at_once_stays_with_python(plants: dict[str, Path]) -> None:
     """Telegrams that are late, may be missed, or are blurred."""
     instants = {"layout": "instants", "instants": [0.35, 2.01, 3.3, 4.777]}
     places = {"layout": "positions", "positions": [-2.0, 1.0, 2.7], "location_accuracy": 0.5}
@@ -161,7 +161,7 @@ def test_what_is_not_told_at_once_stays_with_python(plants: dict[str, Path]) -> 
         assert steps_compiled(compiled) >= COUNT - 3 * len(python.result.events)
 
 
-def test_all_that_a_telegram_says_is_told(plants: dict[str, Path], tmp_path: Path) -> None:
+def test_all_that_a_telegram_says_is_delivered(plants: dict[str, Path], tmp_path: Path) -> None:
     listener = build_fmu(Listener(), tmp_path, 3)
     places = {"layout": "positions", "positions": [-2.0, 0.0, 0.5], "location_accuracy": 0.4}
     for layout in (places, {"layout": "instants", "instants": [0.35, 2.0, 3.3]}):

@@ -157,7 +157,7 @@ def test_the_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.Monkey
     assert sorted(p.name for p in path.parent.iterdir()) == [f"{path.stem}.sha256", path.name]
 
 
-def test_progress_is_told_up_to_the_end(tmp_path: Path) -> None:
+def test_progress_is_reported_up_to_the_end(tmp_path: Path) -> None:
     scenario = chain(tmp_path, [random_linear(tmp_path, "a", np.random.default_rng(1), 3)], stop=100.0, step=0.01)
     told: list[float] = []
     outcome = scenario.run(progress=lambda t, _: told.append(t), warn=lambda _: None)

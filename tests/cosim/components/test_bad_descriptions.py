@@ -106,7 +106,7 @@ def test_what_cannot_be_meant_is_named(case: str, tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.compiler
-def test_one_variable_given_twice_is_one_variable(tmp_path: Path) -> None:
+def test_one_variable_stated_twice_is_one_variable(tmp_path: Path) -> None:
     changed(mass(tmp_path), 'name="x[1]" valueReference="5"', 'name="x" valueReference="2"')
     (tmp_path / "s.toml").write_text(SCENARIO)
     assert main(["run", str(tmp_path / "s.toml"), "--out", str(tmp_path / "out"), "--no-report"]) == 0
@@ -135,7 +135,7 @@ def test_a_missing_function_is_named(
 
 @pytest.mark.compiler
 @pytest.mark.parametrize(("version", "flag"), [(2, "canGetAndSetFMUstate"), (3, "canGetAndSetFMUState")])
-def test_states_that_are_promised_and_not_given(
+def test_states_that_are_promised_and_not_delivered(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], version: Any, flag: str
 ) -> None:
     plain = linear_fmu(tmp_path, "mass", [[0]], [[1]], [[1]], [[0]], version=version, state=False)

@@ -189,7 +189,7 @@ def test_without_the_flag_nobody_speaks_of_tools() -> None:
 
 
 @pytest.mark.compiler
-def test_the_user_is_told_before_the_run(tmp_path: Path) -> None:
+def test_the_user_is_warned_before_the_run(tmp_path: Path) -> None:
     path = linear_fmu(tmp_path, "remote", **LAG, needs_tool=True)
     outcome = cosim.Scenario(stop=0.1, step=0.1).add("remote", fmu=str(path)).run()
     told = [w for w in outcome.result.summary["warnings"] if "needsExecutionTool" in w]
@@ -290,7 +290,7 @@ def test_directional_derivatives_are_those_of_the_matrices(tmp_path: Path, versi
     made.free()
 
 
-def test_a_block_gives_its_derivatives_by_the_same_call() -> None:
+def test_a_block_gives_its_derivatives_by_an_equal_call() -> None:
     """dp = v, dv = push over a step of 0.5 s from a state: neither output depends on the push directly."""
     from coupled_runs import Pushed, block
 

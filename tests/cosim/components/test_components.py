@@ -109,7 +109,7 @@ def test_states_hold_everything_the_component_knows() -> None:
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_events_told_after_a_restore_are_told_again(version: Any) -> None:
+def test_events_notified_after_a_restore_are_notified_again(version: Any) -> None:
     made = block(Listener(), "listener", version)
     made.instantiate()
     made.enter_initialization(0.0, 1.0)
@@ -191,7 +191,7 @@ def test_seconds_and_calls_are_counted() -> None:
     assert np.isfinite(made.seconds)
 
 
-def test_an_fmi2_slave_is_not_told_that_it_may_forget_its_past() -> None:
+def test_an_fmi2_slave_is_not_notified_that_it_may_forget_its_past() -> None:
     """The localiser sets states back; a slave that had thrown its past away could not follow."""
     slave = Train2()
     made = started(slave)

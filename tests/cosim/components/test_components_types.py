@@ -350,7 +350,7 @@ def test_an_item_goes_by_its_name_or_its_number(typed3: Component) -> None:
 
 
 @pytest.mark.parametrize("slave", [Kinds(), Kinds2()])
-def test_python_slaves_have_the_same_types(slave: Mock) -> None:
+def test_python_slaves_have_equal_types(slave: Mock) -> None:
     made = component(slave)
     made.instantiate()
     values = {"x": 0.5, "boolean": True, "string": "ü"}

@@ -264,7 +264,7 @@ def test_a_command_acts_from_its_row_on(tmp_path: Path, algorithm: str, stepper:
     np.testing.assert_allclose(other["distance"], outcome["sum.distance"], atol=1e-9)
 
 
-def test_inputs_of_one_fmu_are_told_for_what_they_are_taken(tmp_path: Path) -> None:
+def test_inputs_of_one_fmu_are_reported_as_what_they_are_taken_for(tmp_path: Path) -> None:
     """Discrete inputs hold a command, 30 at 4 s; continuous ones follow lines, 32.5 as the rows say, unless told."""
     t = 0.5 * np.arange(9)
     rows = "".join(f"{a},{b},{b}\n" for a, b in zip(t, np.where(t >= 1.0, 10.0, 0.0), strict=True))

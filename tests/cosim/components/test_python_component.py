@@ -73,7 +73,7 @@ def scenario(observer: Any = DeadReckoning, plant: Any = Trolley, step: float = 
 
 
 @pytest.mark.parametrize("observer", [DeadReckoning, DeadReckoning(), Saved], ids=["class", "instance", "get_state"])
-def test_telegrams_between_communication_points_are_told_at_their_instants(observer: Any) -> None:
+def test_telegrams_between_communication_points_are_delivered_at_their_instants(observer: Any) -> None:
     outcome = scenario(observer).run(warn=lambda _: None)
     assert outcome.failure is None
     assert [e.stamp for e in outcome.result.events] == pytest.approx([p / 10.0 for p in PLACES], abs=1e-9)
@@ -168,7 +168,7 @@ class Uncopied(DeadReckoning):
         self.lock = threading.Lock()
 
 
-def test_what_cannot_be_copied_is_told() -> None:
+def test_what_cannot_be_copied_is_reported() -> None:
     s = Scenario(stop=1.0, step=0.1).add("plant", model=Uncopied())
     failure = s.run(warn=lambda _: None).failure
     assert failure is not None

@@ -62,7 +62,7 @@ def quietly(scenario: Scenario) -> Outcome:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_an_observer_cannot_tell_the_recording_from_the_plant(name: str, tmp_path: Path) -> None:
+def test_an_observer_cannot_distinguish_the_recording_from_the_plant(name: str, tmp_path: Path) -> None:
     first = quietly(joint(CASES[name]))
     Outcome(first.result, first.spec, ("csv",) if name == "in time" else ("npy",)).write(tmp_path / "run", report=False)
     second = quietly(playback(tmp_path / "run", CASES[name]))
@@ -85,7 +85,7 @@ def test_rows_at_telegrams_hold_what_the_plant_showed_there(tmp_path: Path) -> N
         assert second[field].tobytes() == first[field].tobytes(), field
 
 
-def test_half_of_a_run_is_told_its_own_telegrams_only(tmp_path: Path) -> None:
+def test_half_of_a_run_gets_its_own_telegrams_only(tmp_path: Path) -> None:
     quietly(joint({})).write(tmp_path / "run", report=False)
     later = playback(tmp_path / "run", {}).set("start", 0.3)
     outcome = quietly(later)
@@ -138,7 +138,7 @@ def telegram(**changes: Any) -> BaliseRecord:
         (None, {}, r"holds no telegrams.*no such file"),
     ],
 )
-def test_telegrams_that_cannot_be_told_are_refused(
+def test_telegrams_that_cannot_be_delivered_are_refused(
     records: list[BaliseRecord] | None, keys: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
     if records is not None:
@@ -147,7 +147,7 @@ def test_telegrams_that_cannot_be_told_are_refused(
         small().balises(layout="recorded", file=str(tmp_path / "events.csv"), **{"method": "auto"} | keys).run()
 
 
-def test_a_wrong_row_of_telegrams_is_told_with_its_file_once(tmp_path: Path) -> None:
+def test_a_wrong_row_of_telegrams_is_reported_with_its_file_once(tmp_path: Path) -> None:
     path = tmp_path / "events.csv"
     path.write_text("stamp,position\n0.1,soon\n", encoding="utf-8")
     with pytest.raises(ScenarioError, match="position: expected a number, got 'soon'") as refused:

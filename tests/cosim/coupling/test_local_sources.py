@@ -27,7 +27,7 @@ def observed(source: str, **changes: object) -> Scenario:
     return scenario
 
 
-def test_a_local_variable_is_as_good_a_source_as_the_output_of_the_same_value() -> None:
+def test_a_local_variable_is_as_good_a_source_as_the_output_of_equal_value() -> None:
     usual, hidden = observed(SPEED).run(), observed(LOCAL).run()
     assert hidden.failure is None
     for name in usual.result.table.dtype.names or ():
@@ -54,7 +54,7 @@ def test_both_steppers_read_locals_of_native_fmus(stepper: str) -> None:
     assert (odometer("speed") == odometer("train_speed")).all()
 
 
-def test_balises_and_report_may_look_at_locals() -> None:
+def test_balises_and_report_may_read_locals() -> None:
     scenario = small()
     scenario.balises(speed=LOCAL).report(true_speed=LOCAL)
     outcome, usual = scenario.run(), small().run()

@@ -39,7 +39,7 @@ def test_outputs_lie_in_one_array_in_the_order_of_stepping() -> None:
     assert made.signals[1].unit == "m/s"
 
 
-def test_what_takes_of_a_component_is_told_from_what_it_takes() -> None:
+def test_what_takes_of_a_component_is_distinguished_from_what_it_takes() -> None:
     made = plan()
     listener = np.zeros(len(made.values), dtype=bool)
     listener[made.find("listener").columns] = True

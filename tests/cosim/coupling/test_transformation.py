@@ -93,7 +93,7 @@ def test_a_table_of_values_passes_what_it_does_not_name() -> None:
 
 
 @given(st.dictionaries(NUMBERS, NUMBERS, max_size=4), st.frozensets(NUMBERS, min_size=1, max_size=4))
-def test_a_table_is_linear_only_where_a_line_does_exactly_the_same(
+def test_a_table_is_linear_only_where_a_line_is_exactly_equal(
     table: dict[float, float], domain: frozenset[float]
 ) -> None:
     found = as_affine(table, domain)

@@ -236,7 +236,7 @@ def test_a_log_that_cannot_be_written(tmp_path: Path) -> None:
         small().run(call_log=tmp_path / "nowhere" / "calls.log")
 
 
-def test_a_log_that_breaks_later_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_that_breaks_later_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import cosim.diagnostics.call_log as module
 
     written: list[bytes] = []
@@ -361,7 +361,7 @@ def test_counts_are_those_of_the_call_log(version: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.compiler
-def test_both_steppers_count_the_same(tmp_path: Path) -> None:
+def test_both_steppers_count_equally(tmp_path: Path) -> None:
     counts, rows = [], []
     for stepper in ("python", "compiled"):
         outcome = pair(tmp_path, 2).set("stop", 20.0).master(stepper=stepper).run(warn=lambda _: None)

@@ -81,7 +81,7 @@ def test_an_unknown_category_is_refused_with_those_there_are(tmp_path: Path) -> 
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("version", [1, 2])
-def test_two_instances_of_one_fmu_are_told_apart(version: Any, tmp_path: Path) -> None:
+def test_two_instances_of_one_fmu_are_distinguished(version: Any, tmp_path: Path) -> None:
     scenario = chatty(tmp_path, version, "all").set("quiet.log", "all").set("quiet.u", -1.0)
     found = scenario.run().result.messages
     for name, u in (("talker", 2.5), ("quiet", -1.0)):
@@ -89,7 +89,7 @@ def test_two_instances_of_one_fmu_are_told_apart(version: Any, tmp_path: Path) -
 
 
 @pytest.mark.compiler
-def test_two_instances_of_one_name_are_told_apart(tmp_path: Path) -> None:
+def test_two_instances_of_one_name_are_distinguished(tmp_path: Path) -> None:
     """While an FMU is probed, there is another one of its name."""
     path = awkward_fmu(tmp_path, "chatty", "chatty", version=2, at=0.05, every=0.1)
     run, probed = (load_fmu(path, "plant") for _ in range(2))

@@ -174,7 +174,7 @@ def test_each_kind_of_wire_has_its_colour_and_its_line_in_the_key() -> None:
     assert "algebraic loop" not in plain
 
 
-def test_telegrams_are_dashed_and_go_from_the_plant_to_those_told() -> None:
+def test_telegrams_are_dashed_and_go_from_the_plant_to_those_notified() -> None:
     events = [edge for edge in _wires_of(loop()) if edge.kind == "event"]
     assert [(e.source, e.target) for e in events] == [(("a", EVENT_PORT), ("d", EVENT_PORT))]
     from matplotlib.colors import to_rgba

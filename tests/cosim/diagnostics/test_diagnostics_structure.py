@@ -59,7 +59,7 @@ def test_order_groups_loops_and_what_is_held(loops: Scenario) -> None:
 
 
 @pytest.mark.compiler
-def test_jacobi_holds_everything_and_what_it_cannot_solve_is_told(loops: Scenario) -> None:
+def test_jacobi_holds_everything_and_what_it_cannot_solve_is_reported(loops: Scenario) -> None:
     structure = loops.copy().master(algorithm="jacobi").structure()
     assert {link.held for link in structure.links} == {True}
     assert any("does not solve the algebraic loop" in warning for warning in structure.warnings)

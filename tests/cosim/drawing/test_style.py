@@ -29,7 +29,7 @@ def test_no_figure_has_colours_of_its_own() -> None:
     assert own == {}
 
 
-def test_no_two_observers_have_the_same_colour_or_the_same_dashes() -> None:
+def test_no_two_observers_have_equal_colours_or_equal_dashes() -> None:
     for key in ("color", "linestyle"):
         assert len({str(line[key]) for line in OBSERVER_LINES}) == len(OBSERVER_LINES)
 

@@ -75,7 +75,9 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("item", "text"), WRONG)
-def test_what_cannot_be_judged_is_refused(item: dict[str, Any], text: str, check: Callable[..., ScenarioTable]) -> None:
+def test_what_cannot_be_evaluated_is_refused(
+    item: dict[str, Any], text: str, check: Callable[..., ScenarioTable]
+) -> None:
     with pytest.raises(ScenarioError, match=text) as caught:
         check({"check": "warnings"}, item)
     assert str(caught.value).startswith(f"test: expect, number 2, '{item['check']}'")
@@ -149,7 +151,7 @@ def test_what_is_no_expectation_is_refused(item: dict[str, Any], text: str) -> N
 # ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_run_is_judged_by_its_own_numbers() -> None:
+def test_a_run_is_evaluated_by_its_own_numbers() -> None:
     scenario = small().expect("speed_error", of="observer", start=0.1, max=1.0, rms=1e-9)
     scenario.expect("signal", signal="locomotive.position", final=(0.0, 1.0)).expect("telegrams", used=3)
     outcome = scenario.run(warn=quiet)
@@ -248,7 +250,7 @@ def test_a_mistake_in_prepare_is_that_of_the_expectation(
         check({"check": "test_broken", "mistake": mistake})
 
 
-def test_a_mistake_in_judge_is_an_expectation_that_is_not_met(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mistake_in_evaluate_is_an_expectation_that_is_not_met(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(EXPECTATIONS, "test_broken", Broken)
     items = [{"check": "test_broken", "mistake": mistake} for mistake in ("later", "text")]
     outcome = small(expect=[*items, {"check": "warnings", "at_most": 99}]).run()

@@ -101,7 +101,7 @@ def test_filter_over_fmu_is_filter_over_own_equations(path: Path, readings: np.n
     np.testing.assert_allclose(found, own_filter(kind, readings), rtol=1e-6, atol=1e-6)  # as demanded
 
 
-def test_directional_derivatives_give_the_same_filter(path: Path, readings: np.ndarray) -> None:
+def test_directional_derivatives_give_an_equal_filter(path: Path, readings: np.ndarray) -> None:
     one = driven(made(path, "ekf", interface="model-exchange"), readings[:4])
     # two integrators of one equation: the Rosenbrock step of 5e-4 s is off by its second order
     np.testing.assert_allclose(one, driven(made(path, "ekf"), readings[:4]), rtol=2e-5, atol=2e-5)
@@ -206,7 +206,7 @@ def test_in_a_scenario(path: Path, tmp_path: Path) -> None:
         ({"states": ["rain_speed"]}, "did you mean 'train_speed'"),
     ],
 )
-def test_mistakes_are_told(path: Path, more: dict[str, Any], told: str) -> None:
+def test_mistakes_are_reported(path: Path, more: dict[str, Any], told: str) -> None:
     with pytest.raises(FmuModelError, match=told):
         FmuFilterModel(
             path, FilterTable.model_validate({"kind": "ukf", "measurements": {"wheel_speed": 0.1}} | more), START
@@ -282,7 +282,7 @@ def test_particles_of_model_exchange_find_what_those_of_co_simulation_do() -> No
     np.testing.assert_allclose(found[0], found[1], rtol=1e-4)
 
 
-def test_a_step_at_which_states_were_not_looked_at_is(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_at_which_states_were_not_read_is(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The default experiment has steps of 10 ms: multiples of it need no second look."""
     looked: list[float] = []
     monkeypatch.setattr(component, "check_states", lambda _model, h: looked.append(h))

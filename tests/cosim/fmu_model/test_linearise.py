@@ -70,7 +70,7 @@ def test_the_operating_point_is_where_a_run_arrives(locomotive: Path) -> None:
     assert found.x[1] > 0.5
 
 
-def test_hidden_modes_are_told(exact: Linearisation) -> None:
+def test_hidden_modes_are_reported(exact: Linearisation) -> None:
     part = exact.part(None, ["speed"])
     assert [round(mode.eigenvalue.real, 6) for mode in part.unobservable()] == [0.0]
     assert part.unobservable()[0].taking_part.keys() == {"train_position"}
@@ -155,7 +155,7 @@ def test_command(locomotive: Path, tmp_path: Path, capsys: pytest.CaptureFixture
         (["--at", "-1"], "expected an instant from 0 s on"),
     ],
 )
-def test_mistakes_are_told(
+def test_mistakes_are_reported(
     locomotive: Path, words: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     words = [str(tmp_path / word) if word == "a.txt" else word for word in words]
@@ -163,12 +163,12 @@ def test_mistakes_are_told(
     assert told in capsys.readouterr().err
 
 
-def test_a_model_without_states_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_model_without_states_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["linearise", "inverter"]) == 2
     assert "inverter: it has no continuous states" in capsys.readouterr().err
 
 
-def test_samples_of_an_fmu_are_told(locomotive: Path) -> None:
+def test_samples_of_an_fmu_are_reported(locomotive: Path) -> None:
     path = fmus.cached_fmu(PLANTS["odometer"](), fmi_version=3)
     between = " ".join(linearise_fmu(path).remarks)
     assert "it holds " in between

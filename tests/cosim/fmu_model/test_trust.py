@@ -73,7 +73,7 @@ def test_prepared_points_are_those_of_the_ordinary_calls(version: int, monkeypat
     model.close()
 
 
-def test_a_step_that_fails_is_told_in_words() -> None:
+def test_a_step_that_fails_is_reported_in_words() -> None:
     model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3))
     points = np.array([[0.0], [np.nan], [1.0]])
     with pytest.raises(FmuModelError, match=r"locomotive.*doStep was discarded.* at t = 3 s; .*not a finite number"):
@@ -166,7 +166,7 @@ class OwnSteps:
         return self.read()
 
 
-def test_steps_of_its_own_that_do_not_fit_are_told() -> None:
+def test_steps_of_its_own_that_do_not_fit_are_reported() -> None:
     model = cast(SealedModel, OwnSteps())
     assert check_states(model, 0.1).exact
     assert check_states(model, 0.2).exact
@@ -193,7 +193,7 @@ def test_events_of_model_exchange_are_handled() -> None:
     same.close()
 
 
-def test_a_state_that_chatters_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_state_that_chatters_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exchange, "MOST_EVENTS", 1)
     model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3), "model-exchange")
     x = np.array([0.0, 0.02, 0.02 / 0.575])  # stops within the step

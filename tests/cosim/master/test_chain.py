@@ -113,7 +113,7 @@ CASES: dict[str, Callable[[Path], Scenario]] = {
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("case", CASES)
-def test_show_tells_the_chains_of_the_run(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_show_lists_the_chains_of_the_run(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     masters: list[Master] = []
     run = Master.run
     monkeypatch.setattr(Master, "run", lambda master: (masters.append(master), run(master))[1])

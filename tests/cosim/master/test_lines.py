@@ -74,7 +74,7 @@ def test_interpolation_alone_is_of_second_order_where_nothing_is_fed_back(tmp_pa
         assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.1), telling
 
 
-def test_a_mean_is_not_told_where_the_output_follows_the_input_at_once(tmp_path: Path) -> None:
+def test_a_mean_is_not_reported_where_the_output_follows_the_input_at_once(tmp_path: Path) -> None:
     """Documented limit: held inputs that act directly take the value of the end, and stay of first order."""
     means = halved(tmp_path, "force-displacement", inputs="extrapolate")
     told = halved(tmp_path, "force-displacement", inputs="extrapolate", capabilities={"input_derivatives": True})
@@ -186,7 +186,7 @@ def test_a_value_that_is_corrected_replaces_the_last_one() -> None:
         assert hold.at(0.1)[0] == pytest.approx(guess)
 
 
-def test_balises_are_heard_at_their_own_instants_with_lines_too() -> None:
+def test_balises_are_received_at_their_own_instants_with_lines_too() -> None:
     """The receiver follows the line in each part of its step: a speed that grows linearly integrates to the distance
     exactly.
     """

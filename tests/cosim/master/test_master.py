@@ -73,7 +73,7 @@ def test_an_event_gives_two_rows_before_and_after() -> None:
     assert np.all(np.diff(seen.time) >= 0.0)
 
 
-def test_progress_is_told_up_to_the_end() -> None:
+def test_progress_is_reported_up_to_the_end() -> None:
     told: list[float] = []
     master = prepare([component(Counter(), "c")], [], 0.1, 100)
     master._progress = told.append
@@ -362,7 +362,9 @@ def test_the_plant_is_no_receiver_and_receivers_come_after_it() -> None:
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 0.5), st.integers(0, 5))
 @settings(max_examples=15, deadline=None)
-def test_every_balise_passed_is_told_or_missed_or_still_on_its_way(missed: float, latency: float, seed: int) -> None:
+def test_every_balise_passed_is_delivered_or_missed_or_still_on_its_way(
+    missed: float, latency: float, seed: int
+) -> None:
     channel = Channel(latency=latency, latency_jitter=0.2, missed_fraction=missed, seed=seed)
     layout = positions(*(0.7 + 0.9 * k for k in range(12)))
     parts = [block(Motion(), "plant"), block(Listener(), "listener")]

@@ -180,7 +180,7 @@ def test_a_divided_step_holds_what_was_true_where_its_part_begins() -> None:
         assert [seen for _, _, seen in steps] == [(until if name == "b" else t) for t, until, _ in steps]
 
 
-def test_slow_and_fast_parts_are_given_what_the_others_are_given() -> None:
+def test_slow_and_fast_parts_are_fed_what_the_others_are_fed() -> None:
     """In the step in which a slow part takes its own it is given what everybody is given in that step."""
 
     def rates(master: Master) -> None:

@@ -55,7 +55,7 @@ def test_long_steps_where_nothing_happens(tmp_path: Path) -> None:
     assert statistics.rejected < 0.2 * statistics.accepted
 
 
-def test_where_the_smallest_step_does_not_reach_it_is_told(tmp_path: Path) -> None:
+def test_where_the_smallest_step_does_not_reach_it_is_reported(tmp_path: Path) -> None:
     seen = run_cut(
         cuts(CHAIN)["displacement-displacement"], CHAIN, tmp_path, 0.1, 10, control=doubling(1e-8, smallest=0.025)
     )
@@ -96,7 +96,7 @@ def test_a_system_that_is_exact_is_not_changed_by_steps_that_are_taken_back() ->
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_telegrams_on_their_way_are_neither_lost_nor_told_twice(version: int) -> None:
+def test_telegrams_on_their_way_are_neither_lost_nor_delivered_twice(version: int) -> None:
     """Late, overtaking and missed telegrams: with steps taken back the same ones arrive, at the same times."""
 
     def telegrams(**how: Any) -> Any:

@@ -71,7 +71,7 @@ def test_lost_packets_are_no_wheel_fault(name: str) -> None:
 @pytest.mark.parametrize(
     ("backend", "stepper"), [("block2", "python"), ("fmu3", "python"), ("fmu3", "compiled"), ("fmu2", "compiled")]
 )
-def test_blocks_and_fmus_leave_out_the_same(backend: str, stepper: str) -> None:
+def test_blocks_and_fmus_leave_out_equal_samples(backend: str, stepper: str) -> None:
     reference, outcome = (run("quasi_lpv_uio", *how, loss_fraction=0.3) for how in ((), (backend, stepper)))
     assert outcome.result.summary["master"]["stepper"]["name"] == stepper
     assert missed(outcome) == missed(reference) > 50
@@ -201,7 +201,7 @@ def test_samples_between_packets_are_no_wheel_fault(name: str, network: dict[str
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("version", ["fmu2", "fmu3"])
-def test_both_steppers_leave_out_the_same_samples(version: str) -> None:
+def test_both_steppers_leave_out_equal_samples(version: str) -> None:
     """Bit by bit, also where a sample lies between two communication points."""
     for sampling in (0.01, 0.025):
         runs = [run("quasi_lpv_uio", version, s, sampling=sampling, loss_fraction=0.1, **FASTER) for s in STEPPERS]

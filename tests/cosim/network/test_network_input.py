@@ -45,7 +45,7 @@ SETTINGS = NetworkSettings((Node("a", ("x.y",)),), period=0.02)
         ({"perod": 1.0}, "network.perod: unknown key.*period"),
     ],
 )
-def test_what_cannot_be_is_told_in_words(network: dict[str, Any], words: str) -> None:
+def test_what_cannot_be_is_reported_in_words(network: dict[str, Any], words: str) -> None:
     with pytest.raises(CosimError, match=words):
         scenario(**network).run()
 

@@ -33,7 +33,7 @@ def test_the_compiled_stepper_gives_the_rows_of_python(network: dict[str, Any], 
 
 
 @pytest.mark.compiler
-def test_native_fmus_are_told_what_blocks_are_told() -> None:
+def test_native_fmus_are_notified_of_what_blocks_are_notified() -> None:
     names = ("listener.estimate", "listener.first", "listener.second", "listener.packets")
     block, native = (run(0.01, backend, **NETWORKS[2]) for backend in ("block3", "fmu2"))
     assert [native[name][-1] for name in names] == pytest.approx([block[name][-1] for name in names], abs=1e-12)

@@ -116,14 +116,14 @@ def test_delays_are_made_equal_where_that_is_asked_for() -> None:
     np.testing.assert_allclose(late, np.maximum(usual, 0.1), atol=1e-12)
 
 
-def test_a_duplicate_is_told_once_unless_numbers_are_ignored() -> None:
+def test_a_duplicate_is_reported_once_unless_numbers_are_ignored() -> None:
     checked, ignored = (run(0.01, sequence=kind, duplicate_fraction=1.0) for kind in ("checked", "ignored"))
     assert of(ignored, "listener.packets") == 2 * of(checked, "listener.packets")
     assert {p.outcomes["listener"] for p in checked.result.packets if p.kind == "duplicate"} == {"dropped"}
 
 
 @pytest.mark.parametrize("together", [False, True])
-def test_all_versions_of_fmi_are_told_the_same(tmp_path: Path, *, together: bool) -> None:
+def test_all_versions_of_fmi_are_notified_equally(tmp_path: Path, *, together: bool) -> None:
     network = ROUGH
     if together:  # two packets arrive at one instant
         (tmp_path / "delays.csv").write_text("delay\n0.047\n0.01\n")
@@ -167,7 +167,7 @@ def test_the_order_of_nodes_changes_nothing_but_round_robin() -> None:
     assert run().result.packets != run(nodes=nodes).result.packets
 
 
-def test_steps_that_are_done_again_send_the_same_packets() -> None:
+def test_steps_that_are_done_again_send_equal_packets() -> None:
     halved = scenario(0.1, **ROUGH).master(control="doubling", tolerance=1e-3).run(warn=lambda _: None)
     once = run(0.1, **ROUGH)
     assert [(p.stamp, p.delivered_at, p.kind) for p in halved.result.packets] == [
@@ -177,14 +177,14 @@ def test_steps_that_are_done_again_send_the_same_packets() -> None:
 
 
 @pytest.mark.parametrize("master", [{"algorithm": "jacobi"}, {"inputs": "interpolate"}, {"events": "local"}])
-def test_every_master_gives_the_same(master: dict[str, str]) -> None:
+def test_every_master_gives_equal_rows(master: dict[str, str]) -> None:
     other = scenario(0.02, stop=0.5, **ROUGH).master(**master).run(warn=lambda _: None)
     usual = run(0.02, stop=0.5, **ROUGH)
     np.testing.assert_allclose(of(other, *SIGNALS), of(usual, *SIGNALS), atol=1e-12)
     assert [repr(p) for p in other.result.packets] == [repr(p) for p in usual.result.packets]
 
 
-def test_a_source_with_steps_of_its_own_is_told_of() -> None:
+def test_a_source_with_steps_of_its_own_is_reported() -> None:
     slow = scenario(0.02, stop=0.5)
     slow._data["components"]["source"]["every"] = 5
     said: list[str] = []

@@ -61,7 +61,7 @@ def test_observers_behind_a_network_do_not_depend_on_the_step(network: dict[str,
                 np.testing.assert_allclose(at(other, signal), at(fine, signal), rtol=0.0, atol=1e-9, err_msg=signal)
 
 
-def test_the_python_stepper_sends_the_same_packets() -> None:
+def test_the_python_stepper_sends_equal_packets() -> None:
     """A balise in a step makes the compiled stepper leave it: what is sent at its end is still measured there."""
     packets = [[(p.stamp, p.values) for p in run(0.1, LATE, stepper).result.packets] for stepper in ("python", "auto")]
     assert packets[0] == packets[1]

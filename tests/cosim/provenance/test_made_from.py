@@ -125,7 +125,7 @@ STARTS = st.one_of(NUMBERS, st.booleans(), st.integers(-(2**70), 2**70), st.text
 
 
 @given(st.dictionaries(st.text(min_size=1), STARTS, max_size=5), st.text(), st.lists(NUMBERS, min_size=1, max_size=4))
-def test_what_is_written_reads_back_to_the_same_scenario(
+def test_what_is_written_reads_back_to_an_equal_scenario(
     parameters: dict[str, Any], title: str, places: list[float]
 ) -> None:
     balises = {"position": "a.s", "speed": "a.v", "layout": "positions", "positions": places}
@@ -176,7 +176,7 @@ def test_results_are_written_even_when_a_file_they_come_from_is_gone_or_changed(
 # -- exchange ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_second_run_into_the_same_folder_replaces_all_of_it(tmp_path: Path) -> None:
+def test_a_second_run_into_a_folder_replaces_all_of_it(tmp_path: Path) -> None:
     coast(tmp_path)
     quietly(coasting(tmp_path)).write(tmp_path / "out", report=False)
     quietly(small(certificates="ignore")).write(tmp_path / "out", report=False)

@@ -27,7 +27,7 @@ def kept(tmp_path: Path) -> Path:
     return (tmp_path / "made").rename(tmp_path / "kept")
 
 
-def test_the_same_run_again(kept: Path, tmp_path: Path) -> None:
+def test_a_run_done_again(kept: Path, tmp_path: Path) -> None:
     before = everything(kept)
     again = rerun(kept, out=tmp_path / "again")
     assert (again.verdict, again.equal, again.changes) == ("bit-identical", True, ())
@@ -55,7 +55,7 @@ def test_a_small_difference_is_within_a_tolerance_that_allows_it(kept: Path) -> 
     assert rerun(kept, overrides=changed, tolerance={"relative": 0.0, "absolute": 1e-3}).verdict == "within tolerance"
 
 
-def test_what_changed_since_is_told(kept: Path, tmp_path: Path) -> None:
+def test_what_changed_since_is_reported(kept: Path, tmp_path: Path) -> None:
     manifest = kept / "made_from" / "manifest.json"
     data = json.loads(manifest.read_text())
     data["versions"] |= {"numpy": "1.0"}
@@ -99,7 +99,7 @@ def test_edited_results_can_be_trusted(kept: Path) -> None:
     assert again.changes[0].startswith(f"{table} was changed since")
 
 
-def test_a_large_file_is_looked_for_where_it_was(tmp_path: Path) -> None:
+def test_a_large_file_is_sought_where_it_was(tmp_path: Path) -> None:
     fmu, out = coast(tmp_path), tmp_path / "out"
     quietly(coasting(tmp_path)).write(out, report=False, files_up_to=1e3)
     assert rerun(out).verdict == "bit-identical"
@@ -135,7 +135,7 @@ def test_an_override_without_target_is_refused(kept: Path) -> None:
         rerun(kept, overrides={"train.mas": 1.0})
 
 
-def test_warnings_that_are_known_are_not_given_again(tmp_path: Path) -> None:
+def test_warnings_that_are_known_are_not_reported_again(tmp_path: Path) -> None:
     coast(tmp_path)
     told: list[str] = []
     scenario = coasting(tmp_path).master(threads=2)

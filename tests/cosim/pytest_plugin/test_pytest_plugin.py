@@ -160,7 +160,7 @@ def test_check_fails_with_the_worst_and_writes_no_baseline(pytester: pytest.Pyte
     assert not list((pytester.path / ".pytest_fmu").rglob("*.png"))  # the pictures of a difference go with it
 
 
-def test_a_difference_is_told_where_its_picture_fails(
+def test_a_difference_is_reported_where_its_picture_fails(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: object, **_options: object) -> None:
@@ -188,7 +188,7 @@ def test_boiler(fmu_regression):
 """
 
 
-def test_what_a_component_raises_is_told_in_its_own_words(pytester: pytest.Pytester) -> None:
+def test_what_a_component_raises_is_reported_in_its_own_words(pytester: pytest.Pytester) -> None:
     """With and without a baseline, when it is compared and when it is written."""
     text = FAILING.replace("FILE", failing_models.__file__)
     fails = f"*Component 'boiler' at t = 0.2 s: *{failing_models.WORDS}*"
@@ -269,7 +269,7 @@ def test_several_calls_are_numbered_or_named(pytester: pytest.Pytester) -> None:
     twice.stdout.fnmatch_lines(["*has a baseline named 'dry' already*"])
 
 
-def test_folders_can_be_chosen_and_what_is_unused_is_told(pytester: pytest.Pytester) -> None:
+def test_folders_can_be_chosen_and_what_is_unused_is_reported(pytester: pytest.Pytester) -> None:
     pytester.makeini("[pytest]\nfmu_baseline_dir = kept\nfmu_artifacts = seen\n")
     write(pytester, ONE)
     run(pytester, "--fmu-baseline=update").assert_outcomes(passed=1)
@@ -297,7 +297,7 @@ def test_folders_can_be_chosen_and_what_is_unused_is_told(pytester: pytest.Pytes
         ("fmu_regression(3)", "*Expected the path of an FMU*got int*"),
     ],
 )
-def test_mistakes_are_told_in_words(call: str, says: str, pytester: pytest.Pytester) -> None:
+def test_mistakes_are_reported_in_words(call: str, says: str, pytester: pytest.Pytester) -> None:
     write(pytester, MADE + f"def test_line(fmu_regression):\n    {call}\n")
     told = run(pytester, "--fmu-baseline=update")
     told.assert_outcomes(failed=1)

@@ -101,7 +101,7 @@ def test_nothing_without_a_place_or_with_one_balise() -> None:
     assert not _gaps_table(gap_errors(run(), ReportSpec()))
 
 
-def test_summary_table_and_measures_tell_the_same() -> None:
+def test_summary_table_and_measures_agree() -> None:
     result = run()
     found = gap_errors(result, SPEC)
     data = found.to_data()

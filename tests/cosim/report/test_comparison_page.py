@@ -152,7 +152,7 @@ def test_long_runs_are_thinned() -> None:
     assert all(np.size(line.get_xdata()) < 10_000 for line in ax.get_lines())
 
 
-def test_it_draws_on_axes_given() -> None:
+def test_it_draws_on_axes_passed() -> None:
     ax = new_figure().add_subplot()
     assert comparison_figure(differing(), ax) is ax
     assert _comparison_error_figure(differing(), ax) is ax

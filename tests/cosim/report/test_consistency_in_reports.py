@@ -63,7 +63,7 @@ def test_one_that_trusts_itself_too_much_is_warned_of_once_with_what_to_do() -> 
     assert "Decrease" in warning
 
 
-def test_errors_without_noise_are_not_judged() -> None:
+def test_errors_without_noise_are_not_evaluated() -> None:
     """A plant that moves as the filter expects: NEES is 0 and says nothing of the covariance; NIS still does."""
     assert [entry.kind for entry in filter_consistency(run(1e-7), SPEC)] == ["NIS"]
     assert not any("confident" in w for w in result_warnings(run(1e-7, nis=False), SPEC))
@@ -71,7 +71,7 @@ def test_errors_without_noise_are_not_judged() -> None:
     assert "adds no noise in this run looks alike" in warning
 
 
-def test_small_innovations_beside_large_errors_are_not_answered_by_smaller_covariances() -> None:
+def test_small_innovations_beside_large_errors_do_not_lead_to_smaller_covariances() -> None:
     lasting = run(4.0)
     lasting.table["kf.nis"] /= 16.0
     (warning,) = [w for w in result_warnings(lasting, SPEC) if w.startswith("Filter")]
@@ -80,7 +80,7 @@ def test_small_innovations_beside_large_errors_are_not_answered_by_smaller_covar
     assert "Decrease" not in warning
 
 
-def test_what_is_told_decides_what_is_judged() -> None:
+def test_what_is_stated_decides_what_is_evaluated() -> None:
     """Without NIS and covariance single quantities are, and then they warn."""
     alone = run(4.0, nis=False, covariance=False)
     assert [e.kind for e in filter_consistency(alone, SPEC)] == ["error", "error"]

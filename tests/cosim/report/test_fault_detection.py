@@ -85,7 +85,7 @@ def test_faults_misses_false_alarms_and_delays() -> None:
     assert ("mean |p|" in text, "mean |p|" in left, "outside [s]" in left) == (True, False, True)
 
 
-def test_a_detection_that_never_ends_is_told_so() -> None:
+def test_a_detection_that_never_ends_is_reported_so() -> None:
     (found, _) = fault_detection(made([(10.0, 12.0)], [(10.2, 200.0)]), SPEC)
     assert found.end_delays == (inf,)
     assert found.to_data()["end_delays"] == [None]
@@ -118,7 +118,7 @@ def test_what_is_before_the_evaluation_does_not_count() -> None:
     assert isnan(found.missed_rate)
 
 
-def test_without_the_role_or_a_run_nothing_is_judged() -> None:
+def test_without_the_role_or_a_run_nothing_is_evaluated() -> None:
     assert fault_detection(made([], []), ReportSpec(observers=["o"])) == []
     assert fault_detection(Result(np.zeros(0, [("time", "f8"), ("wheel.active", "f8")]), []), SPEC) == []
     assert position_errors(made([], []), ReportSpec(observers=["o"]), "o") == []
@@ -158,7 +158,7 @@ def test_they_are_measures_of_a_sweep() -> None:
     assert (measure_unit("o.detection_delay"), measure_unit("o.missed_faults")) == ("s", "1")
 
 
-def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that_tells() -> None:
+def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that_reports() -> None:
     result = made([(10.0, 13.0)], [(10.4, 13.2), (60.0, 61.0)])
     assert FaultsPanel.available(result, SPEC)
     assert not FaultsPanel.available(result, replace(SPEC, true_fault=None))
@@ -170,7 +170,7 @@ def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that
     assert axes.get_xlabel() == "Time [s]"
 
 
-def test_figure_of_bounds_holds_the_share_of_observers_that_tell_one() -> None:
+def test_figure_of_bounds_holds_the_share_of_observers_that_report_one() -> None:
     t = np.arange(0.0, 10.0, 0.5)
     names = ("time", "train.speed", "o.speed", "o.error_bound", "alone.speed")
     table = np.zeros(len(t), [(name, "f8") for name in names])

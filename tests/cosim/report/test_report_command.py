@@ -58,7 +58,7 @@ def test_several_over_each_other(runs: Path, tmp_path: Path, monkeypatch: pytest
         assert words in text
 
 
-def test_folders_of_one_name_are_told_apart() -> None:
+def test_folders_of_one_name_are_distinguished() -> None:
     assert default_labels(None, [Path("/a/one"), Path("/b/two")]) == ["one", "two"]
     assert default_labels(None, [Path("/a/one"), Path("/b/one"), Path("/b/two")]) == ["a/one", "b/one", "b/two"]
     assert len(set(default_labels(None, [Path("/a/one"), Path("/a/one")]))) == 2
@@ -72,11 +72,11 @@ def test_folders_of_one_name_are_told_apart() -> None:
         ({"observers": ["a", "b"]}, "guessed from their names: observers = a, b."),
     ],
 )
-def test_what_was_guessed_is_told_in_words(roles: dict[str, Any], text: str) -> None:
+def test_what_was_guessed_is_reported_in_words(roles: dict[str, Any], text: str) -> None:
     assert _guess(ReportSpec(**{"observers": [], **roles})) == text
 
 
-def test_an_older_folder_is_read_and_the_guess_is_told(
+def test_an_older_folder_is_read_and_the_guess_is_reported(
     runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name in ("table.csv", "events.csv", "messages.csv"):

@@ -102,7 +102,7 @@ def test_phases_and_start_of_the_evaluation_choose_the_rows() -> None:
         assert math.isnan(entry.speed.rms)
 
 
-def test_without_phases_the_whole_run_is_judged() -> None:
+def test_without_phases_the_whole_run_is_evaluated() -> None:
     result = small_result(range(5), true__p=[1.0] * 5, obs__position=[2.0] * 5)
     (entry,) = phase_metrics(result, ReportSpec(true_position="true.p", observers=["obs"]))
     assert (entry.phase, entry.speed) == ("whole run", None)

@@ -53,7 +53,7 @@ def two(**summary: Any) -> list[OverlayRun]:
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
-def test_all_are_judged_by_the_phases_of_the_first() -> None:
+def test_all_are_evaluated_by_the_phases_of_the_first() -> None:
     other = replace(SPEC, phases=[Phase("else", 0, 1)], evaluate_after=50.0)
     runs = make_runs([scaled(1.0), scaled(1.0)], [SPEC, other], ["a", "b"])
     assert (runs[1].spec.phases, runs[1].spec.evaluate_after) == (SPEC.phases, SPEC.evaluate_after)

@@ -89,7 +89,7 @@ def test_axes_have_names_with_units(panel: type[Panel], result: Result) -> None:
 
 
 @pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.name)
-def test_figures_draw_on_the_axes_given(panel: type[Panel], result: Result) -> None:
+def test_figures_draw_on_the_axes_passed(panel: type[Panel], result: Result) -> None:
     ax = new_figure().add_subplot()
     assert panel.draw(result, synthetic_spec(), ax) is ax
 
@@ -190,7 +190,7 @@ def test_observers_differ_in_colour_and_in_dashes() -> None:
     )
 
 
-def test_more_observers_than_colours_still_look_different() -> None:
+def test_more_observers_than_colours_are_still_drawn_differently() -> None:
     names = [f"observer_{i}" for i in range(12)]
     lines = [observer_line(names, name) for name in names]
     assert len({(to_hex(line["color"]), str(line["linestyle"])) for line in lines}) == len(names)
@@ -363,7 +363,7 @@ def test_report_of_an_unusual_summary(result: Result) -> None:
     Page(live_page(run_page(replace(result, summary=summary), synthetic_spec())))
 
 
-def test_report_of_a_result_read_back_is_the_same(result: Result, tmp_path: Path) -> None:
+def test_report_of_a_result_read_back_is_equal(result: Result, tmp_path: Path) -> None:
     write_results(result, tmp_path / "a", ("csv",))
     first = live_page(run_page(result, synthetic_spec()))
     second = live_page(run_page(read_results(tmp_path / "a"), synthetic_spec()))

@@ -75,14 +75,14 @@ def test_instants_are_different_times() -> None:
     assert [instants(np.array(times)) for times in ([], [1.0], [1.0, 1.0, 2.0], [0.0, 0.0])] == [0, 1, 2, 1]
 
 
-def test_a_train_that_never_moves_is_told() -> None:
+def test_a_train_that_never_moves_is_reported() -> None:
     (text,) = result_warnings(run(np.full(50, 1e-4), np.zeros(50)), SPEC)
     assert "never moves" in text
     assert "train.speed" in text
     assert result_warnings(run(np.full(50, 1.0), np.zeros(50) + 0.9), SPEC) == []
 
 
-def test_phases_that_were_not_reached_are_told_together() -> None:
+def test_phases_that_were_not_reached_are_reported_together() -> None:
     phases = [Phase("hold", 3.0, 9.0), Phase("braking", 12.0, 15.0), Phase("stop", 15.0, 16.0)]
     result = run(np.full(101, 10.0), np.full(101, 10.0))
     (text,) = result_warnings(result, replace(SPEC, phases=phases))
@@ -92,7 +92,7 @@ def test_phases_that_were_not_reached_are_told_together() -> None:
     assert result_warnings(replace(result, failure="it broke"), replace(SPEC, phases=phases)) == []
 
 
-def test_a_phase_after_the_journey_is_told() -> None:
+def test_a_phase_after_the_journey_is_reported() -> None:
     speed = np.where(np.arange(101) < 40, 10.0, 0.0)
     phases = [Phase("journey", 1.0, 6.0), Phase("after", 5.0, 9.0)]
     (text,) = result_warnings(run(speed, speed), replace(SPEC, phases=phases))
@@ -102,7 +102,7 @@ def test_a_phase_after_the_journey_is_told() -> None:
 
 
 @pytest.mark.parametrize(("wrong", "told"), [(9.0, False), (11.0, True), (np.inf, True), (np.nan, True)])
-def test_an_observer_that_is_worse_than_none_is_told(wrong: float, told: bool) -> None:
+def test_an_observer_that_is_worse_than_none_is_reported(wrong: float, told: bool) -> None:
     estimate = np.full(101, 10.0)
     estimate[60] += wrong
     texts = result_warnings(run(np.full(101, 10.0), estimate), SPEC)

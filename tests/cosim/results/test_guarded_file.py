@@ -25,7 +25,7 @@ def small_disk() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("small_disk")
-def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     table = np.zeros(20_000, dtype=[("time", float), ("a.x", float)])
     table["time"], table["a.x"] = np.arange(20_000), np.random.default_rng(0).random(20_000)
     with pytest.raises(OutputError, match="cannot be written: File too large"):

@@ -33,7 +33,7 @@ def run(**master: Any) -> Outcome:
     return small(master=master).run(overrides=given, warn=lambda _text: None)
 
 
-def test_a_run_that_outgrows_its_memory_is_the_same_run(tmp_path: Path) -> None:
+def test_a_run_that_outgrows_its_memory_is_an_equal_run(tmp_path: Path) -> None:
     whole, streamed = run(), run(record_memory=KEEP_20_ROWS)
     assert isinstance(streamed.result.table, np.memmap)
     assert not isinstance(whole.result.table, np.memmap)

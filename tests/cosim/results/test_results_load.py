@@ -92,7 +92,7 @@ def test_fmpy_reads_what_we_read(tmp_path: Path) -> None:
     blank=st.booleans(),
     unit=st.sampled_from(["", " [m/s]", "[m]"]),
 )
-def test_dialects_say_the_same(
+def test_dialects_agree(
     rows: list[tuple[float, float]],
     separator: str,
     end: str,

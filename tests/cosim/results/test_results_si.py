@@ -49,6 +49,6 @@ def test_the_si_unit_has_its_usual_name(unit: str, name: str) -> None:
     assert _si_name(parse_unit(unit)) == name
 
 
-def test_an_unusual_unit_gets_a_name_that_means_the_same() -> None:
+def test_an_unusual_unit_gets_a_name_of_equal_meaning() -> None:
     unit = parse_unit("kg.m5/s3")
     assert parse_unit(_si_name(unit)).exponents == unit.exponents

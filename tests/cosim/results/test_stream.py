@@ -199,7 +199,7 @@ def row_of(number: int) -> tuple[float, np.ndarray]:
 
 
 @pytest.mark.parametrize("every", [1, 7])
-def test_a_streamed_run_is_the_same_run(tmp_path: Path, every: int) -> None:
+def test_a_streamed_run_is_an_equal_run(tmp_path: Path, every: int) -> None:
     scenario = small().master(record_every=every)
     kept, streamed = quietly(scenario), quietly(scenario, stream=tmp_path)
     np.testing.assert_array_equal(streamed.result.table, kept.result.table)

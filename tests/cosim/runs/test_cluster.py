@@ -97,7 +97,7 @@ def studied(fmu: Path, folder: Path) -> Scenario:
     return scenario.add("growing", model="model.py:Growing")
 
 
-def test_one_of_two_workers_is_killed_and_the_table_is_the_same(
+def test_one_of_two_workers_is_killed_and_the_table_is_equal(
     workers: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
     address, (first, _) = workers
@@ -122,7 +122,7 @@ def test_one_of_two_workers_is_killed_and_the_table_is_the_same(
     assert [str(row) for row in again.table()] == [str(row) for row in here.table()]
 
 
-def test_functions_of_the_users_travel_and_seeds_are_the_same(
+def test_functions_of_the_users_travel_and_seeds_are_equal(
     workers: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
     address, _ = workers

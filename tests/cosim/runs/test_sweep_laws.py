@@ -56,7 +56,7 @@ class _InterruptedError(Exception):
 
 @settings(max_examples=4, deadline=None, phases=[Phase.generate])
 @given(data=st.data(), varied=st.lists(VARIATIONS, min_size=1, max_size=5))
-def test_the_table_of_a_sweep_is_the_same_to_the_bit(data: Any, varied: list[dict[str, Any]], plant: Scenario) -> None:
+def test_the_table_of_a_sweep_is_equal_to_the_bit(data: Any, varied: list[dict[str, Any]], plant: Scenario) -> None:
     sweep = plant.vary([{**each, "balises.file": str(plant.folder / each["balises.file"])} for each in varied])
     whole = rows(sweep)
     assert rows(sweep, workers=2) == whole
@@ -75,7 +75,7 @@ def test_the_table_of_a_sweep_is_the_same_to_the_bit(data: Any, varied: list[dic
         assert rows(plant.vary(shuffled), workers=2, directory=folder, folders=False, resume=True) == whole
 
 
-def test_seeds_are_the_same_with_workers_and_resumed(plant: Scenario, tmp_path: Path) -> None:
+def test_seeds_are_equal_with_workers_and_resumed(plant: Scenario, tmp_path: Path) -> None:
     scenario = plant.copy().set("stop", 0.2).set("balises.file", str(plant.folder / "balises.csv"))
     scenario.add("observer", observer="takagi_sugeno_cdo", **{"as": "block3"}, parameters={"estimated_speed": 10.0})
     scenario.connect("odometer.reading -> observer.odometer")

@@ -32,7 +32,7 @@ def rows() -> list[dict[str, str]]:
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
-def test_the_groups_lie_as_the_train_heard_them() -> None:
+def test_the_groups_lie_as_the_train_received_them() -> None:
     """Numbers counted from the source by somebody else."""
     linked = [float(row["position_linked"]) for row in rows() if row["position_linked"]]
     assert len(layout().balises) == 98
@@ -110,7 +110,7 @@ def test_who_is_certified_for_the_longest_gap() -> None:
 
 @pytest.mark.compiler
 @pytest.mark.slow
-def test_jams_cost_their_length_those_who_are_not_told() -> None:
+def test_jams_cost_their_length_those_who_are_not_notified() -> None:
     """Within the gap of 811 m three jams: 0.8 s, 1.2 s and 0.6 of 0.4 s, at speeds that fall by 0.5 m/s2."""
     outcome, found = shipped()
     quiet = shipped(faults=False)[1]

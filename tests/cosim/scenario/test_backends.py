@@ -114,7 +114,7 @@ def assert_same(one: Outcome, other: Outcome) -> None:
     assert all(set(e.outcomes.values()) == {"accepted"} for e in one.result.events)
 
 
-def test_native_where_not_said_otherwise_built_once_and_told(tmp_path: Path) -> None:
+def test_native_where_not_said_otherwise_built_once_and_reported(tmp_path: Path) -> None:
     made = scenario("reckoning", "reckoning2", "opaque").set("reckoning.record", ["events.accepted"])
     shown = {part.name: part.kind for part in made.structure().parts}
     assert not (tmp_path / "cache").exists()

@@ -265,7 +265,7 @@ def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(
         ("smallest_step", 1e-3, "control = 'doubling'"),
     ],
 )
-def test_a_setting_without_effect_is_told(key: str, value: float, needed: str) -> None:
+def test_a_setting_without_effect_is_reported(key: str, value: float, needed: str) -> None:
     told: list[str] = []
     small().run(overrides={f"master.{key}": value, "stop": 0.02}, warn=told.append)
     assert f"master.{key} has no effect without master.{needed}." in told
@@ -374,7 +374,7 @@ def test_what_a_failing_fmu_logged_is_part_of_the_message(backend: str) -> None:
 @pytest.mark.parametrize(
     ("written", "meant", "name"), [("model", "observer", "threshold_detector"), ("observer", "model", "wheel_fault")]
 )
-def test_a_name_under_the_wrong_key_is_told_the_right_one(written: str, meant: str, name: str) -> None:
+def test_a_name_under_the_wrong_key_is_reported_with_the_right_one(written: str, meant: str, name: str) -> None:
     scenario = Scenario(stop=1.0, step=0.1)
     with pytest.raises(CosimError, match=f"write {meant} = '{name}'"):
         (scenario.add("part", model=name) if written == "model" else scenario.add("part", observer=name)).run()

@@ -20,7 +20,7 @@ def windowed(rows: int, **tables: str) -> Scenario:
     return scenario
 
 
-def test_of_what_ships_one_printed_filter_alone_is_told() -> None:
+def test_of_what_ships_one_printed_filter_alone_is_reported() -> None:
     """Its own page says that currents along d and q do not tell the angle: Allaoui 2024, rank 3 of 4."""
     told = {
         name: warnings
@@ -32,7 +32,7 @@ def test_of_what_ships_one_printed_filter_alone_is_told() -> None:
     assert "rank = 3, order = 4" in told["traction_drive"][0]
 
 
-def test_a_window_that_does_not_tell_a_state_is_told_before_the_run() -> None:
+def test_a_window_that_does_not_show_a_state_is_reported_before_the_run() -> None:
     """One row of the pendulum is its angle: the rate is known from earlier rows only. Two rows tell both."""
     heard: list[str] = []
     windowed(1).run(warn=heard.append)

@@ -29,7 +29,7 @@ def odometer(step: float, count: str = "wheel_distance", inputs: str = "hold") -
 
 
 @pytest.mark.parametrize("step", [0.03, 0.08, 0.15, 0.3])
-def test_a_period_that_ends_between_points_is_told(step: float) -> None:
+def test_a_period_that_ends_between_points_is_reported(step: float) -> None:
     told, wrong = odometer(step)
     assert len(told) == 1
     assert "odometer: reading counts wheel_distance every 0.2 s (aggregation_period)" in told[0]
@@ -37,7 +37,7 @@ def test_a_period_that_ends_between_points_is_told(step: float) -> None:
 
 
 @pytest.mark.parametrize(("step", "count"), [(0.05, "wheel_distance"), (0.2, "wheel_distance"), (0.03, "wheel_speed")])
-def test_nothing_is_told_where_the_reading_is_right(step: float, count: str) -> None:
+def test_nothing_is_reported_where_the_reading_is_right(step: float, count: str) -> None:
     told, wrong = odometer(step, count)
     assert not told
     assert wrong < 0.1

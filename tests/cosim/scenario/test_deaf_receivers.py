@@ -68,7 +68,7 @@ FIRST = {name: (name, preset) for name, preset in reversed(cases())}  # of each 
 
 
 @pytest.mark.parametrize(("name", "preset"), sorted({*FIRST.values(), *(c for c in cases() if c[1] == "gps")}, key=str))
-def test_a_deaf_observer_is_told_before_the_run(name: str, preset: str | None) -> None:
+def test_a_deaf_observer_is_reported_before_the_run(name: str, preset: str | None) -> None:
     told = warned(name, preset)
     assert bool(told) == (not moved(name, preset)), told
     if told:
@@ -76,7 +76,7 @@ def test_a_deaf_observer_is_told_before_the_run(name: str, preset: str | None) -
 
 
 @pytest.mark.parametrize(("mass", "told"), [(873e3, 0), (120e3, 1), (2000e3, 1)])
-def test_a_preset_of_another_train_is_told_before_the_run(mass: float, told: int) -> None:
+def test_a_preset_of_another_train_is_reported_before_the_run(mass: float, told: int) -> None:
     scenario = cosim.Scenario(stop=0.2, step=0.1)
     scenario.add("observer", observer="balise_odometer_ekf", preset="tuned", parameters={"mass": mass, "odometer": 0.0})
     texts: list[str] = []

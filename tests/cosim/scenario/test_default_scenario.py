@@ -56,7 +56,7 @@ def test_medians_over_ten_seeds_agree_in_size_with_the_independent_ones(
 
 
 @pytest.mark.parametrize(("phase", "told"), [(TRACTION, 0.116), (HOLD, 0.348), (BRAKING, 0.140)])
-def test_medians_of_the_unknown_input_observer_are_those_that_the_scenario_tells(phase: str, told: float) -> None:
+def test_medians_of_the_unknown_input_observer_are_those_that_the_scenario_states(phase: str, told: float) -> None:
     # Nothing independent stands beside S5: what there is had another gain, and a position every 0.1 s.
     assert median("discrete_uio", phase) == pytest.approx(told, rel=0.02)
 
@@ -97,7 +97,7 @@ def test_the_indicator_finds_the_zones_with_effort_and_only_those() -> None:
             assert not on[(time > start) & (time < end)].any()
 
 
-def test_fmu_and_block_plants_give_the_same_run() -> None:
+def test_fmu_and_block_plants_give_equal_runs() -> None:
     fmu, block = one_run("fmu3"), one_run("block3")
     assert len(fmu.result.table) == len(block.result.table)
     for signal in ("locomotive.position", "locomotive.speed", "takagi_sugeno_cdo.speed", "multirate_cdo.speed"):

@@ -70,7 +70,7 @@ def test_without_a_speed_it_says_from_which_speed_on_the_gains_are_enough() -> N
     assert "give balises.expected_speed" in warning
 
 
-def test_no_advice_is_given_where_none_is_known_or_needed() -> None:
+def test_no_advice_is_reported_where_none_is_known_or_needed() -> None:
     (warning,) = warnings_of("discrete_uio", 10.0)
     assert "Instead" not in warning
     assert all(f.what != OTHER_GAINS for f in OBSERVERS["differentiator_cdo"]().findings(0.4))  # type: ignore[attr-defined]
@@ -84,7 +84,7 @@ def test_no_advice_is_given_where_none_is_known_or_needed() -> None:
     assert warnings_of("takagi_sugeno_cdo", 10.0, parameters=far) == []
 
 
-def test_an_adapting_observer_is_told_when_the_layout_is_another() -> None:
+def test_an_adapting_observer_is_reported_when_the_layout_is_another() -> None:
     calm = {"assumed_acceleration": 0.3, "ratio": 2.0}
     (warning,) = warnings_of("adaptive_gain_cdo", 10.0, parameters=calm)
     assert warning.startswith(

@@ -84,7 +84,7 @@ def test_what_the_later_file_says_holds_and_the_rest_is_the_earlier_ones(
     assert leaves(merged) == old | new
 
 
-def test_connections_are_appended_and_one_to_the_same_input_replaces(write: Write) -> None:
+def test_connections_are_appended_and_one_to_a_connected_input_replaces(write: Write) -> None:
     added = ["locomotive.speed -> odometer.wheel_speed", "locomotive.speed -> observer.odometer"]
     mine = write("mine.toml", f'include = ["base.toml"]\nconnections = {added}')
     assert Scenario.load(mine).table().connections == [
@@ -205,7 +205,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("case", FAULTS)
-def test_a_fault_is_told_with_the_file_it_stands_in(case: str, write: Write) -> None:
+def test_a_fault_is_reported_with_the_file_it_stands_in(case: str, write: Write) -> None:
     part, mine, message = FAULTS[case]
     write("part.toml", 'include = "base.toml"\n' + part if part != "[[[" else part)
     with pytest.raises(CosimError, match=message):
@@ -233,12 +233,12 @@ def test_files_that_include_one_another_are_refused_with_the_chain(write: Write)
         ('"system.ssp"', r"mine\.toml: include: system\.ssp is a system structure package"),
     ],
 )
-def test_what_cannot_be_included_is_told(include: str, message: str, write: Write) -> None:
+def test_what_cannot_be_included_is_reported(include: str, message: str, write: Write) -> None:
     with pytest.raises(ScenarioError, match=message):
         Scenario.load(write("mine.toml", f"include = {include}"))
 
 
-def test_the_same_file_may_be_included_twice(write: Write) -> None:
+def test_a_file_may_be_included_twice(write: Write) -> None:
     write("one.toml", 'include = "base.toml"\nstop = 0.2\n')
     write("two.toml", 'include = "base.toml"\nstep = 0.02\n')
     table = Scenario.load(write("mine.toml", 'include = ["one.toml", "two.toml"]')).table()

@@ -35,7 +35,7 @@ def test_the_distance_of_the_wheel_lacks_and_gains_what_the_faults_take_and_give
     assert more[-1] - more[at(60.0)] == pytest.approx(-over(70.0, 71.0), abs=0.025 * 0.7 + 1e-3)
 
 
-def test_who_judges_the_odometer_stands_nearer_to_the_truth_than_who_believes_or_ignores_it(outcome: Any) -> None:
+def test_who_evaluates_the_odometer_stands_nearer_to_the_truth_than_who_believes_or_ignores_it(outcome: Any) -> None:
     true = outcome["train.position"][-1]
     error = {
         n: abs(outcome[f"{n}.position"][-1] - true) for n in ("quasi_lpv_uio", "adaptive_gain_cdo", "odometer_reset")

@@ -77,7 +77,7 @@ def missed(outcome: Any, name: str = "filter") -> int:
     [(backend, "python") for backend in ("block3", "block2", "fmu3", "fmu2")]
     + [("fmu3", "compiled"), ("fmu2", "compiled")],
 )
-def test_the_same_numbers_come_from_blocks_and_fmus_by_both_steppers(backend: str, stepper: str) -> None:
+def test_equal_numbers_come_from_blocks_and_fmus_by_both_steppers(backend: str, stepper: str) -> None:
     reference = filtered(stepper="python").run(warn=lambda _: None)
     outcome = filtered(backend, stepper=stepper).run(warn=lambda _: None)
     assert outcome.failure is None
@@ -173,7 +173,7 @@ def test_a_target_that_cannot_leave_it_out_is_refused_before_the_run() -> None:
 
 
 @pytest.mark.parametrize("key", ["position", "odometer"])
-def test_balises_are_found_and_told_by_what_is_always_there(key: str) -> None:
+def test_balises_are_found_and_delivered_by_what_is_always_there(key: str) -> None:
     scenario = cosim.Scenario(stop=1.0, step=0.1)
     scenario.add(
         "train", model="longitudinal_train", can_be_missing=["position" if key == "position" else "acceleration"]

@@ -62,7 +62,7 @@ EMPTY = "kettle: is empty < at the end; seen at the end, 6 s."
 
 
 @pytest.mark.parametrize("stop", [0.5, 1.0, 4.0, 6.0])
-def test_a_run_tells_what_was_not_zero(stop: float) -> None:
+def test_a_run_reports_what_was_not_zero(stop: float) -> None:
     told = _warnings(cosim.Scenario(stop=stop, step=0.5).add("kettle", model=Kettle()))
     assert told == {0.5: [NOT_READY], 1.0: [], 4.0: [HOT], 6.0: [HOT.replace("1.5 s in", "3.5 s in"), EMPTY]}[stop]
 
@@ -83,7 +83,7 @@ def test_an_exported_fmu_carries_its_warnings(version: int) -> None:
     assert [text for text in scenario.run().warnings if text.startswith("Unconnected")] == [FORGOTTEN]
 
 
-def test_a_davis_set_beyond_its_speeds_and_a_jam_longer_than_the_run_are_told() -> None:
+def test_a_davis_set_beyond_its_speeds_and_a_jam_longer_than_the_run_are_reported() -> None:
     s = cosim.Scenario(stop=3.0, step=0.5)
     s.add("train", model="longitudinal_train", preset="set_d", parameters={"train_speed": 49.0})
     s.add("wheel", model="wheel_fault", parameters={"fault_onset[1]": 2.0, "fault_length[1]": 1.5})

@@ -73,7 +73,7 @@ def test_results_keep_the_file_and_run_again_without_it(written: Path, tmp_path:
     assert (tmp_path / "results" / "made_from" / "files" / "wheel" / "worn.py").is_file()
 
 
-def test_saved_elsewhere_and_set_from_the_working_folder_it_is_the_same_file(
+def test_saved_elsewhere_and_set_from_the_working_folder_it_is_one_file(
     written: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = Scenario.load(written / "scenario.toml")

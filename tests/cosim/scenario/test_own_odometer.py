@@ -29,7 +29,7 @@ study = _study()
 HELD = [label for label in study.JUDGED if label not in study.EXCEPT]
 
 
-def test_every_train_observer_is_judged_or_named_with_the_reason() -> None:
+def test_every_train_observer_is_evaluated_or_named_with_the_reason() -> None:
     room = {name for name in OBSERVERS if ".observers.train." in type(shipped(name)).__module__}
     judged = {name for name, _ in study.JUDGED.values()}
     assert judged | set(study.NOT_HERE) == room  # who adds one adds no line: it stands with its own preset

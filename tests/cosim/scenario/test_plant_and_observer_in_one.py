@@ -68,7 +68,7 @@ class Together(HybridSystem):
 
 
 @pytest.mark.parametrize("algorithm", ["auto", "jacobi"])
-def test_an_observer_given_what_the_plant_was_given_is_the_one_inside_it(
+def test_an_observer_fed_what_the_plant_was_fed_is_the_one_inside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str
 ) -> None:
     """A loop of driver, mass and observer; then mass and observer in one, beside what was recorded of the loop:

@@ -14,7 +14,7 @@ def run(speed: float) -> cosim.Outcome:
     return s.run()
 
 
-def test_premises_outside_their_bounds_are_told() -> None:
+def test_premises_outside_their_bounds_are_reported() -> None:
     (warning,) = [text for text in run(60.0).warnings if "Takagi-Sugeno" in text]  # the model is made for 5 to 50 m/s
     assert warning.startswith(
         "observer: what its Takagi-Sugeno model mixes linear ones by (a premise) was outside its bounds at 2 sample(s) "
@@ -37,7 +37,7 @@ def train_run(speed: float, observer: str = "takagi_sugeno_cdo", **parameters: f
 
 
 @pytest.mark.parametrize("observer", ["takagi_sugeno_cdo", "augmented_takagi_sugeno_cdo"])
-def test_a_train_faster_than_its_vertices_is_told_from_the_recorded_odometer(observer: str) -> None:
+def test_a_train_faster_than_its_vertices_is_found_from_the_recorded_odometer(observer: str) -> None:
     outcome = train_run(60.0, observer)
     (warning,) = [text for text in outcome.warnings if "Takagi-Sugeno" in text]
     assert warning.startswith(
@@ -59,7 +59,7 @@ def test_bounds_in_use_count() -> None:
     assert train_run(60.0, premise_max=80.0).result.summary["premises"] == {}
 
 
-def test_an_observer_that_counts_time_only_is_told_of_too() -> None:
+def test_an_observer_that_counts_time_only_is_reported_too() -> None:
     s = cosim.Scenario(stop=1.0, step=0.1)
     s.add("train", model="locomotive", parameters={"train_speed": 60.0, "wheel_rate": 60.0 / 0.575})
     s.add("observer", observer="takagi_sugeno_luenberger", options={"model": "takagi_sugeno_train"})

@@ -215,7 +215,7 @@ def test_a_lossy_odometer_is_not_hidden_by_balises_of_which_the_distance_is_know
         scenario.run(warn=lambda _: None)
 
 
-def test_a_component_that_tells_at_instants_of_its_own_is_refused() -> None:
+def test_a_component_that_notifies_at_instants_of_its_own_is_refused() -> None:
     s = Scenario(stop=0.2, step=0.05, certificates="require")
     s.add("reader", model="balise_reader", parameters={"speed": 0.0}, **{"as": "block2"})
     s.add("observer", observer="takagi_sugeno_cdo", parameters={"odometer": 0.0}, **{"as": "block2"})
@@ -246,7 +246,7 @@ def networks(draw: st.DrawFn) -> tuple[NetworkSettings, frozenset[int]]:
 
 @given(networks())
 @settings(max_examples=100, deadline=None)
-def test_no_gap_of_a_network_is_longer_than_told(case: tuple[NetworkSettings, frozenset[int]]) -> None:
+def test_no_gap_of_a_network_is_longer_than_stated(case: tuple[NetworkSettings, frozenset[int]]) -> None:
     made, nodes = case
     chance, order = Chance(made, 0.0), made.order or tuple(range(len(made.nodes)))
     sent = [chance.instant(k) for k in range(60) if order[k % len(order)] in nodes]
@@ -300,7 +300,7 @@ def test_turns_of_nodes_against_products_of_exponentials() -> None:
     assert np.abs(error).max() < 1e-6
 
 
-def test_what_never_gets_a_sample_is_not_told_of_sequences_of_gaps() -> None:
+def test_what_never_gets_a_sample_is_not_warned_of_sequences_of_gaps() -> None:
     s = Scenario(stop=700.0, step=1.0).add("train", model="locomotive", **{"as": "block3"})
     s.add("obs", observer="discrete_measurement_observer", **{"as": "block3"})
     s.connect("train.wheel_speed -> obs.odometer")
@@ -311,7 +311,7 @@ def test_what_never_gets_a_sample_is_not_told_of_sequences_of_gaps() -> None:
     assert "sequences" not in told
 
 
-def test_what_has_no_certificate_is_told_in_words() -> None:
+def test_what_has_no_certificate_is_reported_in_words() -> None:
     s = Scenario(stop=1.0, step=0.1).add("train", model="locomotive", **{"as": "block3"})
     s.add("obs", observer="odometer_reset", **{"as": "block3"}).connect("train.wheel_speed -> obs.odometer")
     s.balises(position="train.position", speed="train.speed", layout="instants", instants=[0.5])

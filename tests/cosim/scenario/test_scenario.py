@@ -126,7 +126,7 @@ def test_balises_do_not_touch_the_plant() -> None:
         np.testing.assert_array_equal(a[signal][grid], b[signal])
 
 
-def test_the_same_run_with_the_other_fmi_version_is_identical() -> None:
+def test_a_run_with_the_other_fmi_version_is_identical() -> None:
     two = small()
     for name in ("locomotive", "odometer", "driver", "observer"):
         two.set(f"{name}.as", "block2")
@@ -153,7 +153,7 @@ def test_the_certificate_is_of_the_very_gains_in_use() -> None:
     assert scenario.run().result.summary["certificates"]["observer"]["constant_limit"] == pytest.approx(0.286, rel=0.01)
 
 
-def test_gaps_that_turn_out_too_long_are_told_afterwards() -> None:
+def test_gaps_that_turn_out_too_long_are_reported_afterwards() -> None:
     outcome = small(start=0.0).set("balises.positions", [1.0, 4.9]).set("observer.innovation_decay", 1.0).run()
     # 3.9 m at about 10 m/s is 0.39 s; with eta = 1 the published gains are certified for less than that (0.25 s at eta
     # = 2).
@@ -226,7 +226,7 @@ def test_an_fmu_that_does_not_say_what_it_does_with_late_telegrams_is_warned_abo
         scenario.run(overrides={"observer.late_policy": "reject"})
 
 
-def test_doubts_are_told_before_the_first_step() -> None:
+def test_doubts_are_reported_before_the_first_step() -> None:
     told: list[str] = []
 
     def progress(t: float, _stop: float) -> None:

@@ -25,7 +25,7 @@ def double_integrator(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
-def test_what_ships_is_the_same_after_saving(name: str, tmp_path: Path) -> None:
+def test_what_ships_is_equal_after_saving(name: str, tmp_path: Path) -> None:
     scenario = Scenario.load(name)
     before, after = scenario.table(), Scenario.load(scenario.save(tmp_path / "saved.toml")).table()
     if name == "own_fmu":  # its path is relative, and the file stands elsewhere now
@@ -93,7 +93,7 @@ def test_paths_become_relative_to_the_saved_file(tmp_path: Path, monkeypatch: py
     assert [e.identity for e in Scenario.load(tmp_path / saved).run().result.events] == ["A"]
 
 
-def test_what_cannot_be_saved_is_told(tmp_path: Path) -> None:
+def test_what_cannot_be_saved_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"ends in \.toml"):
         small().save(tmp_path / "x.ssp")
     with pytest.raises(ScenarioError, match=r"balises\.sed: unknown key"):
@@ -137,7 +137,7 @@ def test_an_fmu_alone_with_held_and_with_played_back_inputs(tmp_path: Path, monk
 
 
 @pytest.mark.compiler
-def test_times_of_an_fmu_alone_are_its_own_unless_given(tmp_path: Path) -> None:
+def test_times_of_an_fmu_alone_are_its_own_unless_stated(tmp_path: Path) -> None:
     fmu = double_integrator(tmp_path)  # its default experiment ends at 1 s and names no step
     table = Scenario.fmu(fmu).table()
     assert (table.start, table.stop, table.step) == (0.0, 1.0, 1e-3)
@@ -146,7 +146,7 @@ def test_times_of_an_fmu_alone_are_its_own_unless_given(tmp_path: Path) -> None:
 
 
 @pytest.mark.compiler
-def test_wrong_inputs_of_an_fmu_alone_are_told(tmp_path: Path) -> None:
+def test_wrong_inputs_of_an_fmu_alone_are_reported(tmp_path: Path) -> None:
     fmu = double_integrator(tmp_path)
     with pytest.raises(ScenarioError, match=r"mass\.fmu has no input 'uu'; did you mean 'u'"):
         Scenario.fmu(fmu, inputs={"uu": 1.0})

@@ -8,7 +8,7 @@ from cosim import Scenario
 pytestmark = pytest.mark.compiler
 
 
-def test_states_and_rate_are_told_and_gains_order_the_errors() -> None:
+def test_states_and_rate_are_reported_and_gains_order_the_errors() -> None:
     outcome = Scenario.load("signature_observers").run(warn=lambda _text: None)
     assert outcome.failure is None
     assert all(judged.passed for judged in outcome.expectations)

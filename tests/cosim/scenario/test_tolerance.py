@@ -31,7 +31,7 @@ def told(one: Scenario) -> float:
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_the_nearest_tolerance_is_told(tmp_path: Path, version: Any) -> None:
+def test_the_nearest_tolerance_is_named(tmp_path: Path, version: Any) -> None:
     plain = adaptive_fmu(tmp_path, "plain", version=version)
     declaring = adaptive_fmu(tmp_path, "declaring", version=version, declared=1e-5)
     assert told(scenario(plain)) == 0.0
@@ -77,7 +77,7 @@ def test_shipped_models_have_an_internal_step_instead() -> None:
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_the_check_tells_the_declared_one(tmp_path: Path, version: Any) -> None:
+def test_the_check_names_the_declared_one(tmp_path: Path, version: Any) -> None:
     import fmpy
 
     fmu = adaptive_fmu(tmp_path, version=version, declared=1e-5)

@@ -165,7 +165,7 @@ def test_sc4_the_command_is_cut_before_the_slip_is_excessive() -> None:
 
 
 @pytest.mark.slow
-def test_estimates_save_nine_tenths_of_the_energy_lost_in_slip_on_the_same_rail() -> None:
+def test_estimates_save_nine_tenths_of_the_energy_lost_in_slip_on_one_rail() -> None:
     tables = [Scenario.load(name).table().components["train"] for name in ("freight_sc2", "freight_sc3")]
     assert tables[0] == tables[1]
     assert lost_in_slip(run("freight_sc3")) < 0.1 * lost_in_slip(run("freight_sc2"))
@@ -294,7 +294,7 @@ def test_the_gains_are_certified_for_ten_fixes_a_second(component: str, observer
 
 @pytest.mark.parametrize("name", ["freight_sc2", "freight_sc4"])  # one of each controller
 @pytest.mark.slow
-def test_blocks_and_fmus_give_the_same_run(name: str) -> None:
+def test_blocks_and_fmus_give_equal_runs(name: str) -> None:
     short = {"stop": 0.6, "mission.departure_time": 0.1}
     native = Scenario.load(name).run(warn=lambda _warning: None, overrides=short)
     blocks = {f"{component}.as": "block3" for component in Scenario.load(name).table().components}

@@ -85,7 +85,7 @@ def test_every_type_takes_what_it_can_hold_and_refuses_the_rest_by_name(files: d
 
 @pytest.mark.compiler
 @given(data=st.data())
-def test_a_run_and_a_package_take_the_same_values_and_refuse_in_the_same_words(
+def test_a_run_and_a_package_take_equal_values_and_refuse_in_equal_words(
     files: dict[int, Path], tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     component = describe_fmu(files[data.draw(st.sampled_from(VERSIONS))], "a")

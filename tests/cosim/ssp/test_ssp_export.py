@@ -50,7 +50,7 @@ def pair(folder: Path, version: Any = 2) -> Scenario:
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("version", ["1.0", "2.0"])
-def test_a_scenario_with_balises_runs_the_same_after_the_round_trip(tmp_path: Path, version: str) -> None:
+def test_a_scenario_with_balises_runs_equally_after_the_round_trip(tmp_path: Path, version: str) -> None:
     scenario = small().set("observer.late_policy", "reject").set("observer.label", "S2")
     (tmp_path / "track.csv").write_text("position,identity\n1.0,a\n2.5,b\n4.0,c\n")
     scenario.folder = tmp_path
@@ -69,7 +69,7 @@ def test_a_scenario_with_balises_runs_the_same_after_the_round_trip(tmp_path: Pa
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("fmi", [1, 2, 3])
-def test_fmus_by_path_run_the_same_after_the_round_trip(tmp_path: Path, fmi: int) -> None:
+def test_fmus_by_path_run_equally_after_the_round_trip(tmp_path: Path, fmi: int) -> None:
     scenario = pair(tmp_path, fmi)
     scenario._data["connections"] = [{"from": "ramp.speed", "to": "sum.u", "factor": 0.1, "offset": 1.0 / 7.0}]
     path = scenario.export_ssp(tmp_path / "pair.ssp")

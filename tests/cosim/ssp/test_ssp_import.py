@@ -233,7 +233,7 @@ def test_an_array_of_values_for_a_split_vector(load: Load) -> None:
     assert outcome["ramp.speed"][-1] == pytest.approx(4.5, rel=1e-12)
 
 
-def test_what_is_nothing_of_the_system_is_ignored_and_told(load: Load) -> None:
+def test_what_is_nothing_of_the_system_is_ignored_and_reported(load: Load) -> None:
     scenario = load(ssd(nested(bindings=bound(real("ramp.x0[3]", "1")))))
     told: list[str] = []
     outcome = scenario.run(warn=told.append)

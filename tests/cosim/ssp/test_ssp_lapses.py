@@ -75,7 +75,7 @@ def run(path: Path) -> tuple[np.ndarray, list[str]]:
 
 
 @pytest.mark.parametrize("case", LAPSES)
-def test_a_lapse_is_told_and_changes_no_number(
+def test_a_lapse_is_reported_and_changes_no_number(
     case: str, packed: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     right, wrong, words = LAPSES[case]
@@ -94,7 +94,7 @@ def test_a_lapse_is_told_and_changes_no_number(
     assert not printed.out
 
 
-def test_the_same_lapse_at_many_places_is_one_line(packed: Callable[[str], Path]) -> None:
+def test_a_lapse_at_many_places_is_one_line(packed: Callable[[str], Path]) -> None:
     inputs = GOOD.replace('"input"><ssc:Real unit="m/s"', '"input"><ssc:Real unit=""')
     inputs = inputs.replace("<ssd:Connector name=", "\n<ssd:Connector name=")
     _, told = run(packed(inputs))
@@ -114,7 +114,7 @@ def test_an_unknown_unit_goes_to_no_other(packed: Callable[[str], Path]) -> None
         Scenario.load(packed(GOOD.replace(U_IN_METRES, U_IN_METRES.replace("m/s", "kn"))))
 
 
-def test_an_odd_definition_of_a_unit_is_told(packed: Callable[[str], Path]) -> None:
+def test_an_odd_definition_of_a_unit_is_reported(packed: Callable[[str], Path]) -> None:
     litres = '<ssc:Unit name="L/min"><ssc:BaseUnit m="3" s="-1" factor="0.0006"/></ssc:Unit></ssd:Units>'
     _, told = run(packed(GOOD.replace("</ssd:Units>", litres)))
     (line,) = (text for text in told if "L/min" in text)
@@ -159,7 +159,7 @@ def test_the_step_in_an_annotation_is_read(
     assert any(words in line for line in told) if words else not any("annotation" in line for line in told)
 
 
-def test_internal_variables_of_one_name_are_told_apart(tmp_path: Path) -> None:
+def test_internal_variables_of_one_name_are_distinguished(tmp_path: Path) -> None:
     variables = '<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>' + "".join(
         f'<ScalarVariable name="error" valueReference="{reference}"><Real/></ScalarVariable>' for reference in (20, 27)
     )

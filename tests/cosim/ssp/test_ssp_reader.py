@@ -60,7 +60,7 @@ def test_the_system_finds_its_balises_without_our_master(version: str, tmp_path:
         assert first[f"observer.{name}"][-1] == pytest.approx(second[f"observer.{name}"][-1], abs=1e-7)
 
 
-def test_read_back_every_balise_is_told_once(tmp_path: Path) -> None:
+def test_read_back_every_balise_is_delivered_once(tmp_path: Path) -> None:
     scenario = small()
     again = Scenario.load(scenario.export_ssp(tmp_path / "small.ssp", "1.0"))
     assert set(again.table().components) == set(scenario.table().components)

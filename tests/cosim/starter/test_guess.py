@@ -99,7 +99,7 @@ def test_what_is_something_else_is_not_taken_for_it(
     assert found is None or ((quantity, name) in UNSURE and found.sureness != "sure")
 
 
-def test_the_best_comes_first_and_the_others_are_told() -> None:
+def test_the_best_comes_first_and_the_others_are_reported() -> None:
     signals = [
         signal("v2", "m/s"),
         signal("y", "m/s"),

@@ -142,7 +142,7 @@ def test_a_train_without_position_has_no_balises(tmp_path: Path) -> None:
     assert table.report.true_speed == "plant.v"
 
 
-def test_a_train_that_hides_position_and_speed_is_looked_into(tmp_path: Path) -> None:
+def test_a_train_that_hides_position_and_speed_is_searched(tmp_path: Path) -> None:
     hidden = [Variable(name, number, "local", unit=unit) for number, (name, unit) in enumerate(HIDDEN, start=3)]
     made = write_starter(described(tmp_path, into("f", 1, "N"), out("y", 2), *hidden), tmp_path / "mine.toml")
     table = valid(tmp_path / "mine.toml").table()

@@ -44,7 +44,7 @@ def test_members_are_runs_of_their_own(replay: Replay) -> None:
             np.testing.assert_array_equal(got[member, :, i], alone[f"filter.{state}"])
 
 
-def test_the_same_batch_serves_again(replay: Replay, run: Outcome) -> None:
+def test_a_batch_serves_again(replay: Replay, run: Outcome) -> None:
     other = replay.run(STATES, {"measurement_variance": [0.1, 0.1]})
     again = replay.run(STATES)
     np.testing.assert_array_equal(again[0, :, 0], run["filter.current_d"])

@@ -74,7 +74,7 @@ def test_random_points_are_those_of_the_seed() -> None:
         ("a", "grid", None, "expected names with lists"),
     ],
 )
-def test_what_cannot_be_varied_is_told(values: Any, mode: Any, count: int | None, message: str) -> None:
+def test_what_cannot_be_varied_is_reported(values: Any, mode: Any, count: int | None, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         variations(values, mode, count, 0)
 

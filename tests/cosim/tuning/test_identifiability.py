@@ -47,7 +47,7 @@ def test_two_that_only_act_together_are_named_together() -> None:
     assert "measurement" not in text
 
 
-def test_where_nothing_is_told_nothing_is_said() -> None:
+def test_where_nothing_is_stated_nothing_is_said() -> None:
     assert directions(SPACE, [None] * 5) is None
     assert directions(SPACE, [np.full(3, np.nan)] * 5) is None
     assert directions(SPACE, [np.empty(0)] * 5) is None

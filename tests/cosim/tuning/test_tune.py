@@ -143,7 +143,7 @@ def test_the_likelihood_needs_no_true_values_and_sees_the_scale() -> None:
 
 
 @pytest.mark.parametrize("observer", ["motor_ekf", "extended_kalman_filter", "ensemble_kalman_filter"])
-def test_nis_is_judged_by_the_measurements_of_the_observer(observer: str) -> None:
+def test_nis_is_evaluated_by_the_measurements_of_the_observer(observer: str) -> None:
     """Two currents of a motor, one angle of a pendulum; and a filter that tells its degrees itself."""
     rows = np.zeros(50, [("time", "f8"), ("filter.nis", "f8"), ("filter.nis_degrees", "f8")])
     rows["time"], rows["filter.nis_degrees"] = np.arange(50.0), 3.0
@@ -329,12 +329,12 @@ def test_anything_of_a_scenario_is_tuned_by_a_function_of_the_outcome() -> None:
         ({"options": {"popultion": 3}}, "no option 'popultion'; did you mean 'population'"),
     ],
 )
-def test_what_cannot_be_is_told_before_a_search(changes: dict[str, Any], words: str) -> None:
+def test_what_cannot_be_is_reported_before_a_search(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
         tuned(drive(0.001), **changes)
 
 
-def test_values_at_the_end_of_their_range_are_told() -> None:
+def test_values_at_the_end_of_their_range_are_reported() -> None:
     space = SearchSpace([Bounded("q", 1e-6, 1.0, True), Bounded("r", 0.0, 2.0), Bounded("held", 0.0, 1.0)])
     told = at_bounds(space, {"q": 1e-6, "r": 1.0, "held": 0.0}, {"held": "it changes nothing"})
     assert [text.partition(":")[0] for text in told] == ["q ends at its lower bound, 1e-06"]

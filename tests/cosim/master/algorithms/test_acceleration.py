@@ -133,7 +133,7 @@ def test_a_constant_relaxation_multiplies_the_error(gain: float, w: float) -> No
 
 
 @pytest.mark.parametrize("kind", [_Aitken, Newton])
-def test_the_same_problem_in_other_units_takes_the_same_way(kind: type[Acceleration]) -> None:
+def test_a_problem_in_other_units_takes_an_equal_way(kind: type[Acceleration]) -> None:
     matrix, offset, units = np.array([[0.4, 0.3], [-0.2, 0.5]]), np.array([1.0, -2.0]), np.array([1e-3, 1e6])
     for rounds in (2, 3, 4):
         plain = search(kind(2), lambda z: matrix @ z + offset, np.zeros(2), rounds)

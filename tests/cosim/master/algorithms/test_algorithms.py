@@ -195,7 +195,7 @@ class Meeting(Counter):
         super().move(t, h)
 
 
-def test_sealed_fmus_really_step_at_the_same_time() -> None:
+def test_sealed_fmus_really_step_at_one_time() -> None:
     class Both(Meeting):
         barrier = threading.Barrier(2)
 
@@ -204,7 +204,7 @@ def test_sealed_fmus_really_step_at_the_same_time() -> None:
     assert table["a.total"][-1] == pytest.approx(0.5, rel=1e-12)
 
 
-def test_of_several_failures_the_first_of_the_plan_is_told_once_all_have_come_back() -> None:
+def test_of_several_failures_the_first_of_the_plan_is_reported_once_all_have_come_back() -> None:
     class Fails(Meeting):
         barrier = threading.Barrier(3)
 

@@ -46,7 +46,7 @@ def test_the_summary_says_what_was_chosen_and_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.compiler
-def test_held_connections_are_told(tmp_path: Path) -> None:
+def test_held_connections_are_reported(tmp_path: Path) -> None:
     cut = cuts(Chain.two())["force-displacement"]
     made = scenario(dict(cut.parts), cut.connections, tmp_path)
     told = {}
@@ -69,7 +69,7 @@ def test_a_refusal_names_file_and_loop(tmp_path: Path, algorithm: str) -> None:
 
 
 @pytest.mark.compiler
-def test_without_saved_states_the_remedy_is_told(tmp_path: Path) -> None:
+def test_without_saved_states_the_remedy_is_reported(tmp_path: Path) -> None:
     made = scenario(DIVERGENT.parts, DIVERGENT.connections, tmp_path, state=False)
     with pytest.raises(cosim.CosimError, match=r"cannot: first, second\. Use FMUs that can, or break the loop"):
         made.run()

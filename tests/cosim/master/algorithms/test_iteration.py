@@ -202,7 +202,7 @@ def test_an_iterated_run_is_the_implicit_recurrence(tmp_path: Path, name: str, v
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("method", METHODS)
-def test_all_methods_find_the_same_step(tmp_path: Path, method: str) -> None:
+def test_all_methods_find_one_step(tmp_path: Path, method: str) -> None:
     cut = cuts(CHAIN)["force-force"]
     table, summary = run(load(cut, tmp_path), cut.connections, 0.02, 40, {"algorithm": "iterate"} | by(method))
     expected = recurrence(cut, order_of(table), 0.02, 40, "iterate")
@@ -310,7 +310,7 @@ LAYOUTS: dict[str, tuple[list[str], list[tuple[str, str]], list[str]]] = {
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("method", ["rollback", "interpolate"])
-def test_balises_inside_an_iterated_loop_are_told_once_and_leave_no_trace(method: Any, layout: str) -> None:
+def test_balises_inside_an_iterated_loop_are_delivered_once_and_leave_no_trace(method: Any, layout: str) -> None:
     """The plant moves bit for bit as without them; each telegram comes once, at the instant at which the plant is
     there.
     """
@@ -345,7 +345,7 @@ def test_balises_inside_an_iterated_loop_are_told_once_and_leave_no_trace(method
 # ---------------------------------------------------------------------------------------------
 
 
-def test_the_summary_tells_of_sweeps_and_residuals() -> None:
+def test_the_summary_states_sweeps_and_residuals() -> None:
     """``y = u / 2 + t``: each sweep halves the residual; from one point to the next the solution moves by 0.2."""
 
     class Half(Bent):
@@ -394,7 +394,7 @@ def test_a_loop_without_solution_ends_the_run_with_its_history(method: str) -> N
     assert master.plan.values[0] == 0.0  # a guess gone astray is no result
 
 
-def test_a_divergence_to_infinity_is_told_as_such() -> None:
+def test_a_divergence_to_infinity_is_reported_as_such() -> None:
     class Explodes(Bent):
         def compute(self) -> None:
             with np.errstate(over="ignore"):

@@ -229,7 +229,7 @@ def test_an_interval_that_turns_bad_on_the_way_ends_the_run_with_what_was_comput
     assert master.recorder.table()["time"][-1] == pytest.approx(0.14)
 
 
-def test_a_countdown_armed_again_at_the_same_instant_for_ever_is_an_error(folder: Path) -> None:
+def test_a_countdown_armed_again_at_its_instant_for_ever_is_an_error(folder: Path) -> None:
     with pytest.raises(RunError, match=r"t = 0.21 s do not settle in 100 rounds.*c.alarms"):
         run(parts(c=countdown_fmu(folder)), [], 0.1, 10, starts={"c": {"repeat": True, "delay": 0.0}})
 
@@ -253,7 +253,7 @@ def test_one_clock_may_trigger_several_and_unconnected_ones_stay_silent(folder: 
     assert (seen.end("r.count"), seen.end("lonely.count")) == (5.0, 0.0)
 
 
-def test_a_connected_clock_is_no_event_to_be_told_and_frees_its_inputs(folder: Path) -> None:
+def test_a_connected_clock_is_no_event_to_be_notified_and_frees_its_inputs(folder: Path) -> None:
     components = {c.name: c for c in parts(s=triggered_fmu(folder), r=receiver_fmu(folder))}
     try:
         assert list(components["r"].events) == ["tick"]

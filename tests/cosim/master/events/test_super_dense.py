@@ -199,7 +199,7 @@ def test_nobody_is_taken_back_where_nothing_is_connected(folder: Path) -> None:
     assert not saves
 
 
-def test_an_observer_in_a_loop_that_is_only_told_of_balises_needs_no_coordinator() -> None:
+def test_an_observer_in_a_loop_that_is_only_notified_of_balises_needs_no_coordinator() -> None:
     """Its Event Mode serves telegrams only: nothing is added to the steps of such loops, and they may be compiled."""
     wires = ["plant.speed -> listener.speed", "listener.heard -> c.rate"]
     components = [block(Motion(), "plant"), block(Listener(), "listener"), component(Counter(), "c")]
@@ -285,7 +285,7 @@ def test_who_takes_whole_steps_only_gets_values_at_the_next_point_and_is_noted(f
 @pytest.mark.parametrize("method", ["rollback", "predict", "interpolate"])
 @given(places=st.lists(st.floats(0.1, 13.0), min_size=1, max_size=6, unique=True), latency=st.sampled_from([0.0, 0.03]))
 @settings(max_examples=8)
-def test_balises_are_told_once_whatever_events_divide_the_step(
+def test_balises_are_delivered_once_whatever_events_divide_the_step(
     folder: Path, method: Any, places: list[float], latency: float
 ) -> None:
     """The same telegrams at the same instants as without the component that returns early in the same steps."""
@@ -310,7 +310,7 @@ def test_balises_are_told_once_whatever_events_divide_the_step(
     assert np.all(np.diff(divided.time) >= 0.0)
 
 
-def test_a_receiver_of_whole_steps_is_told_of_what_was_passed_in_every_part_of_it(folder: Path) -> None:
+def test_a_receiver_of_whole_steps_is_notified_of_what_was_passed_in_every_part_of_it(folder: Path) -> None:
     listener = block(Listener(), "listener")
     object.__setattr__(listener.capabilities, "canHandleVariableCommunicationStepSize", False)
     speed, divided_at = 13.9, crossing_times(1.0)  # steps from 0.1 s and from 0.3 s are divided at 0.173 s and 0.346 s

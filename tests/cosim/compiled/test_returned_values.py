@@ -13,7 +13,7 @@ from cosim.compiled.recorded_returns import RecordedReturn
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_an_answer_is_never_written_into_another_call(version: int) -> None:
+def test_a_response_is_never_written_into_another_call(version: int) -> None:
     target = np.zeros(3)
     place = target.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
     function = {2: "fmi2GetReal", 3: "fmi3GetFloat64"}[version]
@@ -40,7 +40,7 @@ def run(stepper: str) -> np.ndarray:
 
 
 @pytest.mark.compiler
-def test_a_receiver_that_counts_missing_samples_gives_the_same_numbers_in_both_steppers(
+def test_a_receiver_that_counts_missing_samples_gives_equal_numbers_in_both_steppers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its count was read in the middle of a telegram, with the answer that its outputs were to get."""

@@ -211,7 +211,7 @@ def test_errors_count_from_the_start_of_the_evaluation() -> None:
     assert (after.passed, before.passed) == (True, False)
 
 
-def test_several_observers_are_judged_one_by_one() -> None:
+def test_several_observers_are_evaluated_one_by_one() -> None:
     found = judged(hand_made(), {"check": "speed_error", "of": ["observer", "other"], "max": 0.3, "name": "fast"})
     assert [(j.passed, j.number) for j in found] == [(False, 1), (True, 1)]
     assert all(j.name.startswith("fast (") for j in found)
@@ -250,7 +250,7 @@ def test_a_run_that_failed_at_6_s(item: dict[str, Any], passed: bool, text: str)
     assert text in found.text
 
 
-def test_a_run_that_ended_as_a_component_asked_is_judged_by_what_there_is() -> None:
+def test_a_run_that_ended_as_a_component_asked_is_evaluated_by_what_there_is() -> None:
     ended = hand_made(until=6.0)
     (whole,) = judged(ended, {"check": "speed_error", "max": 1.0})
     (asked,) = judged(ended, {"check": "speed_error", "max": 1.0, "to": 9.0})

@@ -32,7 +32,7 @@ def warned(name: str, sensor: str, given: dict[str, float], **parameters: float)
     return [text for text in texts if NOISE in text or SIZE in text]
 
 
-def test_those_that_judge_an_odometer_are_told_of_its_noise() -> None:
+def test_those_that_evaluate_an_odometer_know_its_noise() -> None:
     assert JUDGES == ["jam_detector", "quasi_lpv_uio"]
     holders = [n for n in OBSERVERS if "odometer_noise" in scalar_names(shipped(n).parameter_signals)]
     assert sorted(holders) == JUDGES
@@ -47,7 +47,7 @@ def test_those_that_judge_an_odometer_are_told_of_its_noise() -> None:
         ("pulse_odometer", {"teeth": 1000.0, "noise_std": 0.02}, 0.08338),
     ],
 )
-def test_less_than_arrives_is_told_and_enough_is_not(
+def test_less_than_arrives_is_reported_and_enough_is_not(
     name: str, sensor: str, given: dict[str, float], bound: float
 ) -> None:
     """Bounds by hand: four deviations; 2 pi 0.46 / (100 . 0.2); four of sqrt(0.02^2 + 0.01445^2 / 6)."""
@@ -58,7 +58,7 @@ def test_less_than_arrives_is_told_and_enough_is_not(
 
 
 @pytest.mark.parametrize("name", JUDGES)
-def test_faults_that_are_noise_are_told_by_their_size(name: str) -> None:
+def test_faults_that_are_noise_are_detected_by_their_size(name: str) -> None:
     """eps / M is 0.4 / 3.36; noise of 0.05 m/s makes sqrt(2) 0.2 = 0.283 m/s, 0.483 m/s with that of the reading."""
     quiet = {"sample_period": 0.2, "noise_std": 0.02}
     noisy = quiet | {"noise_std": 0.05}
@@ -67,7 +67,7 @@ def test_faults_that_are_noise_are_told_by_their_size(name: str) -> None:
     assert "by 0.283 m/s in one of two cases, by 0.483 m/s always" in told
 
 
-def test_gains_that_make_more_of_noise_are_told() -> None:
+def test_gains_that_make_more_of_noise_are_reported() -> None:
     loud = {"gain_low": [9.0, -1.34, -0.22], "gain_high": [9.0, -1.33, -0.22]}
     told = _working_points(Scenario.load("jam_odometry").table().components, [], "here")
     assert told == []

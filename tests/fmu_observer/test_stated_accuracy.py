@@ -47,7 +47,7 @@ def caused(make: Callable[[], GatedObserver], accuracy: float) -> float:
 
 
 @every
-def test_the_error_of_a_balise_falls_with_the_accuracy_that_it_tells(make: Callable[[], GatedObserver]) -> None:
+def test_the_error_of_a_balise_falls_with_the_accuracy_that_it_states(make: Callable[[], GatedObserver]) -> None:
     errors = [caused(make, accuracy) for accuracy in TOLD]
     assert errors[0] > 0.02, errors  # it acts
     assert all(later < earlier for earlier, later in pairwise(errors)), errors
@@ -98,7 +98,7 @@ def test_a_robust_loss_makes_no_balise_weigh_more() -> None:
         assert caused(robust, accuracy) <= caused(squares, accuracy)
 
 
-def test_what_a_told_accuracy_leaves_is_told_honestly() -> None:
+def test_what_a_stated_accuracy_leaves_is_reported_honestly() -> None:
     """150 wheels with a radius of their own, balises anywhere within the accuracy that each tells."""
     system, rng, v = OBSERVERS["adaptive_wheel_radius"](), np.random.default_rng(3), 20.0
     ratios = []
